@@ -17,6 +17,7 @@ from robots.terms import (
     COULOMB_VISCOUS,
     POLYNOMIAL,
     TERMS,
+    BendingFriction,
     Column,
     FrictionPolynomial,
     FrictionTerm,
@@ -177,6 +178,15 @@ class TorqueModel:
             tau[rows] = self.regressor(*(array[rows] for array in arrays), columns=columns) @ pi
         return tau
 
+    def friction_at(self, speed: ArrayLike) -> Array:
+        """Evaluates each friction column on its own joint (p,) at joint velocities (n,); zero for other columns."""
+        chosen = [k for k, column in enumerate(self.columns) if column.friction]
+        values, n = np.zeros(self.size), self.robot.n
+        if chosen:
+            Y = self.symbolic(chosen)(np.zeros(n), np.asarray(speed, dtype=float), np.zeros(n)).full()
+            values[chosen] = Y[[self.columns[k].joint - 1 for k in chosen], range(len(chosen))]
+        return values
+
     def __getstate__(self) -> dict[str, object]:
         # Symbols and loaded libraries do not cross process borders; they are rebuilt where they are needed.
         return {"robot": self.robot, "terms": self.terms}
@@ -224,7 +234,9 @@ def friction_term(choice: str | FrictionTerm, velocity_scale: float | tuple[floa
         return replace(choice, velocity_scale=velocity_scale)
     if choice in FRICTIONS:
         return FrictionPolynomial(powers=FRICTIONS[choice], velocity_scale=velocity_scale)
-    own = [name for name in TERMS if name != FrictionPolynomial.name and issubclass(TERMS[name], FrictionTerm)]
+    # The built-in terms have names above, or are made from the data.
+    built_in = (FrictionPolynomial.name, BendingFriction.name)
+    own = [name for name in TERMS if name not in built_in and issubclass(TERMS[name], FrictionTerm)]
     if choice not in own:
         TERMS.refuse_failed(choice)
         if choice not in TERMS:

@@ -19,8 +19,8 @@ from tests.kr300 import kr300
 
 Array = NDArray[np.float64]
 
-# Logs are cut into pieces of this length [s], which are then ranked by speed or place.
-PIECE = 1.0
+# Logs are cut into so many pieces of equal length, which are then ranked by speed or place.
+PIECES = 12
 
 
 @dataclass(frozen=True)
@@ -44,13 +44,13 @@ class Split:
 
 def within(name: str, robot: Robot, log: Log) -> Iterator[Split]:
     """Splits one log: slow pieces predict fast ones, and one half of the range of each wide joint the other half."""
-    pieces = np.floor((log.t - log.t[0]) / PIECE).astype(int)
+    pieces = np.minimum(PIECES * (log.t - log.t[0]) / log.duration, PIECES - 1).astype(int)
     speed = np.abs(np.gradient(log.q, log.t, axis=0))
     usual = np.maximum(np.sqrt((speed**2).mean(axis=0)), 1e-9)
-    fastness = np.array([(speed[pieces == k] / usual).mean() for k in range(pieces[-1] + 1)])
+    fastness = np.array([(speed[pieces == k] / usual).mean() for k in range(PIECES)])
     yield _by_pieces(f"{name}, slow to fast", robot, log, pieces, fastness)
     widest = int(np.argmax(np.ptp(log.q, axis=0)))
-    place = np.array([log.q[pieces == k, widest].mean() for k in range(pieces[-1] + 1)])
+    place = np.array([log.q[pieces == k, widest].mean() for k in range(PIECES)])
     yield _by_pieces(f"{name}, low to high joint {widest + 1}", robot, log, pieces, place)
     half = len(log) // 2
     yield Split(f"{name}, first to second half", robot, (log.rows(slice(0, half)),), log, np.arange(len(log)) >= half)

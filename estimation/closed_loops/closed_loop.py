@@ -14,7 +14,7 @@ from scipy.interpolate import CubicHermiteSpline
 from robots.base_parameters import BaseParameters
 from robots.common.errors import InputError, SolverError
 from robots.signals import Motion
-from robots.terms import FrictionPolynomial
+from robots.terms import FrictionTerm
 
 Array = NDArray[np.float64]
 
@@ -96,9 +96,7 @@ class ClosedLoop:
     def __init__(self, base: BaseParameters) -> None:
         self.base = base
         self._dry = {
-            column.joint - 1: k
-            for k, column in enumerate(base.columns)
-            if column.term == "friction" and column.symbol == "f1"
+            column.joint - 1: k for k, column in enumerate(base.columns) if column.friction and column.symbol == "f1"
         }
         self._width = _friction_widths(base)
         self._step = self._build()
@@ -235,6 +233,6 @@ def _friction_widths(base: BaseParameters) -> Array:
     n = base.model.robot.n
     widths = np.full(n, 1e-6)
     for term in base.model.terms:
-        if isinstance(term, FrictionPolynomial):
+        if isinstance(term, FrictionTerm):
             widths = np.maximum(np.full(n, 1.0) * np.array(term.velocity_scale), widths)
     return widths

@@ -144,7 +144,7 @@ class PhysicallyConsistent(WeightedLeastSquares):
         pull: str = "entropic",
         weight: float | None = None,
         boxes: Mapping[int, tuple[ArrayLike, ArrayLike]] | None = None,
-        temper: float = 0.5,
+        temper: float = 1.0,
     ) -> None:
         super().__init__(temper)
         if pull not in ("entropic", "euclidean"):

@@ -54,7 +54,7 @@ class ConstrainedLeastSquares(WeightedLeastSquares):
         bounds: Mapping[str, tuple[float, float]] | None = None,
         total_mass: float | tuple[float, float] | None = None,
         signs: bool = True,
-        temper: float = 0.5,
+        temper: float = 1.0,
     ) -> None:
         super().__init__(temper)
         self.bounds = dict(bounds or {})

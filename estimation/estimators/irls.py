@@ -43,7 +43,7 @@ class ReweightedLeastSquares(WeightedLeastSquares):
         InputError: a tuning that is not positive.
     """
 
-    def __init__(self, tuning: float, temper: float = 0.5) -> None:
+    def __init__(self, tuning: float, temper: float = 1.0) -> None:
         super().__init__(temper)
         if not (np.isfinite(tuning) and tuning > 0):
             raise InputError(f"a tuning of {tuning}", allowed="a positive number of residual levels")
@@ -103,7 +103,7 @@ class Huber(ReweightedLeastSquares):
 
     name = "huber"
 
-    def __init__(self, tuning: float = 1.345, temper: float = 0.5) -> None:
+    def __init__(self, tuning: float = 1.345, temper: float = 1.0) -> None:
         super().__init__(tuning, temper)
 
     def factors(self, share: Array) -> Array:
@@ -123,7 +123,7 @@ class Tukey(ReweightedLeastSquares):
 
     name = "tukey"
 
-    def __init__(self, tuning: float = 4.685, temper: float = 0.5) -> None:
+    def __init__(self, tuning: float = 4.685, temper: float = 1.0) -> None:
         super().__init__(tuning, temper)
 
     def factors(self, share: Array) -> Array:

@@ -155,7 +155,7 @@ class RecursiveLeastSquares(WeightedLeastSquares):
 
     name = "recursive"
 
-    def __init__(self, forgetting: float = 1.0, temper: float = 0.5) -> None:
+    def __init__(self, forgetting: float = 1.0, temper: float = 1.0) -> None:
         super().__init__(temper)
         if not 0 < forgetting <= 1:
             raise InputError(f"a forgetting of {forgetting}", allowed="above 0, up to 1")

@@ -62,7 +62,7 @@ class SimulatingEstimator(WeightedLeastSquares):
 
     simulates = True
 
-    def __init__(self, loop: Loop | None = None, temper: float = 0.5) -> None:
+    def __init__(self, loop: Loop | None = None, temper: float = 1.0) -> None:
         super().__init__(temper)
         self.loop = loop or Loop()
 

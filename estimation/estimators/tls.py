@@ -47,7 +47,7 @@ class TotalLeastSquares(WeightedLeastSquares):
 
     name = "tls"
 
-    def __init__(self, noise: ArrayLike | None = None, temper: float = 0.5) -> None:
+    def __init__(self, noise: ArrayLike | None = None, temper: float = 1.0) -> None:
         super().__init__(temper)
         self.noise = None if noise is None else np.asarray(noise, dtype=float)
         if self.noise is not None:

@@ -8,13 +8,16 @@ from estimation.estimators.base import Array, Estimator
 from estimation.regressions.moments import Moments
 from robots.common.errors import InputError
 
+ROUNDS = 2
+# A joint's mean square torque counts as this share of the largest one's at least.
+SMALLEST = 1e-12
+
 
 class WeightedLeastSquares(Estimator):
-    """min sum_j w_j ||tau_j - Y_j pi||^2 with w_j = sigma_j^(-2 temper), sigma_j the residual level of least squares.
+    """min sum_j w_j ||tau_j - Y_j pi||^2 with w_j = sigma_j^(-2 temper), sigma_j the residual level of the joint.
 
-    With `temper` 1 this is the textbook's inverse variance (Swevers et al. 1997). On measured logs most of a residual
-    is what the model lacks, not noise: full weights would then hand the shared parameters to whichever joint happens
-    to be modelled best. Reweighted once, for the same reason.
+    With `temper` 1 this is the textbook's inverse variance (Swevers et al. 1997). The level is that of a fit in which
+    each joint counts by its torque, and of two more with the weights found before.
 
     Args:
         temper: 0 (ordinary least squares) to 1.
@@ -25,12 +28,15 @@ class WeightedLeastSquares(Estimator):
 
     name = "wls"
 
-    def __init__(self, temper: float = 0.5) -> None:
+    def __init__(self, temper: float = 1.0) -> None:
         if not 0 <= temper <= 1:
             raise InputError(f"a temper of {temper}", allowed="0 to 1")
         self.temper = temper
 
     def weights(self, moments: Moments, ridge: float) -> Array:
         """Gives the inverse residual level to the power of twice the temper (n,)."""
-        first = moments.solve(np.ones(len(moments.count)), ridge)
-        return moments.level(first) ** (-2 * self.temper)
+        torque = moments.square / np.maximum(moments.count, 1)
+        weights = np.maximum(torque, SMALLEST * float(torque.max()) + np.finfo(float).tiny) ** -self.temper
+        for _ in range(ROUNDS):
+            weights = moments.level(moments.solve(weights, ridge)) ** (-2 * self.temper)
+        return weights

@@ -1,15 +1,16 @@
-"""Choices by cross-validation: smoothing, sharpness of the friction's sign, regularisation."""
+"""Choices that the data make: smoothing, sharpness of the friction's sign, and a torque by position."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from estimation.estimators import Estimator
 from estimation.identifications.comparison import VELOCITY_SCALES, Comparison
+from estimation.identifications.transfer import Band, Transfer
 from estimation.identifications.trials import Candidates
 from estimation.preprocessing import Smoother
 from estimation.regressions.parameter_priors import GaussianPrior
@@ -17,6 +18,9 @@ from estimation.regressions.preparation import Prepared
 from robots.base_parameters import BaseParameters
 
 Array = NDArray[np.float64]
+
+# Decrease of the error on other motions (mean log) that a torque by position must bring.
+POSITION_GAIN = 0.03
 
 __all__ = ["VELOCITY_SCALES", "Candidates", "Choice", "choose"]
 
@@ -27,28 +31,26 @@ class Choice:
 
     Attributes:
         smoother: of the positions.
-        ridge: of the fit.
+        ridge: weight of the prior, see `Moments.solve`.
         velocity_scales: of each joint's Coulomb column (n,) [rad/s or m/s].
-        pull: what the ridge pulls to; None for zero.
+        prior: of the base parameters.
+        position: whether the model has a torque by each joint's position.
         held_out: RMS of the torque error on blocks left out of the fit (n,) [N m or N], joints at rest and the logs'
             ends besides: what a prediction is judged on.
         spread: standard deviation of the torque (n,): the error of a constant.
-        band: half-width (n,) [N m or N] of a band that holds 95 % of the left-out errors.
-        band_coverage: share (n,) of each block's errors within the band that the other blocks' errors give.
+        band: of the prediction of other motions.
         cost: mean log of the left-out error over that of a constant; a joint worse than a constant counts as one.
-        plain: the choice with the smallest ridge and no pull, which biases nothing; None where this is it.
     """
 
     smoother: Smoother
     ridge: float
     velocity_scales: tuple[float, ...]
-    pull: GaussianPrior | None
+    prior: GaussianPrior
+    position: bool
     held_out: Array
     spread: Array
-    band: Array
-    band_coverage: Array
+    band: Band
     cost: float
-    plain: Choice | None = None
 
     @property
     def cutoff(self) -> float:
@@ -56,40 +58,44 @@ class Choice:
         return self.smoother.cutoff
 
 
-def choose(base: BaseParameters, logs: Sequence[Prepared], estimator: Estimator, candidates: Candidates) -> Choice:
-    """Compares candidates by cross-validation over contiguous blocks: smoothing first, then regularisation.
+def choose(
+    base: BaseParameters,
+    logs: Sequence[Prepared],
+    estimator: Estimator,
+    candidates: Candidates,
+    *,
+    position: bool | None = None,
+) -> Choice:
+    """Chooses by predicting parts of the logs from others.
+
+    The smoothing is the one that predicts contiguous blocks best, the low-pass unless another is clearly better. What
+    the model has besides is judged on parts that are other motions (`Transfer`).
 
     Args:
         base: base parameters of the model whose friction uses the first of `VELOCITY_SCALES`.
         logs: the data.
         estimator: what will fit.
         candidates: what to choose from.
-
-    Returns:
-        The low-pass unless another smoother is clearly better; the smallest ridge, then the lowest cut-off, that is as
-        good as the best; a pull towards the description where it clearly helps.
+        position: whether a `PositionTorque` of the base stays. None: where it predicts other motions clearly better.
     """
     comparison = Comparison(base, logs, estimator, candidates)
     smoother = comparison.smoother()
-    # On the logged torque: a ridge causes bias, so its gain must be significant.
-    blocks = comparison.blocks(smoother, 1)
-    choices: list[Choice] = []
-    for trial in comparison.regularisation(blocks):
-        if choices and trial.ridge == choices[0].ridge and trial.pull is None:
-            return choices[0]
-        band, covered = comparison.band(smoother, blocks, trial)
-        choices.append(
-            Choice(
-                smoother=smoother,
-                ridge=trial.ridge,
-                velocity_scales=tuple(VELOCITY_SCALES[k] for k in trial.scales),
-                pull=trial.pull,
-                held_out=np.exp(trial.logs) * comparison.spread,
-                spread=comparison.spread,
-                band=band,
-                band_coverage=covered,
-                cost=trial.cost,
-            )
-        )
-    plain, best = choices
-    return replace(best, plain=plain)
+    averaged, logged = comparison.blocks(smoother), comparison.blocks(smoother, 1)
+    transfer = Transfer(comparison, smoother)
+    trial = comparison.trial(averaged)
+    if position is not False and len(comparison.plain) < base.size:
+        other = comparison.trial(averaged, position=True)
+        if position or transfer.cost(averaged, other) < transfer.cost(averaged, trial) - POSITION_GAIN:
+            trial, position = other, True
+    held_out = comparison.left_out(logged, trial)
+    return Choice(
+        smoother=smoother,
+        ridge=trial.ridge,
+        velocity_scales=tuple(VELOCITY_SCALES[k] for k in trial.scales),
+        prior=trial.prior,
+        position=bool(position),
+        held_out=held_out,
+        spread=comparison.spread,
+        band=transfer.band(averaged, trial),
+        cost=float(np.minimum(np.log(np.maximum(held_out / comparison.spread, 1e-9)), 0.0).mean()),
+    )

@@ -39,8 +39,7 @@ class JointFit:
         nominal_rms: error of the robot description's own parameters; NaN where it has none.
         noise_floor: what no model of the motion can predict: what differs from period to period where the motion is
             periodic, else the level of white noise that explains the residual's fastest part.
-        band: half-width of a band that holds 95 % of the left-out errors.
-        band_coverage: share of each left-out block that the band of the other blocks holds; NaN of a single block.
+        band: half-width of a band that holds 95 % of the errors on the fitted logs.
         identified: whether the left-out error is clearly below that of a constant.
     """
 
@@ -53,7 +52,6 @@ class JointFit:
     nominal_rms: float
     noise_floor: float
     band: float
-    band_coverage: float
     identified: bool
 
     @property
@@ -118,19 +116,13 @@ class Estimate:
         unknown = [name for name, known in zip(self.model.names, self.model.determined, strict=True) if not known]
         if unknown:
             found.append(
-                f"{len(unknown)} of {len(self.model.names)} parameters are not determined: {', '.join(unknown)}."
+                f"{len(unknown)} of {len(self.model.names)} parameters are not determined: {', '.join(unknown)}. "
+                "They stay near the robot's description, or near a plausible arm where it states nothing."
             )
-        if self.choice.pull is not None:
+        if self.choice.position:
             found.append(
-                f"These logs do not determine some parameter combinations. They were regularised towards the robot's "
-                f"description (weight {self.choice.ridge:.2g}), which improves the prediction of held-out data. The "
-                f"standard errors include the shift by the regularisation."
-            )
-        elif self.choice.ridge > 1e-6:
-            found.append(
-                f"These logs do not determine some parameter combinations. They were regularised towards zero (ridge, "
-                f"weight {self.choice.ridge:.2g}) to keep predictions bounded. The standard errors include the shift "
-                f"by the regularisation."
+                "Each joint has a torque by its position (sin1, cos1, sin2, cos2), which predicts other motions better "
+                "than the rigid body alone. Its cause is unknown: use oed diagnose to find it."
             )
         if bounds := self.model.provenance.get("at_bounds"):
             found.append(
@@ -197,7 +189,6 @@ class Estimate:
                     "nominal_rms": finite(joint.nominal_rms),
                     "noise_floor": joint.noise_floor,
                     "band95": joint.band,
-                    "band95_coverage": finite(joint.band_coverage),
                 }
                 for joint in self.joints
             ],

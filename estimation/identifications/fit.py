@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from estimation.estimators import Estimator, RegressionData, Solution
 from estimation.identifications.choices import Choice
+from estimation.regressions.braking_friction import with_braking_friction
 from estimation.regressions.joint_regressor import CHUNK, JointRegressor, chunks
 from estimation.regressions.moments import Moments
 from estimation.regressions.preparation import Prepared, Rows
@@ -22,8 +23,6 @@ from robots.common.parallel import threaded
 
 Array = NDArray[np.float64]
 
-# Standard errors are those of the fit without regularisation; this much keeps the inverse finite.
-FAINT = 1e-13
 # In a longer log, evenly spread parts represent the noise's correlation and the sandwich's inner matrix.
 MOST_ROWS, STRETCHES = 100_000, 24
 # For the sandwich the rows of a long log are averaged over so much time [s], ...
@@ -73,7 +72,7 @@ def fit(base: BaseParameters, logs: Sequence[Prepared], estimator: Estimator, ch
     """
     rows = [part for log in logs for part in log.pieces(choice.smoother)]
     regressor = JointRegressor(base)
-    moments = sum_moments(regressor, rows).pulled(choice.pull)
+    moments = sum_moments(regressor, rows).pulled(choice.prior)
     values, weights = estimator.solve(moments, choice.ridge)
     whole = len(rows) == len(logs)
     data = RegressionData(
@@ -85,6 +84,9 @@ def fit(base: BaseParameters, logs: Sequence[Prepared], estimator: Estimator, ch
         smoother=choice.smoother,
     )
     solution = estimator.refine(data, values, weights)
+    if "standard" not in solution.extras:
+        braking = with_braking_friction(base, moments, solution.values, solution.weights, choice.ridge)
+        solution = replace(solution, values=braking)
     # One array for all parts, which the estimate keeps: of millions of rows a copy counts.
     torque = np.empty((sum(len(part.motion) for part in rows), rows[0].tau.shape[1]))
     predicted = np.split(torque, np.cumsum([len(part.motion) for part in rows])[:-1])
@@ -95,12 +97,12 @@ def fit(base: BaseParameters, logs: Sequence[Prepared], estimator: Estimator, ch
     if solution.row_weights is not None:
         factors = [solution.row_weights(part.tau - torque) for part, torque in zip(rows, predicted, strict=True)]
         weighted = [replace(part, mask=part.mask * factor) for part, factor in zip(rows, factors, strict=True)]
-        moments = sum_moments(regressor, weighted).pulled(choice.pull)
+        moments = sum_moments(regressor, weighted).pulled(choice.prior)
         # An M-estimator's scores are its weights times its errors (Huber 1967).
         fitted = [_Fitted(*some) for some in zip(rows, predicted, factors, strict=True)]
         scores = _scores(regressor, fitted, solution.weights) if long else scores
     averaged = round(AVERAGED / float(np.median([log.positions.period for log in logs])))
-    full, white = _covariances(regressor, fitted, scores, moments, solution, averaged, seed)
+    full, white = _covariances(regressor, fitted, scores, moments, solution, choice.ridge, averaged, seed)
     return Fit(
         base=base,
         choice=choice,
@@ -180,13 +182,18 @@ def _covariances(
     scores: Array,
     moments: Moments,
     solution: Solution,
+    ridge: float,
     averaged: int,
     seed: int,
 ) -> tuple[Array, Array]:
+    """Covariance (b, b) by the noise and by the prior's own scatter; and standard errors (b,) under white noise."""
     weights = solution.weights
-    inverse = moments.inverse(weights, FAINT)
+    inverse = moments.inverse(weights, ridge)
+    assert moments.pull is not None
+    held = ridge * float(weights @ moments.square) * inverse
+    scatter = held @ moments.pull.precision @ held
     variance = moments.residual(solution.values) / np.maximum(moments.count, 1)
-    textbook = inverse @ np.tensordot(weights**2 * variance, moments.gram, axes=1) @ inverse
+    textbook = inverse @ np.tensordot(weights**2 * variance, moments.gram, axes=1) @ inverse + scatter
     white = np.sqrt(np.maximum(np.diag(textbook), 0.0))
     if solution.covariance is not None:
         return solution.covariance, white
@@ -198,7 +205,7 @@ def _covariances(
     if share < 1:
         factors = batch_factors(scores, inverse, full)
         full = full * factors[:, None] * factors
-    return full, white
+    return full + scatter, white
 
 
 def _parts(regressor: JointRegressor, fitted: Sequence[_Fitted]) -> list[Part]:

@@ -14,6 +14,7 @@ from estimation.gate import GateReport, check_log
 from estimation.identifications.choices import VELOCITY_SCALES, Candidates, Choice, choose
 from estimation.identifications.estimate import Estimate, JointFit, colour_of
 from estimation.identifications.fit import Fit, fit
+from estimation.identifications.transfer import band_of
 from estimation.logs.known_setup import gravities_of, require_plain
 from estimation.logs.provenance import describe_logs
 from estimation.models.model import Model
@@ -24,24 +25,23 @@ from robots.base_parameters import find_base_parameters
 from robots.common.errors import InputError, NotIdentifiableError
 from robots.common.parallel import one_blas_thread
 from robots.common.progress import SILENT, Progress
-from robots.regressor import default_model
+from robots.regressor import TorqueModel, default_model
 from robots.robot import Robot
 from robots.signals import Log
-from robots.terms import FrictionTerm
+from robots.terms import FrictionTerm, PositionTorque, SaturatingFriction
 from robots.version import VERSION
 
 Array = NDArray[np.float64]
 
-# Where this share of the parameters is determined by the data alone, nothing is regularised: a ridge or a pull would
-# move values by what is not data.
-ENOUGH = 0.9
 # A parameter is determined when its standard error is below this share of it ...
 RELATIVE = 0.5
 # ... or when the torque that its standard error makes is below this share of every joint's torque: it is then known
 # to be too small to matter.
 NEGLIGIBLE = 0.02
 # A joint whose left-out torque is predicted hardly better than by a constant is not identified.
-HOPELESS = 0.9
+HOPELESS = 0.95
+# Speeds are measured over so much time [s]; a joint that moves slower than this [rad/s or m/s] stands.
+SPAN, SLOWEST = 0.02, 1e-3
 # A torque that varies by less than this share of its size, or of 1 N m, is constant but for rounding.
 ROUNDING = 1e-9
 
@@ -52,7 +52,8 @@ def identify(
     logs: Log | Sequence[Log],
     *,
     method: str | Estimator = "wls",
-    friction: str | FrictionTerm = "polynomial",
+    friction: str | FrictionTerm = "auto",
+    position: bool | None = None,
     rotor: bool = True,
     offset: bool = True,
     candidates: Candidates | None = None,
@@ -62,16 +63,20 @@ def identify(
 ) -> Estimate:
     """Identifies base parameters of rigid body, friction, rotors and torque offsets, with standard errors.
 
-    Positions are smoothed and differentiated without phase lag; smoothing, regularisation and the sharpness of the
-    friction's sign are chosen by predicting blocks of the logs from the rest. Torque is fitted as it was logged. The
-    standard errors allow for correlated noise.
+    Positions are smoothed and differentiated without phase lag; smoothing and the sharpness of the friction's sign are
+    chosen by predicting blocks of the logs from the rest. Torque is fitted as it was logged. What the logs leave open
+    stays at the robot's description, or at a plausible arm (`default_prior`). The standard errors allow for correlated
+    noise, and for that prior.
 
     Args:
         robot: the robot.
         logs: one log or several, of t, q and tau or current. One that states a payload or a gravity counts as such: the
             parameters are the arm's own, and all that bases which stand unlike show together.
         method: ``wls``, ``ols``, or an estimator of one's own.
-        friction: ``polynomial`` or ``coulomb-viscous``.
+        friction: ``auto`` (`SaturatingFriction`, which a log of slow motions does not let explode at high speed),
+            ``polynomial`` (thesis eq. 35), ``coulomb-viscous``, or a term of one's own.
+        position: whether each joint has a torque by its own position, of unknown cause (`PositionTorque`). None: with
+            ``auto`` friction, where it predicts other motions clearly better.
         rotor: with rotor inertias.
         offset: with a torque offset per joint.
         candidates: settings that the data choose from.
@@ -94,7 +99,7 @@ def identify(
     if chosen.simulates:
         require_plain(data, f"the method {chosen.name}")
     bar = progress or SILENT
-    bar.start("identifying", 4.0)
+    bar.start("identifying", 3.0)
     _require_motion(data)
     gates: list[GateReport] = []
     for log in data if check else ():
@@ -103,34 +108,31 @@ def identify(
         gates[-1].raise_if_refused()
     usable = [part for log, gate in zip(data, gates, strict=True) for part in gate.usable(log)] if gates else data
     prepared = prepare_all(robot, usable)
-    sharp = default_model(robot, friction=friction, velocity_scale=VELOCITY_SCALES[0], rotor=rotor, offset=offset)
-    base = find_base_parameters(sharp, gravities=gravities_of(data))
-    bar.update(1.0, "choosing smoothing and regularisation")
-    choice = choose(base, prepared, chosen, candidates or Candidates())
+    by_position = friction == "auto" if position is None else position
+    if friction == "auto":
+        friction = SaturatingFriction(speed=_usual_speeds(prepared))
+
+    def model(scales: float | tuple[float, ...], with_position: bool) -> TorqueModel:
+        plain = default_model(robot, friction=friction, velocity_scale=scales, rotor=rotor, offset=offset)
+        return replace(plain, terms=(*plain.terms, PositionTorque())) if with_position else plain
+
+    base = find_base_parameters(model(VELOCITY_SCALES[0], by_position), gravities=gravities_of(data))
+    bar.update(1.0, "choosing smoothing and model")
+    choice = choose(base, prepared, chosen, candidates or Candidates(), position=position)
     predictable = _predictable(prepared, choice)
     bar.update(2.0, "fitting")
-
-    def fitted(setting: Choice, free: Array | None = None) -> tuple[Fit, tuple[JointFit, ...], NDArray[np.bool_]]:
-        scales, own = setting.velocity_scales, base
-        if set(scales) != {VELOCITY_SCALES[0]}:
-            model = default_model(robot, friction=friction, velocity_scale=scales, rotor=rotor, offset=offset)
-            own = replace(base, model=model)
-        found = fit(own, prepared, chosen, setting, seed)
-        if free is not None:
-            # The covariance is that of the fit without regularisation; how far that has moved each value comes on top.
-            moved = found.solution.values - free
-            found = replace(found, covariance=found.covariance + np.outer(moved, moved))
-        joints = _joint_fits(found, predictable)
-        return found, joints, _determined(found, joints)
-
-    found, joints, determined = fitted(choice.plain or choice)
-    if choice.plain is not None and determined.mean() < ENOUGH:
-        bar.update(3.0, "fitting with regularisation")
-        found, joints, determined = fitted(choice, found.solution.values)
+    if choice.position != by_position:
+        base = find_base_parameters(model(VELOCITY_SCALES[0], False), gravities=gravities_of(data))
+    if set(choice.velocity_scales) != {VELOCITY_SCALES[0]}:
+        base = replace(base, model=model(choice.velocity_scales, choice.position))
+    found = fit(base, prepared, chosen, choice, seed)
+    joints = _joint_fits(found, predictable)
+    determined = _determined(found, joints)
     bar.finish()
     colour = colour_of(np.sqrt(np.maximum(np.diag(found.covariance), 0.0)), found.white, determined)
     base, rows = found.base, found.rows
     provenance = {**_provenance(data, chosen, found.choice, joints, seed), "colour": colour}
+    provenance["recorded"] = _recorded(found)
     provenance["gravities"] = [list(gravity) for gravity in base.gravities]
     if "standard" in found.solution.extras:
         provenance["standard_parameters"] = np.asarray(found.solution.extras["standard"], dtype=float).tolist()
@@ -156,6 +158,28 @@ def identify(
         dropped_rows=sum(log.positions.dropped for log in prepared),
         gates=tuple(gates),
     )
+
+
+def _usual_speeds(logs: Sequence[Prepared]) -> tuple[float, ...]:
+    """Speed of each joint (n,) that it exceeds in a thousandth of the time only: noise makes single larger ones."""
+    found = []
+    for log in logs:
+        grid = log.positions
+        span = min(max(1, round(SPAN / grid.period)), len(grid.q) - 1)
+        found.append(np.quantile(np.abs(grid.q[span:] - grid.q[:-span]), 0.999, axis=0) / (span * grid.period))
+    # Two digits, as a person would state it. Of a joint that stands any speed says nothing.
+    return tuple(float(f"{speed:.2g}") if speed > SLOWEST else 1.0 for speed in np.max(found, axis=0))
+
+
+def _recorded(found: Fit) -> dict[str, list[list[float]]]:
+    """Each joint's lowest and highest position, and largest speed and acceleration."""
+    motions = [part.motion for part in found.rows]
+    q, dq, ddq = (np.concatenate([getattr(motion, name) for motion in motions]) for name in ("q", "dq", "ddq"))
+    return {
+        "position": [q.min(axis=0).tolist(), q.max(axis=0).tolist()],
+        "velocity": [np.abs(dq).max(axis=0).tolist()],
+        "acceleration": [np.abs(ddq).max(axis=0).tolist()],
+    }
 
 
 def _require_motion(logs: Sequence[Log]) -> None:
@@ -193,8 +217,9 @@ def _joint_fits(found: Fit, predictable: NDArray[np.bool_]) -> tuple[JointFit, .
     total = sum(len(part.motion) for part in found.rows)
     rms = np.sqrt(sum(np.einsum("tj,tj->j", part.tau, part.tau) for part in found.rows) / total)
     # On all rows, as the left-out errors are: those of a joint at rest do not count in the fit, but in its verdict.
-    errors = (part.tau - torque for part, torque in zip(found.rows, found.predicted, strict=True))
+    errors = [part.tau - torque for part, torque in zip(found.rows, found.predicted, strict=True)]
     fitted = np.sqrt(sum(np.einsum("tj,tj->j", error, error) for error in errors) / total)
+    band = band_of(np.abs(np.concatenate(errors)))
     nominal = np.sqrt(found.nominal / total)
     floor = _noise_floor(found)
     return tuple(
@@ -207,8 +232,7 @@ def _joint_fits(found: Fit, predictable: NDArray[np.bool_]) -> tuple[JointFit, .
             held_out_rms=float(choice.held_out[j]),
             nominal_rms=float(nominal[j]),
             noise_floor=float(floor[j]),
-            band=float(choice.band[j]),
-            band_coverage=float(choice.band_coverage[j]),
+            band=float(band[j]),
             identified=bool(predictable[j]),
         )
         for j in range(len(rms))
@@ -251,11 +275,12 @@ def _provenance(
         "cutoff_hz": choice.cutoff,
         "smoothing": choice.smoother.to_dict(),
         "ridge": choice.ridge,
-        "regularised": choice.plain is not None,
-        "pulled_to_description": choice.pull is not None,
         "velocity_scales": list(choice.velocity_scales),
         "seed": seed,
         "band95": [joint.band for joint in joints],
+        "band_growth": choice.band.growth.tolist(),
+        "band_covariance": choice.band.covariance.tolist(),
+        "band_reach": choice.band.reach.tolist(),
         "noise_floor": [joint.noise_floor for joint in joints],
         "residual_rms": [joint.residual_rms for joint in joints],
         "held_out_rms": [joint.held_out_rms for joint in joints],

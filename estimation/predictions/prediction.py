@@ -13,9 +13,9 @@ from numpy.typing import NDArray
 from estimation.logs.clocks import clock_shift_between, earlier_logs_on_clock
 from estimation.logs.known_setup import HEAT, require_plain
 from estimation.models.model import Model
+from estimation.predictions.band import band_of_motion, beyond_the_recorded
 from estimation.preprocessing import LowPass, Smoother, SmoothingSpline, resample, smooth
 from estimation.preprocessing.smoothing import low_pass
-from estimation.regressions.joint_regressor import chunks
 from estimation.regressions.preparation import torque_of
 from robots.common.errors import InputError
 from robots.common.plain import all_finite, finite
@@ -30,8 +30,6 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
-NORMAL_95 = 1.96
-
 
 @dataclass(frozen=True, kw_only=True)
 class Prediction:
@@ -42,8 +40,12 @@ class Prediction:
         predicted: torque (N, n) [N m or N].
         measured: torque (N, n) as logged, or None.
         joint_names: names (n,).
-        band: half-widths (N, n) of a band that held 95 % of the errors on data left out of the fit, widened by what
-            the parameters' errors make of this motion; None of a model that states none.
+        band: half-widths (N, n) of a band that is to hold 95 % of the errors: that of the fitted logs, widened by what
+            the parameters' errors make of this motion. The widening holds 98 % where parts of the logs predicted other
+            parts. None of a model that states none.
+        extrapolates: where (N, n) the parameters' errors make more of the motion than of any recorded one: the fit has
+            not seen the like. None without a band.
+        beyond: what exceeds the recorded motions, in words.
         cutoff: of the model's smoothing [Hz]: above it, no motion is known.
     """
 
@@ -52,6 +54,8 @@ class Prediction:
     measured: Array | None
     joint_names: tuple[str, ...]
     band: Array | None = None
+    extrapolates: NDArray[np.bool_] | None = None
+    beyond: tuple[str, ...] = ()
     cutoff: float = np.inf
 
     @property
@@ -106,7 +110,8 @@ class Prediction:
         """Gives the error per joint, where torque was logged."""
         samples = len(self.motion)
         if self.measured is None:
-            return f"torques of {samples} samples; the log has no torques to compare with"
+            first = f"torques of {samples} samples; the log has no torques to compare with"
+            return "\n".join([first, *self._extrapolation()])
         limited = f"below {self.cutoff:.3g} Hz"
         lines = [
             f"torques of {samples} samples",
@@ -117,7 +122,17 @@ class Prediction:
             share, spread, slow, covered = (f"{100 * v:.2f} %" if np.isfinite(v) else "–" for v in shares)
             lines.append(f"  {j} {name[:18]:18} {rms:12.4g} {share:>10} {spread:>14} {slow:>15} {covered:>21}")
         lines.append("  rel.: error divided by torque; last column: share of the errors within the 95 % band")
-        return "\n".join(lines)
+        return "\n".join([*lines, *self._extrapolation()])
+
+    def _extrapolation(self) -> list[str]:
+        """Says how much of the motion is beyond what the fit has seen."""
+        if self.extrapolates is None or not (self.extrapolates.any() or self.beyond):
+            return []
+        share = 100 * float(self.extrapolates.mean())
+        return [
+            f"  {share:.2g} % of the torques extrapolate: the parameters' errors matter more than in any recorded row",
+            *(f"    {text}" for text in self.beyond),
+        ]
 
     def to_dict(self) -> dict[str, Any]:
         """Gives the errors as plain data."""
@@ -130,29 +145,34 @@ class Prediction:
         }
         return {
             "samples": len(self.motion),
+            "extrapolates": None if self.extrapolates is None else self.extrapolates.mean(axis=0).tolist(),
+            "beyond_the_recorded": list(self.beyond),
             "cutoff_hz": finite(self.cutoff),
             **{name: all_finite(values) for name, values in quantities.items()},
         }
 
     def to_frame(self) -> pd.DataFrame:
-        """Gives t, tau1.. as a table."""
+        """Gives t, tau1.. as a table, and of a model with a band its limits and where it extrapolates."""
         import pandas as pd
 
-        return pd.DataFrame(self._columns(band=False))
+        return pd.DataFrame(self._columns())
 
-    def save(self, path: str | Path, *, band: bool = False, force: bool = False) -> None:
-        """Writes t, tau1..taun, and on request the band's half-widths band1..bandn, as CSV or Parquet.
+    def save(self, path: str | Path, *, force: bool = False) -> None:
+        """Writes CSV or Parquet: t, tau1..taun, and the band: tau1_lower, tau1_upper, tau1_extrapolates (0 or 1) ...
 
         Raises:
             InputError: the file is there, and force is not given.
         """
-        write_table(path, self._columns(band), {"content": "predicted joint torques"}, force=force)
+        write_table(path, self._columns(), {"content": "predicted joint torques"}, force=force)
 
-    def _columns(self, band: bool) -> dict[str, Array]:
+    def _columns(self) -> dict[str, Array]:
         joints = range(self.predicted.shape[1])
         columns = {"t": self.motion.t, **{f"tau{j + 1}": self.predicted[:, j] for j in joints}}
-        if band and self.band is not None:
-            columns |= {f"band{j + 1}": self.band[:, j] for j in joints}
+        if self.band is not None and self.extrapolates is not None:
+            for j in joints:
+                columns[f"tau{j + 1}_lower"] = self.predicted[:, j] - self.band[:, j]
+                columns[f"tau{j + 1}_upper"] = self.predicted[:, j] + self.band[:, j]
+                columns[f"tau{j + 1}_extrapolates"] = self.extrapolates[:, j].astype(float)
         return columns
 
 
@@ -208,12 +228,15 @@ def predict(
 
         require_plain([log], HEAT)
         predicted, _ = thermal.simulate(motion, ambient=surroundings(log, motion.t, ambient), start=start)
+    band = band_of_motion(model, motion, log.gravity)
     return Prediction(
         motion=motion,
         predicted=predicted,
         measured=torque_of(robot, log) if has_torque else None,
         joint_names=robot.joint_names,
-        band=_band(model, motion, log.gravity),
+        band=None if band is None else band[0],
+        extrapolates=None if band is None else band[1],
+        beyond=beyond_the_recorded(model, motion),
         cutoff=cutoff,
     )
 
@@ -271,19 +294,3 @@ def _smoother(model: Model, cutoff: float) -> Smoother:
     smoothing = model.provenance.get("smoothing")
     kind = smoothing.get("kind") if isinstance(smoothing, Mapping) else None
     return SmoothingSpline(cutoff) if kind == SmoothingSpline.name else LowPass(cutoff)
-
-
-def _band(model: Model, motion: Motion, gravity: Array | None) -> Array | None:
-    level = model.provenance.get("band95")
-    if level is None:
-        return None
-    width = np.broadcast_to(np.asarray(level, dtype=float), motion.q.shape).copy()
-    if model.provenance.get("regularised", True):
-        # The covariance is that of the fit without regularisation: it knows nothing of what fills open directions.
-        return width
-    torque_model = model.torque_model.under(gravity)
-    for rows in chunks(len(motion)):
-        Y = torque_model.regressor(motion.q[rows], motion.dq[rows], motion.ddq[rows], columns=model.columns)
-        variance = np.einsum("tjp,tjp->tj", Y @ model.covariance, Y)
-        width[rows] = np.hypot(width[rows], NORMAL_95 * np.sqrt(np.maximum(variance, 0.0)))
-    return width

@@ -87,13 +87,15 @@ class Moments:
         return solve_all(gram[None], cross[None], np.array([weights @ self.square]), ridge, self.pull)[0]
 
     def inverse(self, weights: Array, ridge: float) -> Array:
-        """Inverts the weighted Gram matrix (p, p) with the ridge of `solve`."""
-        matrix = self._weighted(weights)
+        """Inverts the matrix (p, p) by which `solve` finds the parameters."""
+        matrix, extra = self._weighted(weights), ridge
+        if self.pull is not None:
+            matrix, extra = matrix + ridge * float(weights @ self.square) * self.pull.precision, FAINT
         scale = np.sqrt(np.diag(matrix))
         scale = np.where(scale > 0, scale, 1.0)
         unit = np.eye(len(scale))
-        inverse = solve_positive(matrix / scale[:, None] / scale + ridge * unit, unit)
-        return inverse / scale[:, None] / scale
+        inverse = solve_positive(matrix / scale[:, None] / scale + extra * unit, unit)
+        return np.asarray(inverse / scale[:, None] / scale)
 
     def _weighted(self, weights: Array) -> Array:
         return np.asarray((weights @ self.gram.reshape(len(self.gram), -1)).reshape(self.gram.shape[1:]))

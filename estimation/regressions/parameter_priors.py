@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.linalg import solve_triangular
 
 from robots.base_parameters import BaseParameters
 from robots.terms.rigid_body import SYMBOLS
@@ -19,6 +20,8 @@ SMALLEST_REACH = 0.3
 OWN = 3.0
 # A column below this RMS does not act.
 SILENT = 1e-9
+# Standard deviations from which a contradiction weakens the description's prior, and iterations of that weakening.
+CONFLICT_SIGMAS, CONFLICT_ROUNDS = 2.0, 20
 # Keeps the precision finite where a description has links of no size.
 FAINT = 1e-12
 
@@ -70,12 +73,50 @@ def prior_from_description(base: BaseParameters, torque: Array, level: Array) ->
         elif i in own:
             # A column that never acts is held at its description by any spread.
             spread[i] = OWN * torque[joint] / (level[own[i]] if level[own[i]] > SILENT else 1.0)
+    return prior_of_spreads(base, spread, model.nominal)
+
+
+def prior_of_spreads(base: BaseParameters, spread: Array, target: Array) -> GaussianPrior:
+    """Builds a prior of base parameters from spreads (p,) of the standard parameters about a target (p,)."""
     covariance = (base.grouping * spread**2) @ base.grouping.T
     scale = np.sqrt(np.diag(covariance))
     scale = np.where(scale > 0, scale, 1.0)
     normalised = covariance / scale[:, None] / scale + FAINT * np.eye(len(scale))
     precision = np.linalg.inv(normalised) / scale[:, None] / scale
-    return GaussianPrior(precision, base.from_standard(model.nominal))
+    return GaussianPrior(precision, base.from_standard(target))
+
+
+def inflate_conflicting_prior(
+    pull: GaussianPrior, gram: Array, cross: Array, strength: float = 1.0, sigmas: float = CONFLICT_SIGMAS
+) -> GaussianPrior:
+    """Weakens the prior where the data contradict it: errors by a missing rotor or tool may exceed a parameter's size.
+
+    Parameters scatter about the description with heavy tails, independently in directions in which the information of
+    the data and the prior are both diagonal. If the estimate is z > k standard deviations of the description away, the
+    precision is divided by (z / k)^2 (the square of Huber's weights). z is found by iteration. Directions that the data
+    do not determine keep their prior.
+
+    Args:
+        pull: prior of the parameters (p,), with its strength.
+        gram: Gram matrix of the data (p, p), in the same units.
+        cross: products of columns and torque (p,), in the same units.
+        strength: factor of the prior's precision over that of the description's own scatter.
+        sigmas: k.
+
+    Returns:
+        The weakened prior.
+    """
+    root = np.linalg.cholesky(pull.precision / strength)
+    inverse = solve_triangular(root, np.eye(len(root)), lower=True)
+    information, ways = np.linalg.eigh(inverse @ gram @ inverse.T)
+    information = np.maximum(information, 0.0)
+    aim = ways.T @ inverse @ (cross - gram @ pull.target)
+    weights = np.ones(len(information))
+    for _ in range(CONFLICT_ROUNDS):
+        off = aim / (information + strength * weights)
+        weights = 1.0 / np.maximum(1.0, (off / sigmas) ** 2)
+    turned = root @ ways
+    return GaussianPrior(strength * (turned * weights) @ turned.T, pull.target)
 
 
 def link_spreads(inertia: Array) -> Array:
@@ -107,8 +148,4 @@ def friction_levels(base: BaseParameters, level: Array, fastest: Array) -> Array
     """
     limit = np.asarray(base.model.robot.limits.velocity, dtype=float)
     speed = np.where(np.isfinite(limit), np.maximum(limit, fastest), fastest)
-    raised = level.copy()
-    for i, column in enumerate(base.columns):
-        if column.term == "friction":
-            raised[i] = max(raised[i], speed[column.joint - 1] ** (int(column.symbol[1:]) - 1))
-    return raised
+    return np.maximum(level, base.model.friction_at(speed)[list(base.independent)])

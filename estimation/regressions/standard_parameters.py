@@ -22,8 +22,9 @@ THIN = 0.02
 # Radius of gyration of a link without description, as a fraction of its length and of the arm's.
 OWN_SHARE, ARM_SHARE = 0.2, 0.05
 GRAVITY = 9.81
-# Speeds, as shares of the largest, at which friction must not drive the joint.
+# Speeds, as shares of the largest, at which friction must not drive the joint, and from which on it must not fall.
 SPEEDS = np.linspace(0.0, 1.0, 13)
+RISING = 0.5
 
 
 @dataclass(frozen=True)
@@ -52,7 +53,7 @@ def scaling(data: RegressionData) -> Scaling:
     """Chooses units for the model's standard parameters from the description, or from the data where there is none."""
     model = data.base.model
     n = model.robot.n
-    reference, described = reference_bodies(model.robot, _mass_from_torque(data))
+    reference, described = reference_bodies(model.robot, mass_from_torque(model.robot, _largest_torque(data)))
     bodies = body_columns(model)
     rows = np.maximum(data.moments.count, 1)
     torque = np.sqrt(np.maximum(data.moments.square / rows, np.finfo(float).tiny))
@@ -107,8 +108,8 @@ def reference_bodies(robot: Robot, mass: float) -> tuple[Array, NDArray[np.bool_
 def nonnegative_rows(model: TorqueModel, speed: Array) -> Array:
     """Lists quantities that must not be negative: rotor inertias, Coulomb and viscous friction, and the total friction.
 
-    Of a friction polynomial, f1 and f2 must be positive, and the whole must brake at every speed that was seen: its
-    higher coefficients alone may have either sign, as measured curves that flatten show.
+    Friction brakes at every speed that was seen, and does not fall from the middle of that range on. Its further
+    coefficients alone may have either sign, as measured curves that flatten show.
 
     Args:
         model: the torque model with p standard parameters.
@@ -117,23 +118,19 @@ def nonnegative_rows(model: TorqueModel, speed: Array) -> Array:
     Returns:
         Rows (m, p), each of which times the parameters must be zero or more.
     """
-    rows = []
-    powers: dict[int, dict[int, int]] = {}
-    for k, column in enumerate(model.columns):
-        if column.term == "rotor_inertia" or (column.term == "friction" and column.symbol in ("f1", "f2")):
-            row = np.zeros(model.size)
-            row[k] = 1.0
-            rows.append(row)
-        if column.term == "friction":
-            powers.setdefault(column.joint - 1, {})[int(column.symbol[1:])] = k
-    for joint, columns in powers.items():
-        if max(columns) > 2:
-            for share in SPEEDS[1:]:
-                row = np.zeros(model.size)
-                for power, k in columns.items():
-                    row[k] = (share * speed[joint]) ** (power - 1)
-                rows.append(row)
-    return np.array(rows).reshape(-1, model.size)
+    single = [
+        k
+        for k, column in enumerate(model.columns)
+        if column.term == "rotor_inertia" or (column.friction and column.symbol in ("f1", "f2"))
+    ]
+    rows = [np.eye(model.size)[single]]
+    curves = np.array([model.friction_at(share * speed) for share in SPEEDS])
+    rises = np.diff(curves, axis=0)[SPEEDS[:-1] >= RISING]
+    for joint in range(1, model.robot.n + 1):
+        own = np.array([column.friction and column.joint == joint for column in model.columns])
+        if own.sum() > 2:
+            rows += [curves[1:] * own, rises * own]
+    return np.concatenate(rows)
 
 
 def box_rows(model: TorqueModel, boxes: Mapping[int, tuple[Array, Array]]) -> Array:
@@ -177,10 +174,13 @@ def _corrected_body(body: Array, shortest: float) -> Array:
     return inertial_from_pseudo(mass * lifted * unit[:, None] * unit)
 
 
-def _mass_from_torque(data: RegressionData) -> float:
-    """The mass of an arm whose gravity makes the torques that were measured [kg]."""
-    chain = data.robot.chain
+def mass_from_torque(robot: Robot, torque: float) -> float:
+    """Gives the mass [kg] of an arm whose gravity makes the largest joint's torque [N m]."""
+    chain = robot.chain
     reach = sum(float(np.linalg.norm(joint.translation)) for joint in chain.joints[1:])
     reach = max(reach + float(np.linalg.norm(chain.tip[:3, 3])), 0.1)
-    largest = float(np.sqrt((data.moments.square / np.maximum(data.moments.count, 1)).max()))
-    return max(3.0 * largest / (GRAVITY * reach), 1e-3)
+    return max(3.0 * torque / (GRAVITY * reach), np.finfo(float).tiny ** 0.5)
+
+
+def _largest_torque(data: RegressionData) -> float:
+    return float(np.sqrt((data.moments.square / np.maximum(data.moments.count, 1)).max()))

@@ -35,7 +35,7 @@ class ThermalTorqueModel:
 
     def split(self, q: ArrayLike, dq: ArrayLike, ddq: ArrayLike) -> tuple[Array, Array]:
         """Gives the torque without friction and the friction at T0, (N, n) each [N m or N]."""
-        own = np.array([column.term == "friction" for column in self.model.parameters])
+        own = np.array([column.friction for column in self.model.parameters])
         parts = []
         for chosen in (~own, own):
             columns = [c for c, yes in zip(self.model.columns, chosen, strict=True) if yes]

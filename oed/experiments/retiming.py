@@ -21,7 +21,7 @@ from robots.common.errors import InputError
 from robots.regressor import TorqueModel
 from robots.robot import Robot
 from robots.signals import Motion
-from robots.terms import FrictionPolynomial
+from robots.terms import FrictionTerm
 
 Array = NDArray[np.float64]
 
@@ -92,8 +92,8 @@ def _dynamics(
     robot = model.robot
     if not (np.isfinite(model.nominal).all() and np.isfinite(robot.limits.torque).any()):
         return None, None
-    smooth = TorqueModel(robot, tuple(term for term in model.terms if not isinstance(term, FrictionPolynomial)))
-    friction = TorqueModel(robot, tuple(term for term in model.terms if isinstance(term, FrictionPolynomial)))
+    smooth = TorqueModel(robot, tuple(term for term in model.terms if not isinstance(term, FrictionTerm)))
+    friction = TorqueModel(robot, tuple(term for term in model.terms if isinstance(term, FrictionTerm)))
 
     def rigid(q: Array, dq: Array, ddq: Array) -> Array:
         return smooth.torque(q, dq, ddq, smooth.nominal)

@@ -116,7 +116,7 @@ class PlantHeat:
 
 def reference_friction(model: TorqueModel, parameters: Array, motion: Motion) -> Array:
     """Evaluates the friction torque at T0 (N, n) [N m or N]."""
-    own = [k for k, column in enumerate(model.columns) if column.term == "friction"]
+    own = [k for k, column in enumerate(model.columns) if column.friction]
     return np.asarray(model.torque(motion.q, motion.dq, motion.ddq, np.asarray(parameters)[own], columns=own))
 
 

@@ -9,13 +9,17 @@ from typing import Any
 from robots.common.errors import InputError
 from robots.common.registry import Registry, subclass_check
 from robots.terms.base import Column, Term
-from robots.terms.friction import COULOMB_VISCOUS, POLYNOMIAL, FrictionPolynomial, FrictionTerm
+from robots.terms.friction import COULOMB_VISCOUS, POLYNOMIAL, BendingFriction, FrictionPolynomial, FrictionTerm
+from robots.terms.position_torque import PositionTorque
 from robots.terms.rigid_body import RigidBody
 from robots.terms.rotor_inertia import RotorInertia
 from robots.terms.torque_offset import TorqueOffset
 
 TERMS: Registry[type[Term]] = Registry(
-    "term", "robot_oed.terms", (RigidBody, FrictionPolynomial, RotorInertia, TorqueOffset), check=subclass_check(Term)
+    "term",
+    "robot_oed.terms",
+    (RigidBody, FrictionPolynomial, BendingFriction, RotorInertia, TorqueOffset, PositionTorque),
+    check=subclass_check(Term),
 )
 
 
@@ -50,8 +54,10 @@ __all__ = [
     "Column",
     "FrictionPolynomial",
     "FrictionTerm",
+    "PositionTorque",
     "RigidBody",
     "RotorInertia",
+    "BendingFriction",
     "Term",
     "TorqueOffset",
     "build_term",

@@ -24,6 +24,7 @@ class Column:
         joint: the parameter's joint or link, counted from 1.
         unit: its unit, such as ``kg m``.
         term: the name of its term.
+        friction: whether it is friction: a torque by the joint's velocity alone.
     """
 
     name: str
@@ -31,6 +32,7 @@ class Column:
     joint: int
     unit: str
     term: str
+    friction: bool = False
 
 
 class Term(ABC):

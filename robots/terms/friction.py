@@ -18,6 +18,8 @@ if TYPE_CHECKING:
 
 COULOMB_VISCOUS = (1, 2)
 POLYNOMIAL = (1, 2, 3, 4)
+# Where the saturating parts bend, as shares of the usual highest speed.
+BENDS = (0.1, 0.4)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -60,10 +62,16 @@ class FrictionTerm(Term):
             scale: the joint's velocity scale [rad/s or m/s]; 0 for the sharp sign.
         """
 
+    def joint_row(self, robot: Robot, joint: int, dq: casadi.SX, sign: casadi.SX, scale: float) -> casadi.SX:
+        """Builds the columns (1, k) of joint `joint`, counted from 0, by default those of `row`."""
+        return self.row(dq, sign, scale)
+
     def columns(self, robot: Robot) -> tuple[Column, ...]:
         """Describes the parameters joint by joint."""
         return tuple(
-            Column(name=f"{symbol}_{joint + 1}", symbol=symbol, joint=joint + 1, unit=unit, term=self.name)
+            Column(
+                name=f"{symbol}_{joint + 1}", symbol=symbol, joint=joint + 1, unit=unit, term=self.name, friction=True
+            )
             for joint in range(robot.n)
             for symbol, unit in self.units(force_unit(robot, joint), length_unit(robot, joint)).items()
         )
@@ -74,13 +82,10 @@ class FrictionTerm(Term):
         Raises:
             InputError: the number of velocity scales is not the number of joints.
         """
-        scales = self.velocity_scale if isinstance(self.velocity_scale, tuple) else (self.velocity_scale,) * robot.n
-        if len(scales) != robot.n:
-            raise InputError(f"{len(scales)} friction velocity scales", allowed=f"one, or {robot.n}")
         rows = []
-        for joint, scale in enumerate(scales):
+        for joint, scale in enumerate(_each(self.velocity_scale, robot, "friction velocity scales")):
             sign = casadi.tanh(dq[joint] / scale) if scale else casadi.sign(dq[joint])
-            rows.append(self.row(dq[joint], sign, scale))
+            rows.append(self.joint_row(robot, joint, dq[joint], sign, scale))
         return casadi.diagcat(*rows)
 
     def nominal(self, robot: Robot) -> NDArray[np.float64]:
@@ -126,3 +131,74 @@ class FrictionPolynomial(FrictionTerm):
         """Returns the coefficients of the robot's description (k n,)."""
         indices = [power - 1 for power in self.powers]
         return np.asarray(robot.friction, dtype=float)[:, indices].reshape(-1)
+
+
+@dataclass(frozen=True, kw_only=True)
+class BendingFriction(FrictionTerm):
+    """tau_f = f1 sign(dq) + f2 dq + f3 tanh(dq / (0.1 v)) + f4 tanh(dq / (0.4 v)), on each joint.
+
+    v is the highest speed of the data. Within it the curve bends as measured ones do: it falls after the start
+    (Stribeck) or flattens at high speed. Beyond it grows like f2 dq, and a log says nothing that could make it explode.
+
+    Attributes:
+        speed: v [rad/s or m/s], one value for all joints or one per joint.
+        velocity_scale: see `FrictionTerm`.
+
+    Raises:
+        InputError: a speed that is not positive, or a negative scale.
+    """
+
+    speed: float | tuple[float, ...] = 1.0
+    velocity_scale: float | tuple[float, ...] = 0.0
+    name: str = "bending_friction"
+
+    def __post_init__(self) -> None:
+        """Checks the speeds and the scale.
+
+        Raises:
+            InputError: a speed that is not positive, or a negative scale.
+        """
+        super().__post_init__()
+        if not np.all(np.asarray(self.speed) > 0):
+            raise InputError(f"highest speed {self.speed} of the friction", allowed="positive numbers")
+
+    def units(self, force: str, length: str) -> dict[str, str]:
+        """Returns the units of one joint's four coefficients."""
+        return {"f1": force, "f2": f"{force} s/{length}", "f3": force, "f4": force}
+
+    def row(self, dq: casadi.SX, sign: casadi.SX, scale: float) -> casadi.SX:
+        """Builds the columns that do not depend on v (1, 2)."""
+        return casadi.horzcat(sign, dq)
+
+    def joint_row(self, robot: Robot, joint: int, dq: casadi.SX, sign: casadi.SX, scale: float) -> casadi.SX:
+        """Builds the four columns of a joint (1, 4).
+
+        Raises:
+            InputError: the number of speeds is not the number of joints.
+        """
+        speed = _each(self.speed, robot, "highest speeds of the friction")[joint]
+        return casadi.horzcat(self.row(dq, sign, scale), *(casadi.tanh(dq / (share * speed)) for share in BENDS))
+
+    def nominal(self, robot: Robot) -> NDArray[np.float64]:
+        """Returns the coefficients (4 n,) that come nearest to the description's polynomial up to each v."""
+        found = []
+        for described, speed in zip(
+            np.asarray(robot.friction, dtype=float), _each(self.speed, robot, "speeds"), strict=True
+        ):
+            v = speed * (np.arange(50) + 0.5) / 50
+            shapes = np.column_stack([np.ones_like(v), v, *(np.tanh(v / (share * speed)) for share in BENDS)])
+            polynomial = np.column_stack([np.ones_like(v), v, v**2, v**3]) @ described
+            found.append(np.linalg.lstsq(shapes, polynomial, rcond=None)[0])
+        return np.concatenate(found)
+
+
+def _each(value: float | tuple[float, ...], robot: Robot, what: str) -> tuple[float, ...]:
+    """One value per joint.
+
+    Raises:
+        InputError: neither one value, nor as many as joints.
+    """
+    values = value if isinstance(value, tuple) else (value,) * robot.n
+    if len(values) != robot.n:
+        raise InputError(f"{len(values)} {what}", allowed=f"one, or {robot.n}")
+    return values

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg import solve_triangular
 
 from estimation.diagnosis.base_models.baseline import Baseline
 from estimation.diagnosis.recordings.log_reading import Recording
@@ -14,8 +13,6 @@ Array = NDArray[np.float64]
 
 # Quantile of a joint's speed that counts as its largest.
 FASTEST = 0.999
-# Standard deviations from which a contradiction weakens the description's prior, and iterations of that weakening.
-CONFLICT_SIGMAS, CONFLICT_ROUNDS = 2.0, 20
 # Directions below this share of the largest are not determined.
 FAINT = 1e-12
 
@@ -60,36 +57,6 @@ def base_model_prior(baseline: Baseline, recording: Recording, strength: float =
     # Errors of the sign widths need a bound, too: rows that hardly contain them would allow any value.
     precision[range(b, b + m), range(b, b + m)] = 1.0 / (OWN * torque[:m]) ** 2
     return GaussianPrior(strength * precision, np.concatenate([pull.target, np.zeros(m)]))
-
-
-def inflate_conflicting_prior(pull: GaussianPrior, gram: Array, cross: Array, strength: float = 1.0) -> GaussianPrior:
-    """Weakens the prior where the data contradict it: errors by a missing rotor or tool may exceed a parameter's size.
-
-    Parameters scatter about the description with heavy tails, independently in directions in which the information of
-    the data and the prior are both diagonal. If the estimate is z > 2 standard deviations of the description away, the
-    precision is divided by (z / 2)^2 (the square of Huber's weights). z is found by iteration. Directions that the data
-    do not determine keep their prior.
-
-    Args:
-        pull: prior of base parameters and nuisance (p,), with its strength.
-        gram: Gram matrix of the data (p, p), in the same units.
-        cross: products of columns and torque (p,), in the same units.
-        strength: factor of the prior's precision over that of the description's own scatter.
-
-    Returns:
-        The weakened prior.
-    """
-    root = np.linalg.cholesky(pull.precision / strength)
-    inverse = solve_triangular(root, np.eye(len(root)), lower=True)
-    information, ways = np.linalg.eigh(inverse @ gram @ inverse.T)
-    information = np.maximum(information, 0.0)
-    aim = ways.T @ inverse @ (cross - gram @ pull.target)
-    weights = np.ones(len(information))
-    for _ in range(CONFLICT_ROUNDS):
-        off = aim / (information + strength * weights)
-        weights = 1.0 / np.maximum(1.0, (off / CONFLICT_SIGMAS) ** 2)
-    turned = root @ ways
-    return GaussianPrior(strength * (turned * weights) @ turned.T, pull.target)
 
 
 def solve_map(gram: Array, cross: Array, pull: GaussianPrior) -> Array:

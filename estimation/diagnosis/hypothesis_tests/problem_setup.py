@@ -6,13 +6,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from estimation.diagnosis.base_models.baseline import FAINT, Baseline
-from estimation.diagnosis.base_models.priors import base_model_prior, inflate_conflicting_prior, solve_map
+from estimation.diagnosis.base_models.priors import base_model_prior, solve_map
 from estimation.diagnosis.hypothesis_tests.problem import Problem
 from estimation.diagnosis.noise_models.high_frequency_band import HighBand
 from estimation.diagnosis.noise_models.whitening import Whitening
 from estimation.diagnosis.recordings.log_reading import Recording
 from estimation.linear_algebra.orthonormal import orthonormal
-from estimation.regressions.parameter_priors import GaussianPrior
+from estimation.regressions.parameter_priors import GaussianPrior, inflate_conflicting_prior
 from robots.terms.effect_bases.gear_load import ExtraGearLoad, with_gear_load
 
 Array = NDArray[np.float64]

@@ -8,12 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from estimation.diagnosis.base_models.baseline import Baseline, build_baseline, inertia_matrix
-from estimation.diagnosis.base_models.priors import (
-    base_model_prior,
-    inflate_conflicting_prior,
-    solve_least_squares,
-    solve_map,
-)
+from estimation.diagnosis.base_models.priors import base_model_prior, solve_least_squares, solve_map
 from estimation.diagnosis.calibration import MAX_HIGH_BAND_ERROR
 from estimation.diagnosis.hypothesis_tests.hypotheses import Hypothesis, all_hypotheses
 from estimation.diagnosis.hypothesis_tests.problem import Problem
@@ -27,6 +22,7 @@ from estimation.diagnosis.recordings.log_reading import Recording
 from estimation.diagnosis.reversals.reversal_timing import measure_reversal_timing
 from estimation.diagnosis.searches.refit import RefitResult, base_torque_changed, noise_decreased, refit
 from estimation.diagnosis.searches.selection import Selection, select, with_rivals
+from estimation.regressions.parameter_priors import inflate_conflicting_prior
 from robots.base_parameters import BaseParameters
 from robots.common.memory import give_back
 from robots.common.progress import Progress

@@ -11,13 +11,13 @@ from numpy.typing import NDArray
 from estimation.diagnosis.base_models.baseline import SCALES
 from estimation.diagnosis.hypothesis_tests.problem import Problem
 from estimation.diagnosis.validations.gain_intervals import PARTS, HeldOutErrors
-from estimation.identifications.comparison import band_of
+from estimation.identifications.transfer import band_of
 from estimation.models.model import Model
 from estimation.predictions.prediction import Prediction, predict
 from estimation.regressions.preparation import torque_of
 from robots.common.plain import all_finite, number
 from robots.signals import Log
-from robots.terms import FrictionPolynomial
+from robots.terms import FrictionTerm
 from robots.terms.situations.of_model import sign_of, velocity_scale
 
 Array = NDArray[np.float64]
@@ -99,7 +99,7 @@ def _with_scales(model: Model, scales: Array) -> Model:
     """Returns the model with the widths v0 (n,) of its friction signs."""
     stated = tuple(float(v0) for v0 in scales)
     terms = tuple(
-        replace(term, velocity_scale=stated) if isinstance(term, FrictionPolynomial) else term
+        replace(term, velocity_scale=stated) if isinstance(term, FrictionTerm) else term
         for term in model.torque_model.terms
     )
     return replace(

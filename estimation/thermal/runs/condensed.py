@@ -109,7 +109,7 @@ def condense(model: Model, logs: Sequence[Log], width: float) -> Condensed:
     for j in range(n):
         whole = [np.concatenate([part[1][j][key] for part in parts]) for key in range(5)]
         used = np.flatnonzero(np.einsum("bii->i", whole[0]) > 0.0)
-        own = np.array([c.term == "friction" and c.joint == j + 1 for c in model.parameters])
+        own = np.array([c.friction and c.joint == j + 1 for c in model.parameters])
         joints.append(
             JointSums(
                 used=used,
@@ -137,9 +137,7 @@ def _sums_of(model: Model, log: Log, width: float) -> tuple[Array, list[list[Arr
     speed = np.sqrt(np.mean(motion.dq**2, axis=0))
     good = (np.abs(motion.dq) >= SLOW * speed) & (speed > 1e-9)
     own = [
-        np.array(
-            [k for k, c in enumerate(model.parameters) if c.term == "friction" and c.joint == j + 1], dtype=np.intp
-        )
+        np.array([k for k, c in enumerate(model.parameters) if c.friction and c.joint == j + 1], dtype=np.intp)
         for j in range(n)
     ]
     sums = [

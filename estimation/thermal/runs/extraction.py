@@ -60,7 +60,7 @@ def friction_signal(model: Model, log: Log) -> FrictionSignal:
     if log.n != model.robot.n:
         raise InputError(f"{log.n} joints", file=log.metadata.get("file"), allowed=f"{model.robot.n}")
     require_plain([log], HEAT)
-    own = np.array([column.term == "friction" for column in model.parameters])
+    own = np.array([column.friction for column in model.parameters])
     if not own.any():
         raise InputError("a model without friction", allowed="a model with a friction term")
     tau = torque_of(model.robot, log)

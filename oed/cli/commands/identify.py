@@ -34,7 +34,21 @@ def identify(
     payload: PayloadOption = None,
     gravity: GravityOption = None,
     method: Annotated[str, typer.Option(help="Estimator, or `all` to compare them.")] = "wls",
-    friction: Annotated[str, typer.Option(help="Friction model: polynomial or coulomb-viscous.")] = "polynomial",
+    friction: Annotated[
+        str,
+        typer.Option(
+            help="Friction model: auto (bends within the recorded speeds, grows linearly beyond), polynomial or "
+            "coulomb-viscous."
+        ),
+    ] = "auto",
+    position: Annotated[
+        bool | None,
+        typer.Option(
+            help="Include a torque by each joint's position, of unknown cause. By default, where it predicts other "
+            "motions better.",
+            show_default=False,
+        ),
+    ] = None,
     rotor: Annotated[bool, typer.Option(help="Include rotor inertias in the model.")] = True,
     offset: Annotated[bool, typer.Option(help="Include a constant torque offset per joint in the model.")] = True,
     seed: SeedOption = 0,
@@ -77,6 +91,7 @@ def identify(
             )
             options: dict[str, Any] = {
                 "friction": friction,
+                "position": position,
                 "rotor": rotor,
                 "offset": offset,
                 "seed": seed,

@@ -38,12 +38,9 @@ def predict(
             show_default=False,
         ),
     ] = None,
-    out: Annotated[Path, typer.Option("--out", help="CSV file to write, with t and tau1..taun.")] = Path(
+    out: Annotated[Path, typer.Option("--out", help="CSV file to write: torques and their 95 % bands.")] = Path(
         "predicted.csv"
     ),
-    band: Annotated[
-        bool, typer.Option("--band", help="Also write band1..bandn, the half-widths of the 95 % prediction interval.")
-    ] = False,
     force: ForceOption = False,
     json: JsonOption = False,
     quiet: QuietOption = False,
@@ -66,7 +63,7 @@ def predict(
         later, clock = clock_shift(identified, recorded)
         heat = _heat(model, identified, recorded, before or [], ambient, mapping, later)
         result = run(identified, recorded, later=later, **heat.options)
-        result.save(out, band=band, force=force)
+        result.save(out, force=force)
     summary = "\n".join([result.summary(), *(word for word in (heat.assumed, clock) if word), f"written to {out}"])
     words = {"heat": heat.assumed or None, "clock": clock or None}
     console.result(summary, {"file": str(out), **result.to_dict(), **words})

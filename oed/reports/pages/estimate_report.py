@@ -14,7 +14,6 @@ from oed.reports.rendering.picture import Picture
 from oed.reports.rendering.saving import footer, save_page
 from oed.reports.rendering.significant import significant, significant_error
 from robots.common.files import ResultFolder
-from robots.common.plain import finite
 
 Array = NDArray[np.float64]
 
@@ -85,12 +84,12 @@ def estimate_page(estimate: Estimate, methods: MethodTable | None = None) -> Pag
             title="Method",
             paragraphs=(
                 f"Estimator: {model.provenance['method']}. Positions: {estimate.choice.smoother.text}, without phase "
-                f"lag. Regularisation: {_regularisation(estimate)}. Both were chosen by cross-validation on "
-                f"contiguous blocks of the logs. "
+                f"lag; the smoothing was chosen by cross-validation on contiguous blocks of the logs. "
+                "What the logs leave open is held by a prior: each parameter may be wrong by its own size. "
                 "Standard errors: sandwich estimator with an autoregressive model of the residuals, correlated across "
-                "joints. "
-                "The 95 % band is computed from the errors on held-out blocks. Its coverage is counted on each block "
-                "with the band of the other blocks.",
+                "joints, and the scatter of the prior. "
+                "The 95 % band is that of the fitted logs. For another motion it is widened by the parameters' errors, "
+                "times a factor by which it holds 98 % where parts of the logs predicted other parts.",
             ),
             tables=(_logs(estimate),),
             folded=True,
@@ -152,7 +151,6 @@ def _joints(estimate: Estimate) -> Table:
                 joint.name,
                 joint.torque_rms,
                 *(None if not np.isfinite(e) else 100 * e / scale for e in errors),
-                finite(100 * joint.band_coverage),
                 "yes" if joint.identified else "NO",
             )
         )
@@ -166,7 +164,6 @@ def _joints(estimate: Estimate) -> Table:
         "description [%]",
         "noise floor [%]",
         "95 % band ± [%]",
-        "band coverage [%]",
         "identified",
     )
     return Table(
@@ -197,13 +194,6 @@ def _parameters(estimate: Estimate) -> Table:
         caption="Values are rounded to two digits of the standard error.",
         align=("left", "right", "right", "right", "left", "left"),
     )
-
-
-def _regularisation(estimate: Estimate) -> str:
-    choice = estimate.choice
-    if choice.pull is not None:
-        return f"prior on the robot's description, weight {choice.ridge:g}"
-    return f"ridge, weight {choice.ridge:g}, on the Gram matrix with unit columns"
 
 
 def _correlations(estimate: Estimate) -> tuple[Table, ...]:

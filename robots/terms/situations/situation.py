@@ -150,7 +150,7 @@ class Situation:
 
     def friction_at(self, dq: Array) -> Array:
         """Evaluates the base model's friction (N, n) [N m or N] at other velocities (N, n)."""
-        columns = [i for i, c in enumerate(self.model.columns) if c.term == "friction" and self.parameters[i]]
+        columns = [i for i, c in enumerate(self.model.columns) if c.friction and self.parameters[i]]
         if not columns:
             return np.zeros_like(self.q)
         return self.model.torque(self.q, dq, self.ddq, self.parameters[columns], columns=columns)

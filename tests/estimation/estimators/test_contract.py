@@ -173,10 +173,11 @@ def test_full_weights_are_the_inverse_variance():
     """With temper 1, weights are inverse residual variances; with temper 0.5, their roots."""
     noise = np.array([0.1, 1.0, 3.0])
     weights = WeightedLeastSquares(temper=1.0).weights(noisy_moments(noise), 0.0)
-    # 400 rows know a variance to 7 %; the first, unweighted fit adds a per cent to the quiet joint's.
+    # 400 rows know a variance to 7 %.
     np.testing.assert_allclose(weights, noise**-2, rtol=0.35)
     half = WeightedLeastSquares(temper=0.5).weights(noisy_moments(noise), 0.0)
-    np.testing.assert_allclose(half, np.sqrt(weights), rtol=1e-12)
+    # Each level is that of a fit by its own weights.
+    np.testing.assert_allclose(half, np.sqrt(weights), rtol=0.05)
 
 
 def test_weighting_pays_where_noise_differs():

@@ -3,8 +3,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from estimation import identify
-from estimation.identifications.choices import Candidates
 from estimation.regressions.moments import Moments
 from estimation.regressions.parameter_priors import GaussianPrior, friction_levels, link_spreads, prior_from_description
 from robots.base_parameters import find_base_parameters
@@ -59,16 +57,3 @@ def test_a_ridge_with_a_pull_is_a_quadratic_penalty():
     right = np.concatenate([(tau * np.sqrt(weights)).reshape(-1), factor @ pull.target])
     expected = np.linalg.lstsq(stacked, right, rcond=None)[0]
     np.testing.assert_allclose(moments.solve(weights, ridge), expected, rtol=1e-8)
-
-
-@pytest.mark.slow
-def test_data_that_determine_the_parameters_are_not_pulled(arm, arm_log):
-    """An exciting log is fitted without regularisation; a short piece of it leans on the description, and says so."""
-    long = identify(arm, arm_log())
-    assert long.choice.pull is None
-    assert long.choice.ridge == min(Candidates().ridges)
-    assert not long.model.provenance["regularised"]
-    short = identify(arm, arm_log().rows(slice(0, 400)))
-    if short.choice.pull is not None:
-        assert any("description" in warning for warning in short.warnings)
-        assert short.model.provenance["pulled_to_description"]

@@ -84,13 +84,18 @@ def test_exports_never_overwrite(identify, kept: str, tmp_path: Path) -> None:
 
 
 def test_band(run, experiment: Path, tmp_path: Path) -> None:
-    """With --band the table holds half-widths that contain some 95 % of what was logged."""
+    """The table holds the limits of a band that contains some 95 % of what was logged, and hardly extrapolates."""
     out = tmp_path / "p.csv"
-    done = run("predict", "--model", experiment, "--log", experiment / "log.csv", "--out", out, "--band", "--json")
+    done = run("predict", "--model", experiment, "--log", experiment / "log.csv", "--out", out, "--json")
     assert done.code == 0, done.err
     table = pd.read_csv(out, comment="#")
-    assert list(table.columns) == ["t", "tau1", "tau2", "band1", "band2"]
-    assert (table[["band1", "band2"]] > 0).all().all()
+    bounds = [f"tau{joint}_{what}" for joint in (1, 2) for what in ("lower", "upper", "extrapolates")]
+    assert list(table.columns) == ["t", "tau1", "tau2", *bounds]
+    for joint in (1, 2):
+        assert (table[f"tau{joint}_lower"] < table[f"tau{joint}"]).all()
+        assert (table[f"tau{joint}"] < table[f"tau{joint}_upper"]).all()
+        assert set(table[f"tau{joint}_extrapolates"]) <= {0.0, 1.0}
+        assert table[f"tau{joint}_extrapolates"].mean() < 0.02
     # Left-out errors of the fit's own log; its thousands of samples remember some tens of milliseconds.
     assert all(0.9 < share < 0.99 for share in done.data["band95_coverage"])
 

@@ -195,7 +195,7 @@ def test_what_other_effects_do_is_late_as_well(seen):
 def test_friction_of_a_joint_that_breaks_loose_is_late_as_well(seen):
     """A joint that creeps and breaks loose at 8 rad/s2 had crept a moment before: it had not turned round."""
     still = seen(velocity_scale=2e-3)
-    friction = np.where([c.term == "friction" for c in still.model.columns], still.parameters, 0.0)
+    friction = np.where([c.friction for c in still.model.columns], still.parameters, 0.0)
     loose, delay = float(still.t[700]) + 0.001, 0.005
 
     def at(times):

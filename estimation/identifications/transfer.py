@@ -1,0 +1,200 @@
+"""How well a fit predicts motions that it has not seen: the log's own fast rows, other places and other logs."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from estimation.estimators import Estimator
+from estimation.identifications.comparison import VELOCITY_SCALES, Comparison
+from estimation.identifications.trials import Trial
+from estimation.preprocessing import Smoother
+from estimation.regressions.blocks import Blocks, Sides
+from estimation.regressions.moments import Moments
+from estimation.regressions.preparation import Rows
+
+Array = NDArray[np.float64]
+Which = NDArray[np.bool_]
+
+# Joints with the widest range, along each of which the lower half of the log predicts the upper, and back.
+WIDEST = 3
+# Share of the errors that a band is to hold, and the normal distribution's half-width for it.
+BAND, NORMAL_95 = 0.95, 1.96
+# Factors on the parameters' standard errors from which the band of other motions takes the first that suffices.
+GROWTHS = (1.0, 1.5, 2.0, 3.0, 4.0, 6.0, 8.0, 12.0, 16.0, 24.0, 32.0)
+# Share of the splits' errors that this band is to hold. A new motion may lie farther away than one half of the log from
+# the other: with 95 % here, `benchmarks/transfer.py` finds 91 % there at the median, with this 96 %.
+HELD = 0.98
+# Quantile that counts as the largest of the recorded rows.
+LARGEST = 0.999
+# Rows that stand for the log where errors are looked at row by row.
+MOST_ROWS = 3000
+
+
+@dataclass(frozen=True)
+class Split:
+    """Blocks to fit and blocks to predict, (B,) each."""
+
+    fitted: Which
+    judged: Which
+
+
+@dataclass(frozen=True)
+class Band:
+    """A band of the prediction's error.
+
+    Attributes:
+        growth: factor (n,) on the standard deviation that the parameters' errors make of a motion, by which the band
+            holds 98 % of the errors where one part of the log predicted another.
+        covariance: of the parameters (k, k): as much as rows that are independent of each other leave open.
+        reach: largest standard deviation (n,) that this covariance makes of a recorded row. A motion with a larger one
+            is an extrapolation (the largest leverage of the data).
+    """
+
+    growth: Array
+    covariance: Array
+    reach: Array
+
+
+class Transfer:
+    """Splits of the data in which what is predicted is another motion than what is fitted."""
+
+    def __init__(self, comparison: Comparison, smoother: Smoother) -> None:
+        self.comparison = comparison
+        self.rows = comparison.rows(smoother)
+        self._pieces = [(part, piece) for part in self.rows for piece in comparison.pieces(part)]
+        self.splits = list(self._splits())
+
+    def _splits(self) -> Iterator[Split]:
+        """Slow rows predict fast ones, halves of each wide joint's range each other, and so do halves of the time."""
+        q = [part.motion.q[piece] for part, piece in self._pieces]
+        dq = [part.motion.dq[piece] for part, piece in self._pieces]
+        if len(q) < 2:
+            return
+        usual = np.maximum(np.sqrt(np.mean([np.mean(speed**2, axis=0) for speed in dq], axis=0)), 1e-12)
+        slow = _lower_half(np.array([(np.abs(speed) / usual).mean() for speed in dq]))
+        yield Split(slow, ~slow)
+        everywhere = np.concatenate(q)
+        for joint in np.argsort(-np.ptp(everywhere, axis=0))[:WIDEST]:
+            low = _lower_half(np.array([place[:, joint].mean() for place in q]))
+            yield Split(low, ~low)
+            yield Split(~low, low)
+        first = np.arange(len(q)) < len(q) / 2
+        yield Split(first, ~first)
+        yield Split(~first, first)
+
+    def cost(self, blocks: Sides, trial: Trial) -> float:
+        """Mean log of the errors over the splits, relative to a constant."""
+        columns = self.comparison.widened(trial.columns, trial.scales).tolist()
+        fitted, judged = blocks.fitted.columns(columns), blocks.judged.columns(columns)
+        spread, costs = self.comparison.spread, []
+        solve = _Solver(self.comparison.estimator, fitted.total, trial)
+        for split in self.splits:
+            values, _ = solve(_sum(fitted, split.fitted))
+            unseen = _sum(judged, split.judged)
+            error = np.sqrt(unseen.residual(values) / np.maximum(unseen.count, 1))
+            costs.append(float(np.log(np.clip(error / spread, 1e-9, 1.0)).mean()))
+        return float(np.mean(costs)) if costs else 0.0
+
+    def band(self, blocks: Sides, trial: Trial) -> Band:
+        """Calibrates the band on the splits."""
+        columns = self.comparison.widened(trial.columns, trial.scales).tolist()
+        fitted = blocks.fitted.columns(columns)
+        solve, joints = _Solver(self.comparison.estimator, fitted.total, trial), len(self.comparison.spread)
+        rows, block = self._thinned(trial)
+        held = np.zeros((len(GROWTHS), joints))
+        for split in self.splits:
+            values, covariance = solve(_sum(fitted, split.fitted))
+            seen, unseen = split.fitted[block], split.judged[block]
+            for joint, (Y, used, tau) in enumerate(rows):
+                error = np.abs(tau - Y @ values[used])
+                known = seen & np.isfinite(error)
+                level = np.quantile(error[known], BAND) if known.any() else 0.0
+                width = np.hypot(level, NORMAL_95 * np.outer(GROWTHS, _deviation(Y[unseen], covariance, used)))
+                known = np.isfinite(error[unseen])
+                held[:, joint] += (error[unseen] <= width)[:, known].mean(axis=1) if known.any() else 1.0
+        share = held / max(len(self.splits), 1)
+        first = np.where((share >= HELD).any(axis=0), (share >= HELD).argmax(axis=0), len(GROWTHS) - 1)
+        growth = np.array(GROWTHS)[first] if self.splits else np.ones(joints)
+        covariance = solve(fitted.total)[1]
+        open_ = [_deviation(Y, covariance, used) for Y, used, _ in rows]
+        return Band(growth, covariance, np.array([np.quantile(part, LARGEST) for part in open_]))
+
+    def _thinned(self, trial: Trial) -> tuple[list[tuple[Array, NDArray[np.intp], Array]], NDArray[np.intp]]:
+        """Some rows: per joint its columns (m, p_j), their places and its torque; and the rows' blocks (m,)."""
+        total = sum(piece.stop - piece.start for _, piece in self._pieces)
+        step = max(1, total // MOST_ROWS)
+        regressor = self.comparison.regressor
+        place = np.full(regressor.base.size, -1)
+        place[list(trial.columns)] = np.arange(len(trial.columns))
+        chosen = [(k, part, np.arange(piece.start, piece.stop)[::step]) for k, (part, piece) in enumerate(self._pieces)]
+        parts = [_joint_rows(self.comparison, part, at, trial) for _, part, at in chosen]
+        rows = []
+        for joint, used in enumerate(regressor.used):
+            kept = np.flatnonzero(place[used] >= 0)
+            Y = np.concatenate([found[joint][:, kept] for found in parts])
+            tau = np.concatenate([part.tau[at, joint] for _, part, at in chosen])
+            held = [np.full(len(at), part.held is not None and part.held[joint]) for _, part, at in chosen]
+            rows.append((Y, place[used[kept]], np.where(np.concatenate(held), np.nan, tau)))
+        return rows, np.concatenate([np.full(len(at), k) for k, _, at in chosen])
+
+
+def _joint_rows(comparison: Comparison, part: Rows, at: NDArray[np.intp], trial: Trial) -> list[Array]:
+    """Each joint's columns of some rows, the friction's sign as wide as the trial has it."""
+    motion, found = part.motion, []
+    parts = comparison.regressor(motion.q[at], motion.dq[at], motion.ddq[at], part.gravity)
+    for joint, (Y, used) in enumerate(zip(parts, comparison.regressor.used, strict=True)):
+        if trial.scales[joint]:
+            columns = [comparison.base.columns[k] for k in used]
+            sign = [i for i, c in enumerate(columns) if c.friction and c.symbol == "f1" and c.joint == joint + 1]
+            Y[:, sign] = np.tanh(motion.dq[at, joint, None] / VELOCITY_SCALES[trial.scales[joint]])
+        found.append(Y)
+    return found
+
+
+def _deviation(Y: Array, covariance: Array, used: NDArray[np.intp]) -> Array:
+    """Standard deviation (m,) that the parameters' covariance makes of some rows (m, p_j)."""
+    own = covariance[np.ix_(used, used)]
+    return np.sqrt(np.maximum(np.einsum("tp,tp->t", Y @ own, Y), 0.0))
+
+
+class _Solver:
+    """Fits parts of the data with the prior that the whole is fitted with."""
+
+    def __init__(self, estimator: Estimator, total: Moments, trial: Trial) -> None:
+        self.estimator, self.trial = estimator, trial
+        _, self._weights = estimator.solve(total.pulled(trial.prior), trial.ridge)
+        self._square = float(self._weights @ total.square)
+
+    def __call__(self, moments: Moments) -> tuple[Array, Array]:
+        """Gives the parameters (k,) and their covariance (k, k)."""
+        moments = moments.pulled(self.trial.prior)
+        # The ridge is a share of the part's torque; the prior is to count as much as beside the whole.
+        ridge = self.trial.ridge * self._square / max(float(self._weights @ moments.square), np.finfo(float).tiny)
+        values, weights = self.estimator.solve(moments, ridge)
+        # With weights of inverse variance this is how many rows inform as one: see `weighed_prior`.
+        strength = ridge * float(weights @ moments.square)
+        return values, strength * moments.inverse(weights, ridge)
+
+
+def _sum(blocks: Blocks, which: Which) -> Moments:
+    arrays = (blocks.gram, blocks.cross, blocks.square, blocks.count)
+    return Moments(*(array[:, which].sum(axis=1) for array in arrays))
+
+
+def _lower_half(keys: Array) -> Which:
+    """Marks the half of the blocks (B,) with the smaller keys."""
+    lower = np.zeros(len(keys), dtype=bool)
+    lower[np.argsort(keys, kind="stable")[: len(keys) // 2]] = True
+    return lower
+
+
+def band_of(errors: Array) -> Array:
+    """Gives the half-widths (n,) that hold `BAND` of each joint's errors (N, n) that are known; NaN where none is."""
+    if not np.isnan(errors).any():
+        return np.asarray(np.quantile(errors, BAND, axis=0))
+    known: Sequence[Array] = [column[~np.isnan(column)] for column in errors.T]
+    return np.array([np.quantile(column, BAND) if len(column) else np.nan for column in known])

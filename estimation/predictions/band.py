@@ -1,0 +1,65 @@
+"""The band about a prediction, and what a motion has that the fit has not seen."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from estimation.models.model import Model
+from estimation.regressions.joint_regressor import chunks
+from robots.signals import Motion
+from robots.terms.base import length_unit
+
+Array = NDArray[np.float64]
+
+NORMAL_95 = 1.96
+# A speed, acceleration or range larger than the recorded one by this factor is said.
+BEYOND = 1.1
+KINDS = {"speed": "velocity", "acceleration": "acceleration"}
+
+
+def band_of_motion(model: Model, motion: Motion, gravity: Array | None) -> tuple[Array, NDArray[np.bool_]] | None:
+    """Half-widths (N, n) of the 95 % band, and where (N, n) the motion is an extrapolation; None without a band.
+
+    The width of the fitted logs' errors and that of the parameters' errors add up as independent ones do. The latter
+    grow with the distance from what the fit has seen: speeds, accelerations and places that its rows hardly held.
+    """
+    known = model.provenance
+    if known.get("band95") is None:
+        return None
+    level = np.broadcast_to(np.asarray(known["band95"], dtype=float), motion.q.shape)
+    if "band_covariance" not in known:
+        return level.copy(), np.zeros(motion.q.shape, dtype=bool)
+    growth, covariance = (np.asarray(known[key], dtype=float) for key in ("band_growth", "band_covariance"))
+    torque_model, open_ = model.torque_model.under(gravity), np.zeros(motion.q.shape)
+    for rows in chunks(len(motion)):
+        Y = torque_model.regressor(motion.q[rows], motion.dq[rows], motion.ddq[rows], columns=model.columns)
+        open_[rows] = np.sqrt(np.maximum(np.einsum("tjp,tjp->tj", Y @ covariance, Y), 0.0))
+    reach = np.asarray(known["band_reach"], dtype=float)
+    return np.hypot(level, NORMAL_95 * growth * open_), open_ > reach
+
+
+def beyond_the_recorded(model: Model, motion: Motion) -> tuple[str, ...]:
+    """Says of each joint by how much its speed, acceleration or range exceeds the recorded one."""
+    recorded, found = model.provenance.get("recorded"), []
+    if recorded is None:
+        return ()
+    lowest, highest = (np.asarray(bound, dtype=float) for bound in recorded["position"])
+    for joint, name in enumerate(model.robot.joint_names):
+        texts = [
+            f"{ratio:.2g} times the recorded {what}"
+            for what, signal in (("speed", motion.dq), ("acceleration", motion.ddq))
+            if (ratio := _ratio(signal[:, joint], recorded[KINDS[what]][0][joint])) > BEYOND
+        ]
+        q = motion.q[:, joint]
+        outside = max(float(lowest[joint] - q.min()), float(q.max() - highest[joint]))
+        if outside > (BEYOND - 1) * float(highest[joint] - lowest[joint]):
+            texts.append(f"{outside:.2g} {length_unit(model.robot, joint)} outside the recorded range")
+        if texts:
+            found.append(f"joint {joint + 1} ({name}): {', '.join(texts)}")
+    return tuple(found)
+
+
+def _ratio(signal: Array, recorded: float) -> float:
+    largest = float(np.abs(signal).max())
+    return largest / recorded if recorded > 0 else np.inf if largest > 0 else 1.0

@@ -1,0 +1,91 @@
+"""The prior of every fit: a plausible arm, its friction and its drives, as far as nothing is known of them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+from numpy.typing import NDArray
+
+from estimation.regressions.moments import Moments
+from estimation.regressions.parameter_priors import (
+    SILENT,
+    GaussianPrior,
+    inflate_conflicting_prior,
+    link_spreads,
+    prior_of_spreads,
+)
+from estimation.regressions.standard_parameters import mass_from_torque, reference_bodies
+from robots.base_parameters import BaseParameters
+from robots.terms import PositionTorque
+from robots.terms.rigid_body import SYMBOLS
+
+Array = NDArray[np.float64]
+
+# Torque that friction, rotor or offset of a joint usually makes, and that an unknown function of its position does, as
+# shares of the torque's standard deviation. `benchmarks/transfer.py` is flat about both: half and twice the value
+# change the median error by 3 %.
+OWN_SHARE, POSITION_SHARE = 0.2, 0.07
+# Torque of a joint without torque, as a share of the largest joint's.
+SMALLEST_TORQUE = 1e-3
+# What a model lacks is alike for about so long [s] of a motion: rows closer than that do not inform twice.
+MEMORY = 0.1
+# Standard deviations of the prior from which the data are said to contradict it.
+CONFLICT = 4.0
+# Weight of a prior that hardly counts, and rounds by which the weight and the residual suit each other.
+FREE, ROUNDS = 1e-6, 2
+
+
+def default_prior(base: BaseParameters, spread: Array, level: Array) -> GaussianPrior:
+    """Builds the prior: each parameter scatters about the description by its own size, or about zero without one.
+
+    Links scatter by their mass, mass times reach and mass times reach squared (`link_spreads`); a link without
+    description is as heavy as the torques suggest. What belongs to a joint scatters by the parameter that makes a usual
+    share of the joint's torque.
+
+    Args:
+        base: base parameters.
+        spread: standard deviation of each joint's torque (n,) [N m or N].
+        level: RMS of each column on the joint of its own (b,).
+    """
+    model = base.model
+    torque = np.maximum(spread, max(SMALLEST_TORQUE * float(spread.max()), np.finfo(float).tiny))
+    bodies, _ = reference_bodies(model.robot, mass_from_torque(model.robot, float(torque.max())))
+    links = link_spreads(bodies)
+    own = {column: position for position, column in enumerate(base.independent)}
+    scatter = np.zeros(model.size)
+    for i, column in enumerate(model.columns):
+        joint = column.joint - 1
+        if column.term == "rigid_body":
+            scatter[i] = links[joint, SYMBOLS.index(column.symbol)]
+            continue
+        share = POSITION_SHARE if column.term == PositionTorque.name else OWN_SHARE
+        acts = level[own[i]] if i in own else 0.0
+        # A column that never acts stays at its description by any spread.
+        scatter[i] = share * torque[joint] / (acts if acts > SILENT else 1.0)
+    return prior_of_spreads(base, scatter, np.nan_to_num(model.nominal))
+
+
+def weighed_prior(
+    solve: Callable[[Moments, float], tuple[Array, Array]], moments: Moments, prior: GaussianPrior, rows: float
+) -> tuple[float, GaussianPrior]:
+    """Weighs a prior against the residual of the data, and weakens it where the data contradict it.
+
+    Args:
+        solve: (moments, ridge) -> parameters (p,) and weights (n,).
+        moments: of the data.
+        prior: of the parameters (p,).
+        rows: how many rows inform as much as one that is independent of all others.
+
+    Returns:
+        The ridge by which the prior counts for what it is, see `Moments.solve`, and the weakened prior.
+    """
+    # Contradictions show against the noise that the data alone leave: beside a wrong prior all of it would be noise.
+    precision = moments.level(solve(moments.pulled(prior), FREE)[0]) ** -2
+    information = np.tensordot(precision, moments.gram, axes=1) / rows
+    held = inflate_conflicting_prior(prior, information, precision @ moments.cross / rows, sigmas=CONFLICT)
+    ridge = FREE
+    for _ in range(ROUNDS):
+        precision = moments.level(solve(moments.pulled(held), ridge)[0]) ** -2
+        ridge = rows / max(float(precision @ moments.square), np.finfo(float).tiny)
+    return ridge, held
