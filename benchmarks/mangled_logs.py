@@ -48,7 +48,7 @@ from robots.signals import Motion
 # torque.
 ERRORS, MATTERS = 5.0, 0.05
 # Fewer than by default: the logs are short, and it is not the choice of the smoothing that is tested.
-CANDIDATES = Candidates(cutoffs=(3.0, 8.0, 20.0), ridges=(1e-8, 1e-5), blocks=6)
+CANDIDATES = Candidates(cutoffs=(3.0, 8.0, 20.0), blocks=6)
 
 
 @dataclass(frozen=True)

@@ -28,7 +28,7 @@ from robots.common.progress import SILENT, Progress
 from robots.regressor import TorqueModel, default_model
 from robots.robot import Robot
 from robots.signals import Log
-from robots.terms import FrictionTerm, PositionTorque, SaturatingFriction
+from robots.terms import BendingFriction, FrictionTerm, PositionTorque
 from robots.version import VERSION
 
 Array = NDArray[np.float64]
@@ -73,7 +73,7 @@ def identify(
         logs: one log or several, of t, q and tau or current. One that states a payload or a gravity counts as such: the
             parameters are the arm's own, and all that bases which stand unlike show together.
         method: ``wls``, ``ols``, or an estimator of one's own.
-        friction: ``auto`` (`SaturatingFriction`, which a log of slow motions does not let explode at high speed),
+        friction: ``auto`` (`BendingFriction`, which a log of slow motions does not let explode at high speed),
             ``polynomial`` (thesis eq. 35), ``coulomb-viscous``, or a term of one's own.
         position: whether each joint has a torque by its own position, of unknown cause (`PositionTorque`). None: with
             ``auto`` friction, where it predicts other motions clearly better.
@@ -110,7 +110,7 @@ def identify(
     prepared = prepare_all(robot, usable)
     by_position = friction == "auto" if position is None else position
     if friction == "auto":
-        friction = SaturatingFriction(speed=_usual_speeds(prepared))
+        friction = BendingFriction(speed=_usual_speeds(prepared))
 
     def model(scales: float | tuple[float, ...], with_position: bool) -> TorqueModel:
         plain = default_model(robot, friction=friction, velocity_scale=scales, rotor=rotor, offset=offset)
@@ -219,7 +219,12 @@ def _joint_fits(found: Fit, predictable: NDArray[np.bool_]) -> tuple[JointFit, .
     # On all rows, as the left-out errors are: those of a joint at rest do not count in the fit, but in its verdict.
     errors = [part.tau - torque for part, torque in zip(found.rows, found.predicted, strict=True)]
     fitted = np.sqrt(sum(np.einsum("tj,tj->j", error, error) for error in errors) / total)
-    band = band_of(np.abs(np.concatenate(errors)))
+    # Friction holds a joint that stands with any torque.
+    known = (
+        error if part.held is None else np.where(part.held, np.nan, error)
+        for part, error in zip(found.rows, errors, strict=True)
+    )
+    band = band_of(np.abs(np.concatenate(list(known))))
     nominal = np.sqrt(found.nominal / total)
     floor = _noise_floor(found)
     return tuple(

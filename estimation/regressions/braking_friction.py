@@ -9,7 +9,7 @@ from scipy.optimize import nnls
 from estimation.regressions.moments import Moments
 from estimation.regressions.standard_parameters import nonnegative_rows
 from robots.base_parameters import BaseParameters
-from robots.terms import SaturatingFriction
+from robots.terms import BendingFriction
 
 Array = NDArray[np.float64]
 
@@ -18,7 +18,7 @@ ROUNDING = 1e-9
 
 
 def with_braking_friction(base: BaseParameters, moments: Moments, values: Array, weights: Array, ridge: float) -> Array:
-    """Moves a fit of `SaturatingFriction` to the nearest one whose friction brakes; any other fit stays as it is.
+    """Moves a fit of `BendingFriction` to the nearest one whose friction brakes; any other fit stays as it is.
 
     The friction of each joint must oppose the motion, must not fall with speed from half of the highest recorded speed
     on, and beyond that speed grows like the viscous part, which must not be negative. Nearest is meant as the data and
@@ -31,7 +31,7 @@ def with_braking_friction(base: BaseParameters, moments: Moments, values: Array,
         weights: of the joints' rows (n,).
         ridge: see `Moments.solve`.
     """
-    term = next((term for term in base.model.terms if isinstance(term, SaturatingFriction)), None)
+    term = next((term for term in base.model.terms if isinstance(term, BendingFriction)), None)
     if term is None:
         return values
     speed = np.broadcast_to(np.asarray(term.speed, dtype=float), base.model.robot.n)

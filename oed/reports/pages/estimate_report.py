@@ -85,7 +85,7 @@ def estimate_page(estimate: Estimate, methods: MethodTable | None = None) -> Pag
             paragraphs=(
                 f"Estimator: {model.provenance['method']}. Positions: {estimate.choice.smoother.text}, without phase "
                 f"lag; the smoothing was chosen by cross-validation on contiguous blocks of the logs. "
-                "What the logs leave open is held by a prior: each parameter may be wrong by its own size. "
+                "What the logs leave open is regularised by a prior: each parameter may be wrong by its own size. "
                 "Standard errors: sandwich estimator with an autoregressive model of the residuals, correlated across "
                 "joints, and the scatter of the prior. "
                 "The 95 % band is that of the fitted logs. For another motion it is widened by the parameters' errors, "

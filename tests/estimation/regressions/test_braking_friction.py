@@ -7,12 +7,12 @@ from estimation.regressions.moments import Moments
 from estimation.regressions.parameter_priors import GaussianPrior
 from robots.base_parameters import find_base_parameters
 from robots.regressor import default_model
-from robots.terms import SaturatingFriction
+from robots.terms import BendingFriction
 
 
 @pytest.fixture(scope="module")
 def base(arm):
-    friction = SaturatingFriction(speed=(1.0, 2.0), velocity_scale=0.01)
+    friction = BendingFriction(speed=(1.0, 2.0), velocity_scale=0.01)
     return find_base_parameters(default_model(arm, friction=friction, rotor=False, offset=False))
 
 

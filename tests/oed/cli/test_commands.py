@@ -145,7 +145,7 @@ def test_whole_loop(run, robot: Path, experiment: Path, tmp_path: Path) -> None:
     assert list(model.glob("*.png"))
     done = run("predict", "--model", model, "--log", log, "--out", out, "--json")
     table, recorded = pd.read_csv(out, comment="#"), read_log(log)
-    assert list(table.columns) == ["t", "tau1", "tau2"]
+    assert list(table.columns)[:3] == ["t", "tau1", "tau2"]
     for joint in (0, 1):
         measured = np.interp(table["t"], recorded.t, recorded.tau[:, joint])
         error = np.std(table[f"tau{joint + 1}"] - measured) / np.sqrt(np.mean(measured**2))
