@@ -1,8 +1,9 @@
 """How well models predict motions that were not recorded: splits of measured logs that are extrapolations.
 
-Run ``python benchmarks/transfer.py FOLDER``, where FOLDER holds the published logs as ``tests`` read them. The rival is
-a plain script (``transfer_parts/plain.py``). Errors are residual RMS over the torque's standard deviation, of the rows
-that count; the band is that of ``oed predict``, which should hold 95 %.
+Run ``python benchmarks/transfer.py FOLDER``, where FOLDER holds the published logs as ``tests`` read them, or
+``python benchmarks/transfer.py --virtual 10`` for so many virtual robots of each kind. The rival is a plain script
+(``transfer_parts/plain.py``). Errors are residual RMS over the torque's standard deviation, of the rows that count; the
+band is that of ``oed predict``, which should hold 95 %.
 """
 
 from __future__ import annotations
@@ -18,7 +19,7 @@ sys.path.insert(0, str(Path(__file__).parents[1]))
 import numpy as np
 from numpy.typing import NDArray
 
-from benchmarks.transfer_parts import plain
+from benchmarks.transfer_parts import plain, virtual
 from benchmarks.transfer_parts.splits import SETS, Split
 from estimation import diagnose, identify, predict
 from estimation.logs.clocks import on_one_clock
@@ -58,17 +59,42 @@ def _error(split: Split, predicted: Array) -> Array:
     return np.where(moves, error, np.nan)
 
 
+def run_virtual(count: int, options: dict[str, Any]) -> None:
+    """Prints per kind of robot the error from the slow log, over that from a log of the full motion, and the band."""
+    print("| robot | over the full fit: median | worst | over the plain script: median | worst | in the band | least |")
+    print("|---|---|---|---|---|---|---|")
+    for kind in virtual.KINDS:
+        rows = []
+        for seed in range(count):
+            slow, full = virtual.slowed(kind, seed)
+            error, coverage = own_error(slow, options, "identify")
+            best, _ = own_error(full, options, "identify")
+            rows.append(
+                (np.mean(error) / np.mean(best), np.mean(error) / np.mean(rival_error(slow)), np.mean(coverage))
+            )
+        to_full, to_plain, held = np.array(rows).T
+        print(
+            f"| {kind} | {np.median(to_full):.2f} | {to_full.max():.2f} | {np.median(to_plain):.2f} "
+            f"| {to_plain.max():.2f} | {100 * held.mean():.0f} % | {100 * held.min():.0f} % |",
+            flush=True,
+        )
+
+
 def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
-    parser.add_argument("folder", type=Path, help="of the published logs, a folder a set")
+    parser.add_argument("folder", type=Path, nargs="?", help="of the published logs, a folder a set")
+    parser.add_argument("--virtual", type=int, default=0, help="virtual robots of each kind, instead of logs")
     parser.add_argument("--sets", nargs="+", default=list(SETS), choices=list(SETS))
     parser.add_argument("--friction", default=None, help="of identify; its default otherwise")
     parser.add_argument("--how", choices=("identify", "diagnose"), default="identify")
     options = parser.parse_args()
     warnings.simplefilter("ignore", AssumedValueWarning)
-    if not options.folder.is_dir():
-        parser.error(f"no folder {options.folder}")
     given = {"friction": options.friction} if options.friction else {}
+    if options.virtual:
+        run_virtual(options.virtual, given)
+        return 0
+    if options.folder is None or not options.folder.is_dir():
+        parser.error(f"no folder {options.folder}" if options.folder else "give the folder of the logs, or --virtual")
     ratios = []
     print("| split | plain | own | ratio | own by joint | in the band | worst joint |\n|---|---|---|---|---|---|---|")
     for name in options.sets:

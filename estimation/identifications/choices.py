@@ -31,6 +31,8 @@ class Choice:
 
     Attributes:
         smoother: of the positions.
+        low_pass: cut-off [Hz] of the low-pass that suits the logs best: of the prediction of other motions, which do
+            not have the harmonics of these.
         ridge: weight of the prior, see `Moments.solve`.
         velocity_scales: of each joint's Coulomb column (n,) [rad/s or m/s].
         prior: of the base parameters.
@@ -43,6 +45,7 @@ class Choice:
     """
 
     smoother: Smoother
+    low_pass: float
     ridge: float
     velocity_scales: tuple[float, ...]
     prior: GaussianPrior
@@ -79,7 +82,7 @@ def choose(
         position: whether a `PositionTorque` of the base stays. None: where it predicts other motions clearly better.
     """
     comparison = Comparison(base, logs, estimator, candidates)
-    smoother = comparison.smoother()
+    smoother, low_pass = comparison.smoother()
     averaged, logged = comparison.blocks(smoother), comparison.blocks(smoother, 1)
     transfer = Transfer(comparison, smoother)
     trial = comparison.trial(averaged)
@@ -90,6 +93,7 @@ def choose(
     held_out = comparison.left_out(logged, trial)
     return Choice(
         smoother=smoother,
+        low_pass=low_pass.cutoff,
         ridge=trial.ridge,
         velocity_scales=tuple(VELOCITY_SCALES[k] for k in trial.scales),
         prior=trial.prior,

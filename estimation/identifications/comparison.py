@@ -66,20 +66,21 @@ class Comparison:
         self.averaged = max(1, min(round(AVERAGED / self.period), kept // LEAST_AVERAGES))
         self.plain = np.flatnonzero([column.term != PositionTorque.name for column in base.columns])
 
-    def smoother(self) -> Smoother:
-        """Chooses the smoothing."""
+    def smoother(self) -> tuple[Smoother, LowPass]:
+        """Chooses the smoothing; and the best low-pass, which suits other motions of the same sensors, too."""
         rate = 1 / self.period
         usable = [cutoff for cutoff in self.candidates.cutoffs if cutoff <= 0.4 * rate] or [0.4 * rate]
         # All of them: an elastic drive makes a second minimum far above the first.
         tried = [(cutoff, self.trial(self.blocks(LowPass(cutoff))).cost) for cutoff in usable]
         lowest = min(cost for _, cost in tried)
         cutoff, cost = min((t for t in tried if t[1] <= lowest + CUTOFF_SLACK), key=lambda t: t[0])
-        chosen: Smoother = LowPass(cutoff)
+        low_pass = LowPass(cutoff)
+        chosen: Smoother = low_pass
         for other in self._others(cutoff):
             found = self.trial(self.blocks(other)).cost
             if found < cost - SMOOTHER_GAIN:
                 chosen, cost = other, found
-        return chosen
+        return chosen, low_pass
 
     def trial(self, blocks: Sides, *, position: bool = False) -> Trial:
         """Gives the setting of blocks of averaged rows, with a torque by each joint's position or without."""

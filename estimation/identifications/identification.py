@@ -277,7 +277,7 @@ def _provenance(
         "logs": describe_logs(logs),
         "method": method.name,
         "tool_version": VERSION,
-        "cutoff_hz": choice.cutoff,
+        "cutoff_hz": choice.low_pass,
         "smoothing": choice.smoother.to_dict(),
         "ridge": choice.ridge,
         "velocity_scales": list(choice.velocity_scales),
