@@ -11,13 +11,14 @@ from numpy.typing import ArrayLike, NDArray
 from estimation.estimators.base import Solution
 from estimation.estimators.wls import WeightedLeastSquares
 from estimation.linear_algebra.conic import ConicProgram
+from estimation.regressions.default_prior import joint_scatter
 from estimation.regressions.moments import Moments
 from estimation.regressions.regression_data import RegressionData
-from estimation.regressions.regularisation import regularisation
 from estimation.regressions.standard_parameters import (
     Scaling,
     body_columns,
     box_rows,
+    column_levels,
     largest_speed,
     nonnegative_rows,
     scaling,
@@ -49,7 +50,8 @@ class _Problem:
 
     grouping: Array  # (b, p), scaled
     scaling: Scaling
-    others: NDArray[np.intp]  # base parameters of friction, rotors and offsets
+    target: Array  # scaled, of the description
+    precision: Array  # (p,) of what belongs to joints: friction, rotors, offsets; zero for bodies
     rows: Array
     entropic: bool
 
@@ -63,11 +65,10 @@ class _Problem:
         quadratic[:size, :size] = self.grouping.T @ gram @ self.grouping / level
         linear = np.zeros(program.size)
         linear[:size] = -self.grouping.T @ (weights @ moments.cross) / level
-        # Friction, rotors and offsets have no body to lean on: they get the regularisation that the data chose.
-        extra, right = regularisation(moments, weights, gram, ridge)
-        own = self.grouping[self.others]
-        quadratic[:size, :size] += own.T @ extra[np.ix_(self.others, self.others)] @ own / level
-        linear[:size] -= own.T @ right[self.others] / level
+        # What the description says of friction, rotors and offsets counts as it does in any other fit.
+        strength = ridge * float(weights @ moments.square) / level * self.precision
+        quadratic[range(size), range(size)] += strength
+        linear[:size] -= strength * self.target
         quadratic[range(size), range(size)] += FAINT
         linear[bodies] -= FAINT * self.scaling.unit_reference
         for link, columns in enumerate(bodies):
@@ -169,10 +170,13 @@ class PhysicallyConsistent(WeightedLeastSquares):
             rows = np.vstack([rows, box_rows(model, self._boxes(data, units))])
         rows = rows * units.scale
         lengths = np.linalg.norm(rows, axis=1, keepdims=True)
+        spread = np.concatenate([part.tau for part in data.parts]).std(axis=0)
+        scatter = joint_scatter(model, spread, column_levels(data.base, data.moments))
         problem = _Problem(
             grouping=data.base.grouping * units.scale,
             scaling=units,
-            others=np.flatnonzero([column.term != "rigid_body" for column in data.base.columns]),
+            target=np.nan_to_num(model.nominal) / units.scale,
+            precision=np.divide(units.scale, scatter, out=np.zeros(model.size), where=scatter > 0) ** 2,
             rows=rows / np.where(lengths > 0, lengths, 1.0),
             entropic=self.pull == "entropic",
         )

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Mapping
 from difflib import get_close_matches
 from functools import partial
@@ -169,7 +170,10 @@ def _solve(matrix: Array, target: Array, rows: Array, lower: Array, upper: Array
         cvxpy.Minimize(cvxpy.sum_squares(matrix @ x - target)), [c for c in constraints if c.shape[0]]
     )
     try:
-        problem.solve(solver=cvxpy.CLARABEL, max_threads=1)
+        with warnings.catch_warnings():
+            # The status below says it, too.
+            warnings.filterwarnings("ignore", "Solution may be inaccurate", UserWarning)
+            problem.solve(solver=cvxpy.CLARABEL, max_threads=1)
     except cvxpy.error.SolverError as error:
         raise SolverError(f"constrained fit: {error}", remedy="check the bounds") from error
     if problem.status in (cvxpy.INFEASIBLE, cvxpy.INFEASIBLE_INACCURATE):

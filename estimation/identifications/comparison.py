@@ -17,6 +17,7 @@ from estimation.regressions.default_prior import MEMORY, default_prior, weighed_
 from estimation.regressions.joint_regressor import JointRegressor, summed
 from estimation.regressions.parameter_priors import GaussianPrior
 from estimation.regressions.preparation import Prepared, Rows, rows_of
+from estimation.regressions.standard_parameters import column_levels
 from robots.base_parameters import BaseParameters
 from robots.terms import PositionTorque
 
@@ -211,8 +212,6 @@ class Comparison:
         return chosen
 
     def _prior(self, blocks: Sides) -> GaussianPrior:
-        total = blocks.fitted.total
-        count = np.maximum(total.count, 1)
-        own = [column.joint - 1 for column in self.base.columns]
-        squares = [total.gram[joint, i, i] / count[joint] for i, joint in enumerate(own)]
-        return default_prior(self.base, self.spread, np.sqrt(squares))
+        # The columns of the wider signs come after those of the base.
+        total = blocks.fitted.total.columns(np.arange(self.base.size))
+        return default_prior(self.base, self.spread, column_levels(self.base, total))

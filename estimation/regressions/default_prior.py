@@ -17,6 +17,7 @@ from estimation.regressions.parameter_priors import (
 )
 from estimation.regressions.standard_parameters import mass_from_torque, reference_bodies
 from robots.base_parameters import BaseParameters
+from robots.regressor import TorqueModel
 from robots.terms import PositionTorque
 from robots.terms.rigid_body import SYMBOLS
 
@@ -46,24 +47,34 @@ def default_prior(base: BaseParameters, spread: Array, level: Array) -> Gaussian
     Args:
         base: base parameters.
         spread: standard deviation of each joint's torque (n,) [N m or N].
-        level: RMS of each column on the joint of its own (b,).
+        level: RMS of each standard column on the joint of its own (p,).
     """
     model = base.model
     torque = np.maximum(spread, max(SMALLEST_TORQUE * float(spread.max()), np.finfo(float).tiny))
     bodies, _ = reference_bodies(model.robot, mass_from_torque(model.robot, float(torque.max())))
     links = link_spreads(bodies)
-    own = {column: position for position, column in enumerate(base.independent)}
+    scatter = joint_scatter(model, torque, level)
+    for i, column in enumerate(model.columns):
+        if column.term == "rigid_body":
+            scatter[i] = links[column.joint - 1, SYMBOLS.index(column.symbol)]
+    return prior_of_spreads(base, scatter, np.nan_to_num(model.nominal))
+
+
+def joint_scatter(model: TorqueModel, spread: Array, level: Array) -> Array:
+    """Gives how far friction, rotor, offset and other parameters of the joints scatter (p,), zero for bodies.
+
+    Args:
+        model: the torque model with p standard parameters.
+        spread: standard deviation of each joint's torque (n,) [N m or N].
+        level: RMS of each column on the joint of its own (p,).
+    """
     scatter = np.zeros(model.size)
     for i, column in enumerate(model.columns):
-        joint = column.joint - 1
-        if column.term == "rigid_body":
-            scatter[i] = links[joint, SYMBOLS.index(column.symbol)]
-            continue
-        share = POSITION_SHARE if column.term == PositionTorque.name else OWN_SHARE
-        acts = level[own[i]] if i in own else 0.0
-        # A column that never acts stays at its description by any spread.
-        scatter[i] = share * torque[joint] / (acts if acts > SILENT else 1.0)
-    return prior_of_spreads(base, scatter, np.nan_to_num(model.nominal))
+        if column.term != "rigid_body":
+            share = POSITION_SHARE if column.term == PositionTorque.name else OWN_SHARE
+            # A column that never acts stays at its description by any spread.
+            scatter[i] = share * spread[column.joint - 1] / (level[i] if level[i] > SILENT else 1.0)
+    return scatter
 
 
 def weighed_prior(

@@ -8,7 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from estimation.regressions.moments import Moments
 from estimation.regressions.regression_data import RegressionData
+from robots.base_parameters import BaseParameters
 from robots.consistency import inertial_from_pseudo, pseudo_inertia
 from robots.geometry.inertia import SIZE
 from robots.regressor import TorqueModel
@@ -22,6 +24,8 @@ THIN = 0.02
 # Radius of gyration of a link without description, as a fraction of its length and of the arm's.
 OWN_SHARE, ARM_SHARE = 0.2, 0.05
 GRAVITY = 9.81
+# A column whose share of those that span it cancels to this part of their squares does not act.
+SPANNED = 1e-12
 # Speeds, as shares of the largest, at which friction must not drive the joint, and from which on it must not fall.
 SPEEDS = np.linspace(0.0, 1.0, 13)
 RISING = 0.5
@@ -52,20 +56,31 @@ class Scaling:
 def scaling(data: RegressionData) -> Scaling:
     """Chooses units for the model's standard parameters from the description, or from the data where there is none."""
     model = data.base.model
-    n = model.robot.n
     reference, described = reference_bodies(model.robot, mass_from_torque(model.robot, _largest_torque(data)))
     bodies = body_columns(model)
     rows = np.maximum(data.moments.count, 1)
     torque = np.sqrt(np.maximum(data.moments.square / rows, np.finfo(float).tiny))
-    scale = np.ones(model.size)
-    mean_square = {int(c): data.moments.gram[:, k, k] / rows for k, c in enumerate(data.base.independent)}
-    for k, column in enumerate(model.columns):
-        own = float(np.sqrt(mean_square.get(k, np.zeros(n))[column.joint - 1]))
-        scale[k] = torque[column.joint - 1] / own if own > 0 else 1.0
+    level = column_levels(data.base, data.moments)
+    own = torque[[column.joint - 1 for column in model.columns]]
+    scale = np.divide(own, level, out=own.copy(), where=level > 0)
     for link, columns in enumerate(bodies):
         mass, length = _size(reference[link])
         scale[columns] = mass * np.array([1.0] + [length] * 3 + [length**2] * 6)
     return Scaling(reference[: len(bodies)], described[: len(bodies)], scale, bodies)
+
+
+def column_levels(base: BaseParameters, moments: Moments) -> Array:
+    """RMS of every standard column on the joint of its own (p,), zero where the data do not move it.
+
+    A column that others span acts as its share of them does, so that no unit is needed for it.
+    """
+    levels = np.zeros(base.model.size)
+    for k, column in enumerate(base.model.columns):
+        joint, part = column.joint - 1, base.grouping[:, k]
+        square = float(part @ moments.gram[joint] @ part)
+        largest = float((part**2) @ np.diag(moments.gram[joint]))
+        levels[k] = np.sqrt(square / max(moments.count[joint], 1)) if square > SPANNED * largest else 0.0
+    return levels
 
 
 def body_columns(model: TorqueModel) -> NDArray[np.intp]:

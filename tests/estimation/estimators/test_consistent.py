@@ -1,6 +1,7 @@
 """The physically consistent fit: bodies that can exist, checked by eigenvalues and against a modelling layer."""
 
 import time
+from dataclasses import replace
 
 import cvxpy
 import numpy as np
@@ -14,6 +15,7 @@ from estimation.regressions.standard_parameters import body_columns, reference_b
 from robots.common.errors import InfeasibleError, InputError
 from robots.consistency import BASIS, inertial_from_pseudo, pseudo_inertia
 from robots.loading import load_robot
+from robots.signals import Log
 
 
 def solved(member, data):
@@ -226,3 +228,39 @@ def test_on_a_real_arm_it_predicts_as_well(data):
         for method in ("wls", "consistent")
     }
     assert spread["consistent"].mean() < 1.05 * spread["wls"].mean(), spread
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("factor", [1e-4, 1e3])
+def test_units_of_mass_do_not_matter(arm, arm_log, factor):
+    """An arm with all masses, frictions and rotors times a factor gives all parameters times that factor."""
+    log = arm_log(torque_noise=0.02)
+    options = {"method": "consistent", "friction": "coulomb-viscous", "check": False}
+    plain = identify(arm, log, **options).model
+    scaled = replace(
+        arm, inertia=factor * arm.inertia, friction=factor * arm.friction, rotor_inertia=factor * arm.rotor_inertia
+    )
+    other = identify(scaled, replace(log, tau=factor * log.tau), **options).model
+    # The solver stops at a relative gap of 1e-8, which leaves some 1e-6 of flat directions.
+    np.testing.assert_allclose(other.values / factor, plain.values, rtol=1e-4, atol=1e-5 * np.abs(plain.values).max())
+
+
+@pytest.mark.slow
+def test_weight_does_not_move_into_offset_and_rotor(tmp_path):
+    """A vertical slide a fifth heavier than described: the mass is found, though an offset could carry it."""
+    text = (
+        '<robot name="slide"><link name="base"/><link name="a"><inertial><mass value="1"/>'
+        '<inertia ixx="0.01" ixy="0" ixz="0" iyy="0.01" iyz="0" izz="0.01"/></inertial></link>'
+        '<joint name="j1" type="prismatic"><parent link="base"/><child link="a"/><axis xyz="0 0 1"/>'
+        '<limit lower="0.1" upper="0.9" velocity="1" effort="50"/></joint></robot>'
+    )
+    (tmp_path / "slide.urdf").write_text(text)
+    t = np.arange(0.0, 20.0, 0.004)
+    q = 0.5 + 0.15 * np.sin(2 * t) + 0.1 * np.cos(3.1 * t)
+    dq, ddq = np.gradient(q, t), -0.6 * np.sin(2 * t) - 0.961 * np.cos(3.1 * t)
+    rng = np.random.default_rng(0)
+    tau = 1.2 * (ddq + 9.81) + 0.3 * np.sign(dq) + 0.2 * dq + 0.02 * rng.normal(size=len(t))
+    log = Log(t=t, q=q[:, None], tau=tau[:, None])
+    robot = load_robot(tmp_path / "slide.urdf")
+    model = identify(robot, log, method="consistent", friction="coulomb-viscous", check=False).model
+    assert model.provenance["standard_parameters"][0] == pytest.approx(1.2, rel=0.03)

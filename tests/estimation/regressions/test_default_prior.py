@@ -18,10 +18,10 @@ def base(arm):
 
 def test_the_target_is_the_description(base, arm):
     """The prior's mean is the described arm; without a description it is an arm without torque, not without spread."""
-    prior = default_prior(base, np.ones(2), np.ones(base.size))
+    prior = default_prior(base, np.ones(2), np.ones(base.model.size))
     np.testing.assert_allclose(prior.target, base.from_standard(base.model.nominal))
     bare = find_base_parameters(default_model(replace(arm, inertia=None), velocity_scale=0.01, rotor=False))
-    prior = default_prior(bare, np.array([20.0, 5.0]), np.ones(bare.size))
+    prior = default_prior(bare, np.array([20.0, 5.0]), np.ones(bare.model.size))
     inertial = [k for k, column in enumerate(bare.columns) if column.term == "rigid_body"]
     assert not prior.target[inertial].any()
     assert (np.linalg.eigvalsh(prior.precision) > 0).all()
@@ -34,7 +34,7 @@ def test_units_of_mass_do_not_matter(arm):
         light = find_base_parameters(
             default_model(replace(arm, inertia=None if inertia is None else 1e-3 * inertia), velocity_scale=0.01)
         )
-        level, spread = np.ones(heavy.size), np.array([20.0, 5.0])
+        level, spread = np.ones(heavy.model.size), np.array([20.0, 5.0])
         first, second = default_prior(heavy, spread, level), default_prior(light, 1e-3 * spread, level)
         np.testing.assert_allclose(second.precision, 1e6 * first.precision, rtol=1e-6, atol=1e-9)
 
