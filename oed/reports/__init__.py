@@ -8,6 +8,7 @@ from oed.reports.pages.diagnosis_limits import limits_page, save_limits_report
 from oed.reports.pages.diagnosis_report import diagnosis_page, save_diagnosis_report
 from oed.reports.pages.estimate_report import estimate_page, save_estimate_report
 from oed.reports.pages.pareto_report import pareto_page, save_pareto_report
+from oed.reports.pages.prediction_report import prediction_page
 from oed.reports.pages.retime_report import retime_page, save_retime_report
 from oed.reports.pictures.parameter_pictures import error_bars_picture, friction_picture, parameter_picture
 from oed.reports.pictures.torque_pictures import residual_picture, torque_picture
@@ -41,6 +42,7 @@ __all__ = [
     "parameter_picture",
     "pareto_page",
     "percent",
+    "prediction_page",
     "render",
     "residual_picture",
     "retime_page",

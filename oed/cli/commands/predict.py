@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import ExitStack
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -41,6 +42,10 @@ def predict(
     out: Annotated[Path, typer.Option("--out", help="CSV file to write: torques and their 95 % bands.")] = Path(
         "predicted.csv"
     ),
+    report: Annotated[
+        Path | None,
+        typer.Option("--report", help="Also write a page with pictures to this HTML file.", show_default=False),
+    ] = None,
     force: ForceOption = False,
     json: JsonOption = False,
     quiet: QuietOption = False,
@@ -54,16 +59,24 @@ def predict(
         from estimation import load_model, read_log
         from estimation import predict as run
         from estimation.predictions.prediction import clock_shift
+        from oed.reports import prediction_page, render
+        from robots.common.files import open_atomic
 
-        identified = load_model(model)
-        robot = identified.robot
-        read = read_log(log, n=robot.n, torque=False, mapping=mapping, joints=robot.joint_names)
-        (recorded,) = with_known_setup([read], payload, gravity)
-        progress.start("predicting", None)
-        later, clock = clock_shift(identified, recorded)
-        heat = _heat(model, identified, recorded, before or [], ambient, mapping, later)
-        result = run(identified, recorded, later=later, **heat.options)
-        result.save(out, force=force)
+        with ExitStack() as files:
+            # Opened before the work: an existing file ends the command early, and an error leaves no file behind.
+            page_file = files.enter_context(open_atomic(report, force=force)) if report else None
+            identified = load_model(model)
+            robot = identified.robot
+            read = read_log(log, n=robot.n, torque=False, mapping=mapping, joints=robot.joint_names)
+            (recorded,) = with_known_setup([read], payload, gravity)
+            progress.start("predicting", None)
+            later, clock = clock_shift(identified, recorded)
+            heat = _heat(model, identified, recorded, before or [], ambient, mapping, later)
+            result = run(identified, recorded, later=later, **heat.options)
+            result.save(out, force=force)
+            if page_file is not None:
+                page = prediction_page(result, robot.name, robot.chain.kinds)
+                page_file.write(render(page).encode())
     summary = "\n".join([result.summary(), *(word for word in (heat.assumed, clock) if word), f"written to {out}"])
     words = {"heat": heat.assumed or None, "clock": clock or None}
     console.result(summary, {"file": str(out), **result.to_dict(), **words})

@@ -252,29 +252,9 @@ def _parameter_pictures(estimate: Estimate) -> tuple[Picture, ...]:
                 [column.unit for column, k in zip(model.parameters, known, strict=True) if k],
             )
         )
-    n = model.robot.n
-    coefficients, covariances = np.zeros((n, 4)), np.zeros((n, 4, 4))
-    place = {column.name: i for i, column in enumerate(model.parameters)}
-    for joint in range(n):
-        found = [(power, place.get(f"f{power + 1}_{joint + 1}")) for power in range(4)]
-        for power, i in found:
-            if i is None:
-                continue
-            coefficients[joint, power] = model.values[i]
-            for other, k in found:
-                if k is not None:
-                    covariances[joint, power, other] = model.covariance[i, k]
     speed = np.abs(estimate.dq).max(axis=0)
-    if coefficients.any() and (speed > 0).all():
-        pictures.append(
-            friction_picture(
-                coefficients,
-                speed,
-                covariances=covariances,
-                joint_names=model.robot.joint_names,
-                kinds=model.robot.chain.kinds,
-            )
-        )
+    if any(column.friction for column in model.parameters) and (speed > 0).all():
+        pictures.append(_friction(estimate, speed))
     return tuple(pictures)
 
 
@@ -284,3 +264,31 @@ def _logs(estimate: Estimate) -> Table:
         for log in estimate.model.provenance["logs"]
     )
     return Table(headings=("log", "samples", "duration [s]", "sha256"), rows=rows)
+
+
+def _friction(estimate: Estimate, speed: Array) -> Picture:
+    """The friction curves of the model's own friction term."""
+    model = estimate.model
+    n = model.robot.n
+    own = [[k for k, c in enumerate(model.parameters) if c.friction and c.joint == joint + 1] for joint in range(n)]
+    most = max(map(len, own))
+    coefficients, covariances = np.zeros((n, most)), np.zeros((n, most, most))
+    for joint, places in enumerate(own):
+        coefficients[joint, : len(places)] = model.values[places]
+        covariances[joint, : len(places), : len(places)] = model.covariance[np.ix_(places, places)]
+
+    def shapes(joint: int, dq: Array) -> Array:
+        columns = np.zeros((len(dq), most))
+        places = [model.columns[k] for k in own[joint]]
+        for row, velocity in enumerate(dq):
+            columns[row, : len(places)] = model.torque_model.friction_at(np.full(n, velocity))[places]
+        return columns
+
+    return friction_picture(
+        coefficients,
+        speed,
+        shapes=shapes,
+        covariances=covariances,
+        joint_names=model.robot.joint_names,
+        kinds=model.robot.chain.kinds,
+    )

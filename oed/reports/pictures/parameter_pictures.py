@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -82,19 +82,22 @@ def friction_picture(
     coefficients: ArrayLike,
     velocity: ArrayLike,
     *,
+    shapes: Callable[[int, FloatArray], FloatArray] | None = None,
     covariances: ArrayLike | None = None,
     references: ArrayLike | None = None,
     joint_names: Sequence[str] | None = None,
     kinds: Sequence[str] | None = None,
     name: str = "friction",
 ) -> Picture:
-    """Shows the friction torque f1 sign(dq) + f2 dq + f3 dq|dq| + f4 dq^3 of each joint (thesis eq. 35).
+    """Shows the friction torque of each joint over its velocity.
 
     Args:
-        coefficients: f1 to f4 of each joint in SI units, (n, 4).
+        coefficients: coefficients of each joint in SI units, (n, k).
         velocity: the highest speed shown of each joint [rad/s or m/s], (n,).
-        covariances: covariance matrices of the coefficients, (n, 4, 4), for a 95 % ribbon.
-        references: coefficients to compare with, such as nominal ones, (n, 4).
+        shapes: (joint counted from 0, velocities (m,)) -> torque per unit of each coefficient (m, k); by default those
+            of f1 sign(dq) + f2 dq + f3 dq|dq| + f4 dq^3 (thesis eq. 35).
+        covariances: covariance matrices of the coefficients, (n, k, k), for a 95 % ribbon.
+        references: coefficients to compare with, such as nominal ones, (n, k).
         joint_names: names, (n,).
         kinds: "revolute" or "prismatic" of each joint, (n,); None where all are revolute.
         name: the stem of the file name.
@@ -103,7 +106,7 @@ def friction_picture(
         InputError: arrays of shapes that do not fit.
     """
     table, speeds = np.asarray(coefficients, dtype=np.float64), np.asarray(velocity, dtype=np.float64)
-    if table.ndim != 2 or table.shape[1] != 4 or speeds.shape != table.shape[:1]:
+    if table.ndim != 2 or (shapes is None and table.shape[1] != 4) or speeds.shape != table.shape[:1]:
         raise InputError(f"shapes {table.shape} and {speeds.shape}", allowed="(n, 4) and (n,)")
     known = None if references is None else np.asarray(references, dtype=np.float64)
     spread = None if covariances is None else np.asarray(covariances, dtype=np.float64)
@@ -112,17 +115,17 @@ def friction_picture(
     panels = []
     for joint in range(count):
         dq = speeds[joint] * np.concatenate([np.linspace(-1.0, -1e-6, 100), [0.0], np.linspace(1e-6, 1.0, 100)])
-        shapes = np.column_stack([np.sign(dq), dq, dq * np.abs(dq), dq**3])
+        columns = _polynomial(dq) if shapes is None else shapes(joint, dq)
         # Friction is not a function at rest: a gap, not a slope, joins both branches.
-        shapes[dq == 0.0] = np.nan
+        columns[dq == 0.0] = np.nan
         error = None
         if spread is not None:
-            error = NORMAL_95 * np.sqrt(np.maximum(np.einsum("ij,jk,ik->i", shapes, spread[joint], shapes), 0.0))
+            error = NORMAL_95 * np.sqrt(np.maximum(np.einsum("ij,jk,ik->i", columns, spread[joint], columns), 0.0))
         # Joints have colours of their own: one entry in the legend would not speak for all of them.
         label = "identified" if count == 1 else ""
-        series = [Series(x=dq, y=shapes @ table[joint], error=error, name=label, role=joint_role(joint + 1))]
+        series = [Series(x=dq, y=columns @ table[joint], error=error, name=label, role=joint_role(joint + 1))]
         if known is not None and np.isfinite(known[joint]).all():
-            series.append(Series(x=dq, y=shapes @ known[joint], name="reference", role="neutral", dash="dash"))
+            series.append(Series(x=dq, y=columns @ known[joint], name="reference", role="neutral", dash="dash"))
         panels.append(
             Panel(
                 title=titles[joint],
@@ -187,3 +190,7 @@ def error_bars_picture(
 
 def _short(name: str) -> str:
     return name if len(name) <= LABEL_LENGTH else name[: LABEL_LENGTH - 1].rstrip(" +-") + "…"
+
+
+def _polynomial(dq: FloatArray) -> FloatArray:
+    return np.column_stack([np.sign(dq), dq, dq * np.abs(dq), dq**3])

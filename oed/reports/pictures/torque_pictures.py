@@ -94,7 +94,7 @@ def torque_picture(
         shared_x=True,
         panel_height=150,
         caption="Left: measured and predicted torque. Right: measured minus predicted, on its own scale."
-        + ("" if widths is None else " The band contains 95 % of the errors on held-out data."),
+        + ("" if widths is None else " The band is to contain 95 % of the errors."),
     )
 
 

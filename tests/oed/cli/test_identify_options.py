@@ -83,6 +83,22 @@ def test_exports_never_overwrite(identify, kept: str, tmp_path: Path) -> None:
     assert files[kept].read_text() == "precious"
 
 
+def test_prediction_report(run, experiment: Path, tmp_path: Path) -> None:
+    """With --report there is a page with the torque, its band and the errors; a file in the way stops the command."""
+    page, out = tmp_path / "p.html", tmp_path / "p.csv"
+    command = ["predict", "--model", experiment, "--log", experiment / "log.csv", "--out", out, "--report", page]
+    done = run(*command)
+    assert done.code == 0, done.err
+    text = page.read_text(encoding="utf-8")
+    assert "95 % band" in text
+    assert "of torque RMS [%]" in text
+    out.unlink()
+    again = run(*command)
+    assert again.code == 2
+    assert "p.html" in again.err
+    assert not out.exists()
+
+
 def test_band(run, experiment: Path, tmp_path: Path) -> None:
     """The table holds the limits of a band that contains some 95 % of what was logged, and hardly extrapolates."""
     out = tmp_path / "p.csv"
