@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from estimation.estimators import Estimator
 from estimation.identifications.comparison import VELOCITY_SCALES, Comparison
-from estimation.identifications.transfer import Band, Transfer
+from estimation.identifications.transfer import Band, Contradiction, Transfer
 from estimation.identifications.trials import Candidates
 from estimation.preprocessing import Smoother
 from estimation.regressions.parameter_priors import GaussianPrior
@@ -41,6 +41,7 @@ class Choice:
             ends besides: what a prediction is judged on.
         spread: standard deviation of the torque (n,): the error of a constant.
         band: of the prediction of other motions.
+        contradiction: a log that one model does not fit together with the others; None where they agree.
         cost: mean log of the left-out error over that of a constant; a joint worse than a constant counts as one.
     """
 
@@ -53,6 +54,7 @@ class Choice:
     held_out: Array
     spread: Array
     band: Band
+    contradiction: Contradiction | None
     cost: float
 
     @property
@@ -101,5 +103,6 @@ def choose(
         held_out=held_out,
         spread=comparison.spread,
         band=transfer.band(averaged, trial),
+        contradiction=transfer.contradiction(averaged, trial),
         cost=float(np.minimum(np.log(np.maximum(held_out / comparison.spread, 1e-9)), 0.0).mean()),
     )

@@ -59,9 +59,12 @@ class Comparison:
         self.spread = np.maximum(tau.std(axis=0), 1e-9 * np.maximum(1.0, np.abs(tau).max(axis=0)))
         self.sampled = count > MOST_ROWS
         self.logs: list[Prepared] = []
-        for log in logs:
+        self.names = [log.log.name or f"log {index}" for index, log in enumerate(logs, start=1)]
+        self.source: list[int] = []  # of each stretch, which log it is part of
+        for index, log in enumerate(logs):
             number = max(1, round(STRETCHES * len(log.log) / count)) if self.sampled else 1
             self.logs += log.stretches(number, -(-min(len(log.log), round(MOST_ROWS / count * len(log.log))) // number))
+            self.source += [index] * (len(self.logs) - len(self.source))
         self.period = float(np.median([log.positions.period for log in self.logs]))
         kept = sum(len(log.log) for log in self.logs)
         self.averaged = max(1, min(round(AVERAGED / self.period), kept // LEAST_AVERAGES))

@@ -113,6 +113,13 @@ class Estimate:
                 f"Not identified: joints {names}. Their held-out torque is predicted no better than by a constant. "
                 "Do not use their friction, rotor inertia and offset."
             )
+        if (clash := self.choice.contradiction) is not None:
+            found.append(
+                f"The logs contradict each other: the error of {clash.log} on joint {clash.joint} is "
+                f"{100 * clash.alone:.2g} % of the torque if it is fitted alone, and {100 * clash.together:.2g} % with "
+                f"the others. "
+                "If a payload or the base differs, state it (--payload, --gravity); else use oed diagnose."
+            )
         unknown = [name for name, known in zip(self.model.names, self.model.determined, strict=True) if not known]
         if unknown:
             found.append(

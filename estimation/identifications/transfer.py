@@ -30,6 +30,9 @@ GROWTHS = (1.0, 1.5, 2.0, 3.0, 4.0, 6.0, 8.0, 12.0, 16.0, 24.0, 32.0)
 HELD = 0.98
 # Quantile that counts as the largest of the recorded rows.
 LARGEST = 0.999
+# A log's error that grows by this factor beside other logs contradicts them. Errors below this share of the torque are
+# not compared.
+CONTRADICTS, SMALLEST_ERROR = 4.0, 0.01
 # Rows that stand for the log where errors are looked at row by row.
 MOST_ROWS = 3000
 
@@ -59,6 +62,23 @@ class Band:
     reach: Array
 
 
+@dataclass(frozen=True)
+class Contradiction:
+    """A log that one model does not fit together with the others.
+
+    Attributes:
+        log: its name.
+        joint: where it shows most, counted from 1.
+        alone: error of the fit of this log alone, over the standard deviation of the joint's torque.
+        together: the same of the fit of all logs.
+    """
+
+    log: str
+    joint: int
+    alone: float
+    together: float
+
+
 class Transfer:
     """Splits of the data in which what is predicted is another motion than what is fitted."""
 
@@ -66,6 +86,8 @@ class Transfer:
         self.comparison = comparison
         self.rows = comparison.rows(smoother)
         self._pieces = [(part, piece) for part in self.rows for piece in comparison.pieces(part)]
+        sources = zip(self.rows, comparison.source, strict=True)
+        self._source = np.array([source for part, source in sources for _ in comparison.pieces(part)])
         self.splits = list(self._splits())
 
     def _splits(self) -> Iterator[Split]:
@@ -98,6 +120,28 @@ class Transfer:
             error = np.sqrt(unseen.residual(values) / np.maximum(unseen.count, 1))
             costs.append(float(np.log(np.clip(error / spread, 1e-9, 1.0)).mean()))
         return float(np.mean(costs)) if costs else 0.0
+
+    def contradiction(self, blocks: Sides, trial: Trial) -> Contradiction | None:
+        """Finds the log whose error grows most where the other logs are fitted with it; None where none grows much."""
+        logs = np.unique(self._source)
+        if len(logs) < 2:
+            return None
+        columns = self.comparison.widened(trial.columns, trial.scales).tolist()
+        fitted = blocks.fitted.columns(columns)
+        solve = _Solver(self.comparison.estimator, fitted.total, trial)
+        together, _ = solve(fitted.total)
+        found: list[Contradiction] = []
+        for log in logs.tolist():
+            own = _sum(fitted, self._source == log)
+            rows = np.maximum(own.count, 1)
+            errors = [np.sqrt(own.residual(values) / rows) for values in (solve(own)[0], together)]
+            alone, beside = (error / self.comparison.spread for error in errors)
+            grows = np.where(own.count > 0, beside / np.maximum(alone, SMALLEST_ERROR), 0.0)
+            joint = int(np.argmax(grows))
+            if grows[joint] > CONTRADICTS:
+                name = self.comparison.names[log]
+                found.append(Contradiction(name, joint + 1, float(alone[joint]), float(beside[joint])))
+        return max(found, key=lambda item: item.together / max(item.alone, SMALLEST_ERROR), default=None)
 
     def band(self, blocks: Sides, trial: Trial) -> Band:
         """Calibrates the band on the splits."""

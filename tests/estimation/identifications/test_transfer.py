@@ -14,6 +14,7 @@ from robots.base_parameters import find_base_parameters
 from robots.plants import simulate
 from robots.regressor import default_model
 from robots.signals import Motion
+from robots.terms.situations.flange_body import with_body
 
 
 @pytest.fixture(scope="module")
@@ -89,3 +90,20 @@ def test_a_band_holds_its_share():
     np.testing.assert_allclose(band_of(errors), 1.96, rtol=0.03)
     errors[:, 1] = np.nan
     assert np.isnan(band_of(errors)[1])
+
+
+@pytest.mark.slow
+def test_logs_that_contradict_each_other_are_said(arm, arm_plant, fourier_motion):
+    """A body at the flange in the second log that nobody states is told as a contradiction; its like is not."""
+    motions = [fourier_motion(arm, seed) for seed in (0, 1)]
+    plant = arm_plant(torque_noise=0.01)
+    first, second = (simulate(plant, motion, seed=seed) for seed, motion in enumerate(motions))
+    assert identify(arm, [first, second]).choice.contradiction is None
+    body = np.array([2.0, 0.4, 0, 0, 0, 0, 0, 0.08, 0, 0.08])
+    with_load = replace(plant, parameters=with_body(plant.model, plant.parameters, body))
+    loaded = simulate(with_load, motions[1], seed=1)
+    estimate = identify(arm, [first, loaded])
+    clash = estimate.choice.contradiction
+    assert clash is not None
+    assert clash.together > 4 * clash.alone
+    assert any("contradict each other" in text for text in estimate.warnings)
