@@ -110,7 +110,7 @@ def run(task: tuple[Case, int]) -> Run:
     case, seed = task
     plant = plant_of(case)
     log = simulate(plant, fourier_motion(plant.robot, seed % MOTIONS), seed=seed)
-    estimate = identify(plant.robot, log)
+    estimate = identify(plant.robot, log, friction="polynomial")
     model = estimate.model
     error = model.values - find_base_parameters(plant.model).from_standard(plant.parameters)
     scale = np.sqrt(np.diag(model.covariance))
@@ -121,7 +121,7 @@ def run(task: tuple[Case, int]) -> Run:
 
 
 def exact_errors(plant: Plant, log: Log, estimate: Estimate, motion: int) -> Array:
-    """Standard errors (b,) of that fit under the noise that the plant really has."""
+    """Standard errors (b,) of that fit under the noise that the plant really has, and the prior's scatter."""
     sensors = plant.sensors
     quiet = replace(plant, sensors=replace(sensors, torque_noise=0.0))
     tau = simulate(quiet, fourier_motion(plant.robot, motion)).tau
@@ -130,9 +130,11 @@ def exact_errors(plant: Plant, log: Log, estimate: Estimate, motion: int) -> Arr
     rho, share = np.exp(-PERIOD / sensors.correlation_time), sensors.coloured_share
     regressor = JointRegressor(find_base_parameters(estimate.model.torque_model))
     rows = prepare(plant.robot, log).rows(estimate.choice.smoother)
-    moments = sum_moments(regressor, [rows])
-    _, weights = WeightedLeastSquares().solve(moments, estimate.choice.ridge)
-    inverse = moments.inverse(weights, 1e-13)
+    choice = estimate.choice
+    moments = sum_moments(regressor, [rows]).pulled(choice.prior)
+    _, weights = WeightedLeastSquares().solve(moments, choice.ridge)
+    inverse = moments.inverse(weights, choice.ridge)
+    held = choice.ridge * float(weights @ moments.square) * inverse
     meat = np.zeros_like(inverse)
     state = rows.motion.q, rows.motion.dq, rows.motion.ddq
     for joint, (Y, used) in enumerate(zip(regressor(*state), regressor.used, strict=True)):
@@ -140,7 +142,7 @@ def exact_errors(plant: Plant, log: Log, estimate: Estimate, motion: int) -> Arr
         before, after = (lfilter([1.0], [1.0, -rho], part, axis=0) for part in (X, X[::-1]))
         coloured = before + after[::-1] - X  # sum_k rho^|k| X(t + k)
         meat[np.ix_(used, used)] += level[joint] ** 2 * X.T @ ((1 - share) * X + share * coloured)
-    return np.asarray(np.sqrt(np.diag(inverse @ meat @ inverse)))
+    return np.asarray(np.sqrt(np.diag(inverse @ meat @ inverse + held @ choice.prior.precision @ held)))
 
 
 def table(case: Case, seeds: range, workers: int | None = None) -> str:
