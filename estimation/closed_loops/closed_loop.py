@@ -95,9 +95,7 @@ class ClosedLoop:
 
     def __init__(self, base: BaseParameters) -> None:
         self.base = base
-        self._dry = {
-            column.joint - 1: k for k, column in enumerate(base.columns) if column.friction and column.symbol == "f1"
-        }
+        self._dry = {column.joint - 1: k for k, column in enumerate(base.columns) if column.is_coulomb}
         self._width = _friction_widths(base)
         self._step = self._build()
 

@@ -178,10 +178,13 @@ class Comparison:
 
     def left_out(self, blocks: Sides, trial: Trial) -> Array:
         """RMS error of all rows of each block, predicted from the others (n,) [N m or N]."""
-        columns = self.widened(trial.columns, trial.scales).tolist()
-        judged = blocks.judged.columns(columns)
-        squares = judged.squares(self._without(blocks.fitted.columns(columns), trial))
+        judged = self.of_trial(blocks.judged, trial)
+        squares = judged.squares(self._without(self.of_trial(blocks.fitted, trial), trial))
         return np.asarray(np.sqrt(squares / np.maximum(judged.count.sum(axis=1), 1)))
+
+    def of_trial(self, side: Blocks, trial: Trial) -> Blocks:
+        """Keeps the columns of a trial, with the widths of its friction signs."""
+        return side.columns(self.widened(trial.columns, trial.scales).tolist())
 
     def _without(self, chosen: Blocks, trial: Trial) -> Array:
         """Parameters (B, b) of the fit without each block."""
@@ -209,7 +212,7 @@ class Comparison:
         extra = len(VELOCITY_SCALES) - 1
         for position, index in enumerate(columns):
             column = self.base.columns[index]
-            scale = scales[column.joint - 1] if column.friction and column.symbol == "f1" else 0
+            scale = scales[column.joint - 1] if column.is_coulomb else 0
             if scale:
                 chosen[position] = self.base.size + (column.joint - 1) * extra + scale - 1
         return chosen

@@ -19,7 +19,7 @@ from estimation.regressions.preparation import Rows
 Array = NDArray[np.float64]
 Which = NDArray[np.bool_]
 
-# Joints with the widest range, along each of which the lower half of the log predicts the upper, and back.
+# Joints with the widest ranges: of each, the lower half of the range predicts the upper, and the upper the lower.
 WIDEST = 3
 # Share of the errors that a band is to hold, and the normal distribution's half-width for it.
 BAND, NORMAL_95 = 0.95, 1.96
@@ -78,6 +78,11 @@ class Contradiction:
     alone: float
     together: float
 
+    @property
+    def growth(self) -> float:
+        """Factor by which the error grows."""
+        return self.together / max(self.alone, SMALLEST_ERROR)
+
 
 class Transfer:
     """Splits of the data in which what is predicted is another motion than what is fitted."""
@@ -86,8 +91,8 @@ class Transfer:
         self.comparison = comparison
         self.rows = comparison.rows(smoother)
         self._pieces = [(part, piece) for part in self.rows for piece in comparison.pieces(part)]
-        sources = zip(self.rows, comparison.source, strict=True)
-        self._source = np.array([source for part, source in sources for _ in comparison.pieces(part)])
+        pieces = [len(comparison.pieces(part)) for part in self.rows]
+        self._source = np.repeat(comparison.source, pieces)
         self.splits = list(self._splits())
 
     def _splits(self) -> Iterator[Split]:
@@ -110,12 +115,11 @@ class Transfer:
 
     def cost(self, blocks: Sides, trial: Trial) -> float:
         """Mean log of the errors over the splits, relative to a constant."""
-        columns = self.comparison.widened(trial.columns, trial.scales).tolist()
-        fitted, judged = blocks.fitted.columns(columns), blocks.judged.columns(columns)
+        fitted, judged = (self.comparison.of_trial(side, trial) for side in (blocks.fitted, blocks.judged))
         spread, costs = self.comparison.spread, []
-        solve = _Solver(self.comparison.estimator, fitted.total, trial)
+        solver = _Solver(self.comparison.estimator, fitted.total, trial)
         for split in self.splits:
-            values, _ = solve(_sum(fitted, split.fitted))
+            values = solver.solve(_sum(fitted, split.fitted))
             unseen = _sum(judged, split.judged)
             error = np.sqrt(unseen.residual(values) / np.maximum(unseen.count, 1))
             costs.append(float(np.log(np.clip(error / spread, 1e-9, 1.0)).mean()))
@@ -126,32 +130,31 @@ class Transfer:
         logs = np.unique(self._source)
         if len(logs) < 2:
             return None
-        columns = self.comparison.widened(trial.columns, trial.scales).tolist()
-        fitted = blocks.fitted.columns(columns)
-        solve = _Solver(self.comparison.estimator, fitted.total, trial)
-        together, _ = solve(fitted.total)
+        fitted = self.comparison.of_trial(blocks.fitted, trial)
+        solver = _Solver(self.comparison.estimator, fitted.total, trial)
+        together = solver.solve(fitted.total)
         found: list[Contradiction] = []
         for log in logs.tolist():
             own = _sum(fitted, self._source == log)
             rows = np.maximum(own.count, 1)
-            errors = [np.sqrt(own.residual(values) / rows) for values in (solve(own)[0], together)]
+            errors = [np.sqrt(own.residual(values) / rows) for values in (solver.solve(own), together)]
             alone, beside = (error / self.comparison.spread for error in errors)
             grows = np.where(own.count > 0, beside / np.maximum(alone, SMALLEST_ERROR), 0.0)
             joint = int(np.argmax(grows))
             if grows[joint] > CONTRADICTS:
                 name = self.comparison.names[log]
                 found.append(Contradiction(name, joint + 1, float(alone[joint]), float(beside[joint])))
-        return max(found, key=lambda item: item.together / max(item.alone, SMALLEST_ERROR), default=None)
+        return max(found, key=lambda item: item.growth, default=None)
 
     def band(self, blocks: Sides, trial: Trial) -> Band:
         """Calibrates the band on the splits."""
-        columns = self.comparison.widened(trial.columns, trial.scales).tolist()
-        fitted = blocks.fitted.columns(columns)
-        solve, joints = _Solver(self.comparison.estimator, fitted.total, trial), len(self.comparison.spread)
+        fitted, joints = self.comparison.of_trial(blocks.fitted, trial), len(self.comparison.spread)
+        solver = _Solver(self.comparison.estimator, fitted.total, trial)
         rows, block = self._thinned(trial)
         held = np.zeros((len(GROWTHS), joints))
         for split in self.splits:
-            values, covariance = solve(_sum(fitted, split.fitted))
+            part = _sum(fitted, split.fitted)
+            values, covariance = solver.solve(part), solver.covariance(part)
             seen, unseen = split.fitted[block], split.judged[block]
             for joint, (Y, used, tau) in enumerate(rows):
                 error = np.abs(tau - Y @ values[used])
@@ -163,7 +166,7 @@ class Transfer:
         share = held / max(len(self.splits), 1)
         first = np.where((share >= HELD).any(axis=0), (share >= HELD).argmax(axis=0), len(GROWTHS) - 1)
         growth = np.array(GROWTHS)[first] if self.splits else np.ones(joints)
-        covariance = solve(fitted.total)[1]
+        covariance = solver.covariance(fitted.total)
         open_ = [_deviation(Y, covariance, used) for Y, used, _ in rows]
         return Band(growth, covariance, np.array([np.quantile(part, LARGEST) for part in open_]))
 
@@ -193,7 +196,7 @@ def _joint_rows(comparison: Comparison, part: Rows, at: NDArray[np.intp], trial:
     for joint, (Y, used) in enumerate(zip(parts, comparison.regressor.used, strict=True)):
         if trial.scales[joint]:
             columns = [comparison.base.columns[k] for k in used]
-            sign = [i for i, c in enumerate(columns) if c.friction and c.symbol == "f1" and c.joint == joint + 1]
+            sign = [i for i, c in enumerate(columns) if c.is_coulomb and c.joint == joint + 1]
             Y[:, sign] = np.tanh(motion.dq[at, joint, None] / VELOCITY_SCALES[trial.scales[joint]])
         found.append(Y)
     return found
@@ -213,15 +216,21 @@ class _Solver:
         _, self._weights = estimator.solve(total.pulled(trial.prior), trial.ridge)
         self._square = float(self._weights @ total.square)
 
-    def __call__(self, moments: Moments) -> tuple[Array, Array]:
-        """Gives the parameters (k,) and their covariance (k, k)."""
-        moments = moments.pulled(self.trial.prior)
-        # The ridge is a share of the part's torque; the prior is to count as much as beside the whole.
-        ridge = self.trial.ridge * self._square / max(float(self._weights @ moments.square), np.finfo(float).tiny)
-        values, weights = self.estimator.solve(moments, ridge)
+    def solve(self, moments: Moments) -> Array:
+        """Gives the parameters (k,)."""
+        return self.estimator.solve(moments.pulled(self.trial.prior), self._ridge(moments))[0]
+
+    def covariance(self, moments: Moments) -> Array:
+        """Gives the parameters' covariance (k, k)."""
+        moments, ridge = moments.pulled(self.trial.prior), self._ridge(moments)
+        weights = self.estimator.solve(moments, ridge)[1]
         # With weights of inverse variance this is how many rows inform as one: see `weighed_prior`.
         strength = ridge * float(weights @ moments.square)
-        return values, strength * moments.inverse(weights, ridge)
+        return strength * moments.inverse(weights, ridge)
+
+    def _ridge(self, moments: Moments) -> float:
+        """The ridge is a share of the part's torque; the prior is to count as much as beside the whole."""
+        return self.trial.ridge * self._square / max(float(self._weights @ moments.square), np.finfo(float).tiny)
 
 
 def _sum(blocks: Blocks, which: Which) -> Moments:

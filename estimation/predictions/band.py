@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from estimation.identifications.transfer import NORMAL_95
 from estimation.models.model import Model
 from estimation.regressions.joint_regressor import chunks
 from robots.signals import Motion
@@ -12,10 +13,8 @@ from robots.terms.base import length_unit
 
 Array = NDArray[np.float64]
 
-NORMAL_95 = 1.96
 # A speed, acceleration or range larger than the recorded one by this factor is said.
 BEYOND = 1.1
-KINDS = {"speed": "velocity", "acceleration": "acceleration"}
 
 
 def band_of_motion(model: Model, motion: Motion, gravity: Array | None) -> tuple[Array, NDArray[np.bool_]] | None:
@@ -48,8 +47,8 @@ def beyond_the_recorded(model: Model, motion: Motion) -> tuple[str, ...]:
     for joint, name in enumerate(model.robot.joint_names):
         texts = [
             f"{ratio:.2g} times the recorded {what}"
-            for what, signal in (("speed", motion.dq), ("acceleration", motion.ddq))
-            if (ratio := _ratio(signal[:, joint], recorded[KINDS[what]][0][joint])) > BEYOND
+            for what, key, signal in (("speed", "velocity", motion.dq), ("acceleration", "acceleration", motion.ddq))
+            if (ratio := _ratio(signal[:, joint], recorded[key][0][joint])) > BEYOND
         ]
         q = motion.q[:, joint]
         outside = max(float(lowest[joint] - q.min()), float(q.max() - highest[joint]))

@@ -34,6 +34,11 @@ class Column:
     term: str
     friction: bool = False
 
+    @property
+    def is_coulomb(self) -> bool:
+        """Whether it is the coefficient of the velocity's sign in a joint's friction."""
+        return self.friction and self.symbol == "f1"
+
 
 class Term(ABC):
     """A physical effect whose torque is linear in its parameters: tau = Y(q, dq, ddq) pi."""

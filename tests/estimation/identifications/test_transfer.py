@@ -78,8 +78,8 @@ def test_a_torque_by_position_is_taken_where_there_is_one(arm, arm_log):
     found = identify(arm, replace(clean, tau=clean.tau + pull))
     assert found.choice.position
     assert any("torque by its position" in text for text in found.warnings)
-    told = dict(zip(found.model.names, found.model.values, strict=True))
-    size = np.hypot([told["sin2_1"], told["sin2_2"]], [told["cos2_1"], told["cos2_2"]])
+    values = dict(zip(found.model.names, found.model.values, strict=True))
+    size = np.hypot([values["sin2_1"], values["sin2_2"]], [values["cos2_1"], values["cos2_2"]])
     np.testing.assert_allclose(size, 0.15 * clean.tau.std(axis=0), rtol=0.3)
     assert not identify(arm, replace(clean, tau=clean.tau + pull), position=False).choice.position
 
@@ -94,7 +94,7 @@ def test_a_band_holds_its_share():
 
 @pytest.mark.slow
 def test_logs_that_contradict_each_other_are_said(arm, arm_plant, fourier_motion):
-    """A body at the flange in the second log that nobody states is told as a contradiction; its like is not."""
+    """An unstated body at the flange in the second log is reported as a contradiction; two equal logs are not."""
     motions = [fourier_motion(arm, seed) for seed in (0, 1)]
     plant = arm_plant(torque_noise=0.01)
     first, second = (simulate(plant, motion, seed=seed) for seed, motion in enumerate(motions))
