@@ -116,7 +116,11 @@ def identify(
         plain = default_model(robot, friction=friction, velocity_scale=scales, rotor=rotor, offset=offset)
         return replace(plain, terms=(*plain.terms, PositionTorque())) if with_position else plain
 
-    base = find_base_parameters(model(VELOCITY_SCALES[0], by_position), gravities=gravities_of(data))
+    try:
+        sharp = model(VELOCITY_SCALES[0], by_position)
+    except InputError as error:
+        raise InputError(error.problem, allowed=error.allowed and f"auto, {error.allowed}") from error
+    base = find_base_parameters(sharp, gravities=gravities_of(data))
     bar.update(1.0, "choosing smoothing and model")
     choice = choose(base, prepared, chosen, candidates or Candidates(), position=position)
     predictable = _predictable(prepared, choice)
