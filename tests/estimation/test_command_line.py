@@ -143,7 +143,7 @@ def test_unknown_names_are_refused(run, log_file, tmp_path):
     out = tmp_path / "out"
     for option, value, fragment in (
         ("--method", "kalman", "allowed: wls, ols"),
-        ("--friction", "oil", "allowed: polynomial, coulomb-viscous"),
+        ("--friction", "oil", "allowed: auto, polynomial, coulomb-viscous"),
     ):
         ended = run("identify", "--robot", "er3a", "--log", log_file, "--out", out, option, value)
         refused(ended, 2, repr(value), fragment)
