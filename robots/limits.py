@@ -10,6 +10,12 @@ from numpy.typing import NDArray
 from robots.common.errors import InputError
 from robots.signals import FloatArray, Motion
 
+ACCELERATION_PER_VELOCITY = 4.0
+"""Default acceleration limit over the velocity limit [1/s]: full speed in a quarter of a second, as small arms do."""
+
+JERK_PER_ACCELERATION = 20.0
+"""Default jerk limit over the acceleration limit [1/s]: full acceleration within 50 ms."""
+
 
 @dataclass(frozen=True, kw_only=True)
 class Margin:
@@ -101,10 +107,15 @@ class Limits:
     @property
     def home(self) -> FloatArray:
         """A pose within the limits (n,): zero, or the middle of a range without zero, or its one end."""
+        zero = (self.lower <= 0.0) & (self.upper >= 0.0)
+        return np.where(zero, 0.0, self.middle)
+
+    @property
+    def middle(self) -> FloatArray:
+        """The middle of each range (n,); where an end is open, zero or the other end."""
         ranged = np.isfinite(self.lower) & np.isfinite(self.upper)
         middle = np.where(ranged, (np.where(ranged, self.lower, 0.0) + np.where(ranged, self.upper, 0.0)) / 2.0, 0.0)
-        zero = (self.lower <= 0.0) & (self.upper >= 0.0)
-        return np.clip(np.where(zero, 0.0, middle), self.lower, self.upper)
+        return np.clip(middle, self.lower, self.upper)
 
     def scaled(
         self, *, velocity: float = 1.0, acceleration: float = 1.0, jerk: float = 1.0, torque: float = 1.0

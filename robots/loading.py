@@ -31,6 +31,7 @@ def load_robot(
     tip: str | None = None,
     joints: Sequence[str] | None = None,
     locked: Mapping[str, float] | None = None,
+    unlimited: bool = False,
 ) -> Robot:
     """Load a robot.
 
@@ -39,6 +40,8 @@ def load_robot(
         tip: of a URDF, the link at which the chain ends.
         joints: of a URDF, the moving joints in the chain's order.
         locked: of a URDF, positions of locked joints [rad or m].
+        unlimited: of a URDF, whether revolute and prismatic joints may lack position limits. They are 0 by default in
+            a URDF, which no experiment can be designed for.
 
     Returns:
         The robot.
@@ -48,7 +51,8 @@ def load_robot(
             or joint; when a URDF branches and nothing says which chain is meant.
 
     Warns:
-        AssumedValueWarning: once per process and robot, when the description holds values that no source backs.
+        AssumedValueWarning: once per process and robot, when the description holds values that no source backs; for
+            each of the robot's `notes`, if it is not of the catalogue.
     """
     if isinstance(spec, Robot):
         if tip is not None or joints is not None or locked:
@@ -59,13 +63,16 @@ def load_robot(
     else:
         path = _robot_file(spec)
         if path.suffix.lower() == ".urdf":
-            robot = robot_from_urdf(path, tip, joints, locked)
+            robot = robot_from_urdf(path, tip, joints, locked, unlimited)
         else:
-            robot = robot_from_yaml(path, str(path), tip, joints, locked)
-    if robot.assumed and robot.origin not in _warned:
+            robot = robot_from_yaml(path, str(path), tip, joints, locked, unlimited)
+    if robot.origin not in _warned:
         _warned.add(robot.origin)
-        message = f"{robot.name}: these values are assumptions without a source: {', '.join(robot.assumed)}"
-        warnings.warn(message, AssumedValueWarning, stacklevel=2)
+        notes = () if robot.origin in catalogue() else robot.notes
+        if robot.assumed:
+            notes = (f"these values are assumptions without a source: {', '.join(robot.assumed)}", *notes)
+        for note in notes:
+            warnings.warn(f"{robot.name}: {note}", AssumedValueWarning, stacklevel=2)
     return robot
 
 

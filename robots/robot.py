@@ -35,6 +35,7 @@ class Robot:
             lowered to what the gear makes of it.
         period: sample period of the controller [s].
         assumed: the quantities that no source backs, such as "limits.jerk".
+        notes: what a reader of its file may not expect: values by default, doubtful ones, parts that are not used.
         origin: the catalogue name, or the file it was read from.
         digest: SHA-256 of what defines the robot; empty for a robot made in memory.
         title: full name, for reports.
@@ -57,6 +58,7 @@ class Robot:
     motor_speed: Array = None  # type: ignore[assignment]
     period: float = 0.004
     assumed: tuple[str, ...] = ()
+    notes: tuple[str, ...] = ()
     origin: str = ""
     digest: str = ""
     title: str = ""
@@ -91,6 +93,7 @@ class Robot:
             lowered = np.minimum(self.limits.velocity, reachable)
             object.__setattr__(self, "limits", replace(self.limits, velocity=lowered))
         object.__setattr__(self, "assumed", tuple(self.assumed))
+        object.__setattr__(self, "notes", tuple(self.notes))
 
     def _freeze(self, quantity: str, shape: tuple[int, ...], unknown: float) -> None:
         value = getattr(self, quantity)

@@ -246,7 +246,7 @@ class Campaign:
         file = Path(folder) / CAMPAIGN
         try:
             data = json.loads(existing_file(file).read_text(encoding="utf-8"))
-            known = robot or load_robot(data["robot"]["origin"])
+            known = robot or load_robot(data["robot"]["origin"], unlimited=True)
             if known.name != data["robot"]["name"]:
                 raise InputError(f"the campaign is for {data['robot']['name']}, not for {known.name}", file=file)
             stages = []

@@ -8,16 +8,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from robots.common.errors import InfeasibleError, InputError
-from robots.limits import Limits, finite_jerk
+from robots.limits import ACCELERATION_PER_VELOCITY, JERK_PER_ACCELERATION, Limits, finite_jerk
 from robots.signals import Motion
 
 Array = NDArray[np.float64]
-
-ACCELERATION_PER_VELOCITY = 4.0
-"""Default acceleration limit over the velocity limit [1/s]: full speed in a quarter of a second, as small arms do."""
-
-JERK_PER_ACCELERATION = 20.0
-"""Default jerk limit over the acceleration limit [1/s]: full acceleration within 50 ms."""
 
 
 def finite_limits(limits: Limits) -> Limits:

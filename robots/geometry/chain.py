@@ -78,6 +78,25 @@ def rotation_from_rpy(rpy: ArrayLike) -> Array:
     )
 
 
+def rotation_from_quaternion(quaternion: ArrayLike) -> Array:
+    """Rotation of a quaternion x, y, z, w, which is normalised.
+
+    Args:
+        quaternion: (4,), not zero.
+
+    Returns:
+        (3, 3).
+    """
+    x, y, z, w = np.asarray(quaternion, dtype=np.float64) / np.linalg.norm(quaternion)
+    return np.array(
+        [
+            [1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y - w * z), 2.0 * (x * z + w * y)],
+            [2.0 * (x * y + w * z), 1.0 - 2.0 * (x * x + z * z), 2.0 * (y * z - w * x)],
+            [2.0 * (x * z - w * y), 2.0 * (y * z + w * x), 1.0 - 2.0 * (x * x + y * y)],
+        ]
+    )
+
+
 def joint_motion(kind: Kind, axis: ArrayLike, q: ArrayLike) -> Array:
     """Transform that a joint adds: ``R = 1 + sin(q) [k] + (1 - cos(q)) [k]^2`` (Rodrigues), or ``p = k q``.
 

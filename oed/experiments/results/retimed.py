@@ -190,7 +190,7 @@ class RetimedExperiment:
         file = Path(folder) / DESIGN
         try:
             data = json.loads(existing_file(file).read_text(encoding="utf-8"))
-            known = robot or load_robot(data["robot"]["origin"])
+            known = robot or load_robot(data["robot"]["origin"], unlimited=True)
             base = find_base_parameters(design_model(known, data["settings"]))
             if list(base.names) != data["model"]["columns"]:
                 raise InputError(f"the experiment is for {data['robot']['name']}, not for {known.name}", file=file)
