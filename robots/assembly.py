@@ -6,6 +6,7 @@ import hashlib
 import json
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -207,7 +208,7 @@ def _limits(text: RobotDescription, entries: PerJoint, known: Limits | None) -> 
             return getattr(known, quantity)
         return -np.inf if quantity == "lower" else np.inf
 
-    bounds: dict[str, Array] = {}
+    bounds: dict[str, Any] = {}
     position: Range | None = text.limits.position
     for quantity in ("lower", "upper"):
         if position is None:

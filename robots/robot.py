@@ -92,6 +92,8 @@ class Robot:
         if (reachable < self.limits.velocity).any():
             lowered = np.minimum(self.limits.velocity, reachable)
             object.__setattr__(self, "limits", replace(self.limits, velocity=lowered))
+        if self.limits.kinds != self.chain.kinds:
+            object.__setattr__(self, "limits", replace(self.limits, kinds=self.chain.kinds))
         object.__setattr__(self, "assumed", tuple(self.assumed))
         object.__setattr__(self, "notes", tuple(self.notes))
 

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from estimation.logs.campaigns import MAPPING, in_order, log_files
 from estimation.logs.columns import BY_FIELD, QUANTITIES, Quantity, column_name, parse_name, refuse_text, unit_factors
 from estimation.logs.formats import is_bag_folder, read_foreign
-from estimation.logs.mapped_tables import count_joints, map_table
+from estimation.logs.mapped_tables import UNIT_NOTES, count_joints, map_table
 from estimation.logs.mapping import LogMapping, read_mapping
 from estimation.logs.repairs import drop_repeated_rows
 from robots.common.errors import InputError
@@ -33,6 +33,7 @@ def read_log(
     torque: bool = True,
     mapping: LogMapping | str | PathLike[str] | None = None,
     joints: Sequence[str] | None = None,
+    kinds: Sequence[str] | None = None,
 ) -> Log:
     """Reads a log: ``t, q1..qn``, torque or current, and whatever optional columns there are.
 
@@ -44,6 +45,7 @@ def read_log(
         torque: whether torque or current must be there; a prediction needs the motion only.
         mapping: a mapping YAML, where the columns have other names, units, signs or another order.
         joints: names of the robot's joints in its order: a bag names its joints, in any order.
+        kinds: "revolute" or "prismatic" of each joint: units of angles do not apply to linear axes.
 
     Returns:
         The log in SI units. ``metadata`` holds what the file says of itself, ``file`` (its path),
@@ -54,7 +56,7 @@ def read_log(
             record of another file, both counted from 1.
     """
     known = mapping if isinstance(mapping, LogMapping) or mapping is None else read_mapping(mapping)
-    table = _read_table(path, n, known, joints)
+    table = _read_table(path, n, known, joints, kinds)
     quantities = _checked_names(table)
     count = _count_joints(table, quantities, n)
     for name in table.names:
@@ -63,7 +65,8 @@ def read_log(
     table, kept, repairs = drop_repeated_rows(table)
     if len(table) < 2:
         raise InputError("only one row", file=table.path, row=table.first_row, allowed="2 or more rows")
-    factors = unit_factors(table, quantities)
+    factors, notes = unit_factors(table, quantities, kinds)
+    repairs = [*table.metadata.get(UNIT_NOTES, ()), *notes, *repairs]
     signals = {
         quantity.field: _signal(table, quantity, count, factors)
         for quantity in QUANTITIES
@@ -90,6 +93,7 @@ def read_logs(
     *,
     mapping: LogMapping | str | PathLike[str] | None = None,
     joints: Sequence[str] | None = None,
+    kinds: Sequence[str] | None = None,
 ) -> tuple[Log, ...]:
     """Reads the logs of one robot.
 
@@ -99,6 +103,7 @@ def read_logs(
         n: the number of joints of the robot; without it the first log decides.
         mapping: see `read_log`.
         joints: see `read_log`.
+        kinds: see `read_log`.
 
     Raises:
         InputError: no file, a file twice, another number of joints, or a file that is not a log.
@@ -117,7 +122,7 @@ def read_logs(
                 "the log is given twice", file=path, remedy="give each log once; otherwise it would count twice"
             )
         seen.add(real)
-        log = read_log(path, n, mapping=mapping, joints=joints)
+        log = read_log(path, n, mapping=mapping, joints=joints, kinds=kinds)
         if logs and log.n != logs[0].n:
             raise InputError(
                 f"{log.n} joints, but {logs[0].metadata['file']} has {logs[0].n}",
@@ -138,7 +143,11 @@ def read_logs(
 
 
 def _read_table(
-    path: str | PathLike[str], n: int | None, mapping: LogMapping | None, joints: Sequence[str] | None
+    path: str | PathLike[str],
+    n: int | None,
+    mapping: LogMapping | None,
+    joints: Sequence[str] | None,
+    kinds: Sequence[str] | None,
 ) -> Table:
     if mapping is None:
         return read_foreign(path, lambda name: parse_name(name) is not None, joints=joints)
@@ -146,7 +155,7 @@ def _read_table(
     # Which columns the mapping names depends on the number of joints, and that on the columns: names come first.
     table = read_foreign(path, lambda name: True, topic=mapping.topic, joints=named)
     count = count_joints(mapping, table.names, n)
-    mapped = map_table(table, mapping, count)
+    mapped = map_table(table, mapping, count, kinds)
     kept = {name: values for name, values in mapped.columns.items() if parse_name(name) is not None}
     left = tuple(name for name in mapped.columns if name not in kept)
     return replace(mapped, columns=kept, skipped=(*mapped.skipped, *left))
@@ -249,7 +258,7 @@ def _signal(table: Table, quantity: Quantity, joints: int, factors: Mapping[str,
 
 
 def _metadata(table: Table) -> dict[str, Any]:
-    metadata = {key: value for key, value in table.metadata.items() if key != "units"}
+    metadata = {key: value for key, value in table.metadata.items() if key not in ("units", UNIT_NOTES)}
     period = metadata.get("period")
     if period is not None:
         try:

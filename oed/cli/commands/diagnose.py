@@ -225,8 +225,8 @@ def _diagnosis(
     from robots.common.files import ResultFolder
 
     with ResultFolder(out, force, names=["diagnosis.json", "model.json", "report.html"]) as folder:
-        read = list(read_logs(logs, n=robot.n))
-        other = list(read_logs(held_out, n=robot.n)) if held_out else []
+        read = list(read_logs(logs, n=robot.n, kinds=robot.chain.kinds))
+        other = list(read_logs(held_out, n=robot.n, kinds=robot.chain.kinds)) if held_out else []
         # Held-out logs are numbered after the others.
         both = with_known_setup([*read, *other], *known)
         if own_clocks:
@@ -239,6 +239,7 @@ def _diagnosis(
             for number, made in enumerate(following.motions, start=1):
                 path = folder.path(f"next_experiment_{number}.csv")
                 motion = at_rate(made, robot.period)
-                write_trajectory(path, motion, {"robot": robot.name, "experiment": following.kind})
+                stated = {"robot": robot.name, "experiment": following.kind}
+                write_trajectory(path, motion, stated, kinds=robot.chain.kinds)
         save_diagnosis_report(result, folder, png=png)
     return result.summary(), result.to_dict()

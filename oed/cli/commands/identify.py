@@ -87,7 +87,11 @@ def identify(
             streams = {path: files.enter_context(open_atomic(path, force=force)) for path in (urdf, c_code) if path}
             described = robot_from(robot, tip, joints, lock)
             logs = with_known_setup(
-                read_logs(log, n=described.n, mapping=mapping, joints=described.joint_names), payload, gravity
+                read_logs(
+                    log, n=described.n, mapping=mapping, joints=described.joint_names, kinds=described.chain.kinds
+                ),
+                payload,
+                gravity,
             )
             options: dict[str, Any] = {
                 "friction": friction,
