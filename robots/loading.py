@@ -10,6 +10,7 @@ from pathlib import Path
 from robots.assembly import robot_from_urdf, robot_from_yaml
 from robots.common.errors import AssumedValueWarning, InputError
 from robots.common.files import existing_file
+from robots.geometry.xacro_ import is_description, split_arguments
 from robots.robot import Robot
 
 CATALOG = Path(__file__).parent / "catalog"
@@ -36,7 +37,8 @@ def load_robot(
     """Load a robot.
 
     Args:
-        spec: a catalogue name, the path of a ``.urdf`` or of a robot's ``.yaml``, or a robot, which is returned.
+        spec: a catalogue name, the path of a ``.urdf``, of a ``.xacro`` (arguments may follow: ``FILE NAME:=VALUE``) or
+            of a robot's ``.yaml``, or a robot, which is returned.
         tip: of a URDF, the link at which the chain ends.
         joints: of a URDF, the moving joints in the chain's order.
         locked: of a URDF, positions of locked joints [rad or m].
@@ -62,7 +64,7 @@ def load_robot(
         robot = robot_from_yaml(CATALOG / f"{spec}.yaml", str(spec), tip, joints, locked)
     else:
         path = _robot_file(spec)
-        if path.suffix.lower() == ".urdf":
+        if is_description(path):
             robot = robot_from_urdf(path, tip, joints, locked, unlimited)
         else:
             robot = robot_from_yaml(path, str(path), tip, joints, locked, unlimited)
@@ -79,18 +81,18 @@ def load_robot(
 def _robot_file(spec: str | Path) -> Path:
     text = str(spec)
     path = Path(text)
-    suffix = path.suffix.lower()
-    if suffix in (".urdf", ".yaml", ".yml"):
+    if is_description(text):
+        existing_file(split_arguments(text)[0])
+        return path
+    if path.suffix.lower() in (".yaml", ".yml"):
         return existing_file(path)
-    if suffix == ".xacro":
-        raise InputError("a xacro file", file=text, remedy="expand it first: xacro FILE.xacro > FILE.urdf")
     if text and path.exists():
         raise InputError(
-            "the file name does not end like that of a robot file", file=text, allowed=".urdf, .yaml or .yml"
+            "the file name does not end like that of a robot file", file=text, allowed=".urdf, .xacro, .yaml or .yml"
         )
     close = get_close_matches(text.lower(), catalogue(), n=1, cutoff=0.4)
     raise InputError(
         f"unknown robot {text!r}",
-        allowed=f"{', '.join(catalogue())}, or the path of a .urdf or .yaml file",
+        allowed=f"{', '.join(catalogue())}, or the path of a .urdf, .xacro or .yaml file",
         remedy=f"did you mean {close[0]!r}?" if close else None,
     )

@@ -12,7 +12,7 @@ from robots.common.errors import InputError
 if TYPE_CHECKING:
     from robots.robot import Robot
 
-ROBOT = "a catalogue name (er3a, ur10, panda), a URDF, or a robot YAML"
+ROBOT = "a catalogue name (er3a, ur10, panda), a URDF or xacro, or a robot YAML"
 
 RobotOption = Annotated[str, typer.Option("--robot", help=f"The robot: {ROBOT}.", show_default=False)]
 TipOption = Annotated[

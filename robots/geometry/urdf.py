@@ -263,7 +263,7 @@ def read_urdf(path: str | Path) -> UrdfTree:
     """Read a URDF file.
 
     Args:
-        path: the file, expanded if it came from xacro.
+        path: the file, a ``.urdf`` or a ``.xacro``.
 
     Returns:
         Its tree of links; ``tree.chain(...)`` takes the robot's chain out of it.

@@ -12,12 +12,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from robots.common.errors import InputError
-from robots.common.files import existing_file
 from robots.geometry.chain import Kind
 from robots.geometry.inertia import symmetric
 from robots.geometry.urdf_limits import UrdfLimit, read_limit
 from robots.geometry.urdf_reader import UrdfReader
 from robots.geometry.urdf_schema import unused_parts
+from robots.geometry.xacro_ import split_arguments, urdf_bytes
 
 Array = NDArray[np.float64]
 JointType = Literal["revolute", "continuous", "prismatic", "fixed", "floating", "planar"]
@@ -26,7 +26,7 @@ JointType = Literal["revolute", "continuous", "prismatic", "fixed", "floating", 
 _KINEMATIC = frozenset(
     ("link", "joint", "origin", "axis", "limit", "mass", "inertia", "parent", "child", "mimic", "dynamics")
 )
-_EXPAND = "expand it first: xacro FILE.xacro > FILE.urdf"
+_EXPAND = "expand it first: xacro FILE.xacro > FILE.urdf, or name it .xacro"
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -168,7 +168,7 @@ def read_elements(path: str | Path) -> UrdfElements:
     """Read the links and joints of a URDF file, each on its own; nothing is said yet of how they hang together.
 
     Args:
-        path: the file.
+        path: the file; a ``.xacro`` is expanded, with the arguments that may follow it (``FILE NAME:=VALUE``).
 
     Returns:
         What the file states.
@@ -178,7 +178,7 @@ def read_elements(path: str | Path) -> UrdfElements:
             not yet expanded from xacro, or states something impossible.
     """
     file = str(path)
-    content = existing_file(path).read_bytes()
+    content = urdf_bytes(path)
     robot = _parse(content, file)
     # Direct children only: <transmission> holds elements of the name <joint> that define none.
     links = tuple(_link(element, file) for element in robot.findall("link"))
@@ -190,7 +190,7 @@ def read_elements(path: str | Path) -> UrdfElements:
     digest = hashlib.sha256(content).hexdigest()
     return UrdfElements(
         file=file,
-        name=robot.get("name", Path(path).stem),
+        name=robot.get("name", split_arguments(path)[0].stem),
         links=links,
         joints=joints,
         digest=digest,

@@ -44,7 +44,9 @@ def export(
         motion, metadata = read_trajectory(trajectory)
         kinds = robot_from(robot).chain.kinds if robot else metadata.get("kinds")
         if degrees and kinds is None:
-            text = f"{trajectory} states no units: all joints are taken as revolute; --robot states which axes are linear"
+            text = (
+                f"{trajectory} states no units: all joints are taken as revolute; --robot states which axes are linear"
+            )
             warnings.warn(text, AssumedValueWarning, stacklevel=1)
         target = out or trajectory.with_name(f"{trajectory.stem}-export.csv")
         write_trajectory(
