@@ -54,7 +54,8 @@ def identify(
     seed: SeedOption = 0,
     out: OutOption = Path("identified"),
     urdf: Annotated[
-        Path | None, typer.Option("--urdf", help="Also write a URDF with the identified links.", show_default=False)
+        Path | None,
+        typer.Option("--urdf", help="Also write a URDF with identified bodies and friction.", show_default=False),
     ] = None,
     c_code: Annotated[
         Path | None, typer.Option("--c-code", help="Also write C code for torque and gravity.", show_default=False)
