@@ -15,6 +15,7 @@ from oed.cli.commands.identify import identify
 from oed.cli.commands.pareto import pareto
 from oed.cli.commands.predict import predict
 from oed.cli.commands.retime import retime
+from oed.cli.commands.robot import robots, show
 from oed.cli.commands.simulate import simulate
 from oed.cli.commands.thermal import thermal
 
@@ -28,6 +29,16 @@ app = typer.Typer(
 )
 for command in (design, pareto, retime, export, campaign, simulate, identify, thermal, diagnose, predict):
     app.command(cls=Command)(command)
+app.command()(robots)
+robot = typer.Typer(no_args_is_help=True, rich_markup_mode=None)
+robot.command()(show)
+app.add_typer(robot, name="robot")
+
+
+# Without a callback, typer makes the only command of a group the group itself.
+@robot.callback()
+def _of_robots() -> None:
+    """Shows what was read of a robot."""
 
 
 def _show_version(wanted: bool) -> None:

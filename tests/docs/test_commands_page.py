@@ -12,14 +12,18 @@ import typer
 from oed.cli.app import app
 
 PAGE = (Path(__file__).parents[2] / "docs" / "commands.md").read_text(encoding="utf-8")
-SECTIONS = dict(re.findall(r"^## `oed (\w+)`\n(.*?)(?=^## |\Z)", PAGE, flags=re.MULTILINE | re.DOTALL))
+SECTIONS = dict(re.findall(r"^## `oed (\w+(?: \w+)?)`\n(.*?)(?=^## |\Z)", PAGE, flags=re.MULTILINE | re.DOTALL))
 # What every command has is described once, at the top of the page.
 COMMON = {"--force", "--json", "--quiet", "--help"}
 
 
 def commands() -> dict[str, Any]:
-    """Every command of the program."""
-    return dict(typer.main.get_command(app).commands)
+    """Every command of the program, those of groups by both names."""
+    found = {}
+    for name, command in typer.main.get_command(app).commands.items():
+        inner = getattr(command, "commands", None)
+        found |= {name: command} if inner is None else {f"{name} {own}": each for own, each in inner.items()}
+    return found
 
 
 def offered(command: Any) -> dict[str, str]:
@@ -57,7 +61,7 @@ def test_options_are_those_of_the_command(name):
 @pytest.mark.parametrize("name", sorted(commands()))
 def test_section_has_an_example(name):
     """Every section shows the command at work."""
-    assert f"oed {name} " in SECTIONS[name]
+    assert re.search(rf"oed {name}\b", SECTIONS[name])
 
 
 def test_common_options_are_described():
@@ -66,4 +70,5 @@ def test_common_options_are_described():
     assert all(f"`{option}`" in head for option in COMMON)
     for command in commands().values():
         options = {name for parameter in command.params for name in parameter.opts}
-        assert COMMON - {"--help"} <= options
+        # A command that writes no file has nothing to overwrite.
+        assert COMMON - {"--help"} - (set() if "--out" in options else {"--force"}) <= options
