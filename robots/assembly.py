@@ -15,7 +15,7 @@ from robots.common.config import read_config
 from robots.common.errors import InputError
 from robots.description import MOTOR_UNITS, Bounds, Geometry, Pose, Range, RobotDescription, Values
 from robots.description_notes import assumed_in_urdf, require_stops, urdf_notes
-from robots.geometry.chain import Chain, homogeneous, rotation_from_rpy
+from robots.geometry.chain import Chain, LinkPlace, homogeneous, rotation_from_rpy
 from robots.geometry.dh import DhRow, chain_from_dh, dh_frames
 from robots.geometry.inertia import SIZE, check_body, inertial_parameters, symmetric
 from robots.geometry.urdf import read_urdf
@@ -62,6 +62,8 @@ def robot_from_urdf(
         friction=friction,
         notes=(*urdf_notes(taken, tree.unused), *assumed_in_urdf(taken, friction, tree.root)),
         origin=str(path),
+        urdf=str(path),
+        links=taken.links,
         # A choice of joints makes another robot of the same file; without one the digest is the file's own.
         digest=_digest(tree.digest, (tip, joints, locked)) if chosen else tree.digest,
     )
@@ -102,6 +104,8 @@ def robot_from_yaml(
         entries = PerJoint(str(path), chain, chain.names)
         inertia, friction, limits = _inertia(text, text.geometry, str(path)), None, None
         notes: tuple[str, ...] = ()
+        links: tuple[LinkPlace, ...] = ()
+        urdf = ""
         digest = _digest(content)
     else:
         tree = read_urdf(path.parent / (text.urdf or ""))
@@ -117,7 +121,7 @@ def robot_from_yaml(
         known = entries.names if text.limits.position is not None else ()
         taken = taken._replace(unlimited=tuple(name for name in taken.unlimited if name not in known))
         require_stops(taken.unlimited, unlimited, tree.file)
-        notes = urdf_notes(taken, tree.unused)
+        notes, links, urdf = urdf_notes(taken, tree.unused), taken.links, tree.file
     ratio, rotor, constant, speed = _drives(text, entries)
     return Robot(
         name=text.name,
@@ -134,6 +138,8 @@ def robot_from_yaml(
         assumed=tuple(text.assumed()),
         notes=notes,
         origin=origin,
+        urdf=urdf,
+        links=links,
         digest=digest,
         payload=None if text.payload is None else text.payload.value,
         ambient=None if text.ambient is None else (text.ambient.lowest, text.ambient.highest),

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from robots.common.errors import InputError
-from robots.geometry.chain import Chain
+from robots.geometry.chain import Chain, LinkPlace
 from robots.limits import Limits
 
 Array = NDArray[np.float64]
@@ -38,6 +38,8 @@ class Robot:
         notes: what a reader of its file may not expect: values by default, doubtful ones, parts that are not used.
         origin: the catalogue name, or the file it was read from.
         digest: SHA-256 of what defines the robot; empty for a robot made in memory.
+        urdf: the URDF or xacro file it was read from, with the file's path and arguments; empty without one.
+        links: the links of that file and the bodies that carry them.
         title: full name, for reports.
         payload: rated payload [kg].
         ambient: (lowest, highest) ambient temperature of operation [degC].
@@ -60,6 +62,8 @@ class Robot:
     assumed: tuple[str, ...] = ()
     notes: tuple[str, ...] = ()
     origin: str = ""
+    urdf: str = ""
+    links: tuple[LinkPlace, ...] = ()
     digest: str = ""
     title: str = ""
     payload: float | None = None

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import Any, Literal, get_args
+from typing import Any, Literal, NamedTuple, get_args
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -177,6 +177,14 @@ class Joint:
             (..., 4, 4).
         """
         return self.placement @ joint_motion(self.kind, self.axis, q)
+
+
+class LinkPlace(NamedTuple):
+    """Where a named link of a file is: ``pose`` (4, 4) in the frame of ``body``, 0 the base, i what joint i moves."""
+
+    name: str
+    body: int
+    pose: Array
 
 
 @dataclass(frozen=True, eq=False)

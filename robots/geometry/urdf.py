@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from robots.common.errors import InputError
-from robots.geometry.chain import Chain, Joint, joint_motion
+from robots.geometry.chain import Chain, Joint, LinkPlace, joint_motion
 from robots.geometry.inertia import SIZE, body_doubts, check_body, inertial_parameters
 from robots.geometry.urdf_limits import JointBounds, joint_bounds
 from robots.geometry.urdf_selection import Selection, nearest, select
@@ -25,6 +25,7 @@ class UrdfChain(NamedTuple):
     """A chain taken from a URDF: ``inertia`` is (n, 10) about the link frames, everything locked lumped in.
 
     ``unlimited`` names the joints that have stops but state none. ``notes`` says what a reader may not expect.
+    ``links`` has all links of the file with the body that carries each.
     """
 
     chain: Chain
@@ -33,6 +34,7 @@ class UrdfChain(NamedTuple):
     names: tuple[str, ...]
     unlimited: tuple[str, ...] = ()
     notes: tuple[str, ...] = ()
+    links: tuple[LinkPlace, ...] = ()
 
 
 class UrdfTree:
@@ -148,10 +150,12 @@ class UrdfTree:
         chain_joints: list[Joint] = []
         inertia = np.zeros((len(moving), SIZE))
         lumped: list[list[str]] = [[] for _ in moving]
+        places: list[LinkPlace] = []
         flange: Array = np.eye(4)
         stack: list[tuple[str, int, Array]] = [(self.root, -1, np.eye(4))]
         while stack:
             name, body, pose = stack.pop()
+            places.append(LinkPlace(name, body + 1, pose))
             if body >= 0:
                 link = self.links[name]
                 # Only what moves: bodies of the base without a proper inertia are common, and do no harm.
@@ -191,7 +195,7 @@ class UrdfTree:
                 if joint.mimic is not None and joint.mimic[0] in moving and joint.name not in selection.locked
             ),
         ]
-        return UrdfChain(chain, _limits(bounds), inertia, chain.names, unlimited, tuple(notes))
+        return UrdfChain(chain, _limits(bounds), inertia, chain.names, unlimited, tuple(notes), tuple(places))
 
     def _locked_motion(self, joint: UrdfJoint, selection: Selection) -> Array:
         if not joint.moves:
