@@ -115,6 +115,7 @@ def test_primitive_shapes_are_enclosed(inner, write):
     assert volume < own[inner] * {BOX: 2.7, CYLINDER: 1.6}.get(inner, 1.0 + 1e-6)
 
 
+@pytest.mark.slow
 def test_a_mesh_is_cut_into_parts(write):
     """An L of two bars, loaded by coal in its scale, is enclosed by several capsules much thinner than one."""
     robot = load_robot(write(urdf(drawn(MESH, ""))))
@@ -157,6 +158,7 @@ def test_coal_confirms_on_the_shapes(write):
     assert checked > 50
 
 
+@pytest.mark.slow
 def test_what_is_fixed_to_a_link_moves_with_it(write):
     """A tool's shape belongs to the body that carries it; a locked joint stands as it is locked."""
     path = write(urdf(drawn(BOX), drawn(BOX), tool=drawn(SPHERE, "")))
@@ -171,6 +173,7 @@ def test_what_is_fixed_to_a_link_moves_with_it(write):
     np.testing.assert_allclose(tool.start, [0, 0, 0.7], atol=1e-12)
 
 
+@pytest.mark.slow
 def test_many_shapes_of_a_link_are_joined(write):
     """A link of many small shapes gets a few capsules, which enclose them all."""
     boxes = "".join(drawn('<box size="0.02 0.02 0.02"/>', f'<origin xyz="0 0 {0.03 * i}"/>') for i in range(9))
@@ -180,6 +183,7 @@ def test_many_shapes_of_a_link_are_joined(write):
     assert distance_outside(found.capsules, centres) < -0.009
 
 
+@pytest.mark.slow
 def test_boxes_of_the_base_are_boxes(write):
     """A table that the base stands on stays a box, and may touch the first link."""
     base = drawn('<box size="1.2 0.8 0.04"/>', '<origin xyz="0 0 -0.02"/>') + drawn(
@@ -205,6 +209,7 @@ def test_links_without_shapes_are_assumed(write):
     assert set(model.assumed) == {"link 2", "link 3"}
 
 
+@pytest.mark.slow
 def test_meshes_of_packages(write, tmp_path):
     """``package://`` paths are found without ROS."""
     path = write(urdf(drawn('<mesh filename="package://my_arm/meshes/angle.obj" scale="0.001 0.001 0.001"/>')))
@@ -232,6 +237,7 @@ def test_impossible_shapes_are_refused(inner, message, write):
         collision_model(robot)
 
 
+@pytest.mark.slow
 def test_a_yaml_over_a_urdf_has_its_shapes(write):
     """A robot YAML that states no capsules takes the shapes of its URDF; stated ones replace them."""
     path = write(urdf(drawn(BOX), drawn(BOX)))
