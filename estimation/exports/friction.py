@@ -24,13 +24,15 @@ class LinearFriction:
         coulomb: (n,) [N m or N], zero or more.
         viscous: (n,) [N m s/rad or N s/m], zero or more.
         fastest: (n,) speed up to which it was compared [rad/s or m/s].
-        error: (n,) largest difference over the largest friction up to that speed; 0 without friction.
+        error: (n,) largest difference up to that speed [N m or N].
+        largest: (n,) largest friction of the model up to that speed [N m or N].
     """
 
     coulomb: Array
     viscous: Array
     fastest: Array
     error: Array
+    largest: Array
 
 
 def linear_friction(model: Model) -> LinearFriction | None:
@@ -59,11 +61,10 @@ def linear_friction(model: Model) -> LinearFriction | None:
     forward, backward = (torque_model.torque(still, v, still, values, columns=model.columns) for v in (speeds, -speeds))
     curve = (forward - backward) / 2.0
     found = np.array([nnls(np.column_stack([np.ones(SPEEDS), speeds[:, j]]), curve[:, j])[0] for j in range(n)])
-    largest = np.abs(curve).max(axis=0)
-    difference = np.abs(found[:, 0] + speeds * found[:, 1] - curve).max(axis=0)
     return LinearFriction(
         coulomb=found[:, 0],
         viscous=found[:, 1],
         fastest=fastest,
-        error=np.divide(difference, largest, out=np.zeros(n), where=largest > 0.0),
+        error=np.abs(found[:, 0] + speeds * found[:, 1] - curve).max(axis=0),
+        largest=np.abs(curve).max(axis=0),
     )

@@ -81,9 +81,9 @@ def _remarks(model: Model, friction: LinearFriction | None) -> str:
     if friction is not None:
         parts[0] += ", damping and friction"
         rough = [
-            f"{100 * error:.0f} % at joint {name}"
-            for name, error in zip(model.robot.joint_names, friction.error, strict=True)
-            if error > ROUGH
+            f"{friction.error[i]:.2g} {model.robot.limits.unit(i, 'torque')} at joint {name}"
+            for i, name in enumerate(model.robot.joint_names)
+            if friction.error[i] > ROUGH * friction.largest[i]
         ]
         if rough:
             text = "damping and friction approximate the identified friction curve; largest difference up to the"

@@ -87,12 +87,12 @@ def test_a_curve_is_approximated_up_to_the_recorded_speed(source, tmp_path):
     curve = 1.0 + 2.0 * speeds - 0.4 * speeds**2
     slope, constant = np.polyfit(speeds, curve, 1)
     np.testing.assert_allclose([fitted.viscous[0], fitted.coulomb[0]], [slope, constant], rtol=1e-6)
-    assert fitted.error[0] == pytest.approx(np.abs(constant + slope * speeds - curve).max() / curve.max(), rel=1e-6)
+    assert fitted.error[0] == pytest.approx(np.abs(constant + slope * speeds - curve).max(), rel=1e-6)
     assert fitted.viscous[1] == 0.0
     export_urdf(model, tmp_path / "new.urdf", robot=robot)
     found, text = written(tmp_path / "new.urdf")
     np.testing.assert_allclose(found[0], (slope, constant), rtol=1e-6)
-    assert f"recorded speed: {100 * fitted.error[0]:.0f} % at joint j1" in text
+    assert f"recorded speed: {fitted.error[0]:.2g} N m at joint j1, {fitted.error[1]:.2g} N at joint j2" in text
 
 
 def test_what_a_urdf_cannot_state_is_named(source, tmp_path):
