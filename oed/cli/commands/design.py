@@ -89,7 +89,7 @@ def design(
     noise: Annotated[
         str | None,
         typer.Option(
-            help="Standard deviation of the torque noise of each joint [N m], comma-separated.", show_default=False
+            help="Standard deviation of the torque noise of each joint [N m or N], comma-separated.", show_default=False
         ),
     ] = None,
     after: Annotated[

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import warnings
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -39,6 +40,8 @@ class DrawnLinks:
     without: tuple[int, ...]
 
 
+# A design, its check and its campaign ask for the same robot; meshes take their time.
+@lru_cache(maxsize=8)
 def drawn_links(robot: Robot) -> DrawnLinks | None:
     """Fits capsules to the collision shapes of a robot's URDF.
 
