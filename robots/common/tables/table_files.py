@@ -28,7 +28,7 @@ _FOREIGN = ("pandas", "ARROW:schema", "table")
 
 
 def read_table(path: str | PathLike[str], *, wanted: Callable[[str], bool] | None = None) -> Table:
-    """Reads a table from ``.csv`` (commas, semicolons or tabs, a leading ``#`` block allowed) or ``.parquet``.
+    """Reads a table from ``.csv`` (commas, semicolons, tabs or blanks, a leading ``#`` block allowed) or ``.parquet``.
 
     Args:
         path: the file.

@@ -230,7 +230,7 @@ def test_one_row_is_too_few(save):
 @pytest.mark.parametrize(
     ("content", "word"),
     [
-        ("t q1 tau1\n0 1 2\n1 2 3\n", "spaces"),
+        ("t q1 tau1\n0,1,2\n1,2,3\n", "spaces"),
         ("t,q1,q1,tau1\n0,1,1,2\n1,2,2,3\n", "twice"),
         ("t,q1,tau1\n0,1,2\n1,2\n", "2 cells"),
         ("t,q1,tau1\n0,1,2\n1,x,3\n", "'x'"),
