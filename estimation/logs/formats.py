@@ -6,9 +6,9 @@ from collections.abc import Callable, Sequence
 from os import PathLike
 from pathlib import Path
 
-from estimation.logs.matlab_files import read_matlab
-from estimation.logs.numpy_files import read_npz
-from estimation.logs.ros_bags import read_bag
+from estimation.logs.readers.matlab_files import read_matlab
+from estimation.logs.readers.numpy_files import read_npz
+from estimation.logs.readers.ros_bags import read_bag
 from robots.common.errors import InputError
 from robots.common.files import existing_file
 from robots.common.tables.csv_tables import read_csv
