@@ -14,6 +14,10 @@ from robots.common.errors import InputError
 from robots.common.tables.table import Table
 
 
+def _number(column: str) -> int:
+    return int(re.sub(r"\D", "", column))
+
+
 class RosTopicCsv(Recorder):
     """One row a message of ``sensor_msgs/JointState``: ``field.name0``, ``field.position0`` and so on."""
 
@@ -44,7 +48,7 @@ class RosTopicCsv(Recorder):
         effort = columns["effort"]
         source = TorqueSource(
             format=self.name,
-            columns=span(effort),
+            columns=span(sorted(effort, key=_number)) if effort else "",
             quantity="effort",
             measured=True,
             meaning="the effort that the robot's driver publishes",
