@@ -10,6 +10,9 @@ from oed.cli.command import HELP
 from oed.cli.commands.campaign import campaign
 from oed.cli.commands.design import design
 from oed.cli.commands.diagnose import diagnose
+from oed.cli.commands.doctor import doctor
+from oed.cli.commands.effects import effects
+from oed.cli.commands.example import example
 from oed.cli.commands.export import export
 from oed.cli.commands.identify import identify
 from oed.cli.commands.pareto import pareto
@@ -17,9 +20,23 @@ from oed.cli.commands.predict import predict
 from oed.cli.commands.retime import retime
 from oed.cli.commands.simulate import simulate
 from oed.cli.commands.thermal import thermal
-from oed.cli.groups import Commands
+from oed.cli.help.groups import Commands
 
-FUNCTIONS = (design, pareto, retime, export, campaign, simulate, identify, thermal, diagnose, predict)
+FUNCTIONS = (
+    design,
+    pareto,
+    retime,
+    export,
+    campaign,
+    simulate,
+    identify,
+    thermal,
+    diagnose,
+    predict,
+    example,
+    effects,
+    doctor,
+)
 
 
 class Program(Commands):

@@ -8,7 +8,7 @@ from typing import Any
 
 from typer.core import TyperCommand
 
-from oed.cli.help_texts import EXAMPLES, OPTIONS, SETTINGS, group_of
+from oed.cli.help.help_texts import EXAMPLES, OPTIONS, SETTINGS, group_of
 
 HELP = {"help_option_names": ["-h", "--help"]}
 """Settings of all commands: ``-h`` is ``--help``."""

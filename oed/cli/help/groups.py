@@ -8,8 +8,8 @@ from typing import Any, ClassVar
 from typer.core import TyperGroup
 
 from oed.cli.command import write_lines, write_sections
-from oed.cli.help_texts import COMMANDS, FIRST, OTHER, group_of
-from oed.cli.lazy_commands import LazyCommands
+from oed.cli.help.help_texts import COMMANDS, FIRST, OTHER, group_of
+from oed.cli.help.lazy_commands import LazyCommands
 
 
 class Commands(TyperGroup):
