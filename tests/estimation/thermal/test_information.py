@@ -16,7 +16,7 @@ def test_scales_that_differ_by_many_orders_do_not_matter():
     matrix, right = problem(np.array([1e-9, 1.0, 1e3, 1e9]))
     scale = np.sqrt(np.diag(matrix))
     # The regularisation of 1e-12 is the only error besides rounding.
-    np.testing.assert_allclose(inverse_of(matrix) @ matrix * scale / scale[:, None], np.eye(4), atol=1e-10)
+    np.testing.assert_allclose(inverse_of(matrix) @ matrix * scale[:, None] / scale, np.eye(4), atol=1e-10)
     np.testing.assert_allclose(matrix @ solve_normal(matrix, right) / scale, right / scale, rtol=1e-9)
 
 
