@@ -17,7 +17,7 @@ def test_scales_that_differ_by_many_orders_do_not_matter():
     scale = np.sqrt(np.diag(matrix))
     # The regularisation of 1e-12 is the only error besides rounding.
     np.testing.assert_allclose(inverse_of(matrix) @ matrix * scale[:, None] / scale, np.eye(4), atol=1e-10)
-    np.testing.assert_allclose(matrix @ solve_normal(matrix, right) / scale, right / scale, rtol=1e-9)
+    np.testing.assert_allclose(solve_normal(matrix, matrix @ (right / scale)) * scale, right, rtol=1e-9)
 
 
 def test_parameter_without_influence_has_an_infinite_variance():
