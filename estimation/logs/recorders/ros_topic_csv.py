@@ -41,9 +41,9 @@ class RosTopicCsv(Recorder):
                 remedy="choose the robot of this log",
             )
         columns = {
-            key: [names[place] for place in order] if (names := numbered(table, f"field.{key}{{}}")) else []
-            for key in ("position", "velocity", "effort")
+            key: numbered(table, f"field.{key}{{}}", 0, len(found)) for key in ("position", "velocity", "effort")
         }
+        columns = {key: [names[place] for place in order] if names else [] for key, names in columns.items()}
         stamp = "field.header.stamp" if "field.header.stamp" in table.columns else "%time"
         effort = columns["effort"]
         source = TorqueSource(

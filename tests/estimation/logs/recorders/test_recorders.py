@@ -199,3 +199,60 @@ def test_derivative_of_the_torque_is_no_torque(tmp_path):
     for name, values in (("dtau_J", 0 * tau), ("tau_J", tau), ("dq", dq), ("q", q)):
         columns |= {f"{name}[{joint}]": values[:, joint] for joint in range(7)}
     np.testing.assert_array_equal(read_log(table(tmp_path / "log.csv", columns), 7).tau, tau)
+
+
+TOKENS = (
+    b",",
+    b";",
+    b" ",
+    b"\n",
+    b'"',
+    b"#",
+    b"nan",
+    b"\0",
+    b"\xff",
+    b"1e999",
+    b"-",
+    b"{",
+    b"\t",
+    b"",
+    b"x",
+    b"\r",
+    b"%",
+)
+
+
+@pytest.mark.slow
+def test_mangled_recordings_end_in_a_message(tmp_path):
+    """Whatever happens to a file, it is a log or an input error that names the file."""
+    rng = np.random.default_rng(7)
+    sources = {}
+    for name, form in FORMATS.items():
+        sources[name] = form.write(tmp_path / "whole.csv", T[:8], *(x[:8] for x in motion(form.joints))).read_bytes()
+    path = tmp_path / "mangled.csv"
+    outcomes: list[str | None] = []
+    for _ in range(300):
+        data = bytearray(sources[list(sources)[rng.integers(len(sources))]])
+        for _ in range(rng.integers(1, 4)):
+            # The head is short and matters most.
+            place = int(rng.integers(400 if rng.random() < 0.5 else len(data)))
+            kind = rng.integers(3)
+            if kind == 2:
+                del data[place : place + int(rng.integers(1, 200))]
+            else:
+                token = TOKENS[rng.integers(len(TOKENS))]
+                data[place : place + int(kind) * len(token)] = token
+        path.write_bytes(bytes(data))
+        try:
+            read_log(path)
+            outcomes.append("read")
+        except InputError as error:
+            outcomes.append(error.file)
+    assert set(outcomes) == {"read", str(path)}
+
+
+def test_rostopic_table_with_fewer_values_than_names_is_refused(tmp_path):
+    """A message with two names has two positions."""
+    path = FORMATS["rostopic"].write(tmp_path / "log.csv", T, *motion(6))
+    spoilt(path, "field.position5", to="other")
+    assert refused(path, joints=UR_NAMES).column == "field.position5"
