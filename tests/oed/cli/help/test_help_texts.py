@@ -79,3 +79,12 @@ def test_parsers_are_made_when_they_are_asked_for() -> None:
     assert fresh.lazy._made == {}
     assert fresh.commands["design"] is fresh.commands["design"]
     assert list(fresh.lazy._made) == ["design"]
+
+
+def test_help_lists_the_estimators(run) -> None:
+    """The choices of --method are those of the registry."""
+    from estimation.estimators import ESTIMATORS
+
+    text = " ".join(run("identify", "-h").out.split())
+    listed = text.split("Estimator: ")[1].split(";")[0].replace(" or ", ", ").split(", ")
+    assert sorted(listed) == sorted(ESTIMATORS)
