@@ -14,7 +14,7 @@ class JointState(JointMessage):
     field: ClassVar[str] = "effort"
     quantity: ClassVar[Literal["torque", "effort"]] = "effort"
     meaning: ClassVar[str] = (
-        "what the robot's driver publishes; UR's driver publishes motor currents [A] unless it is told otherwise"
+        "what the robot's driver publishes; UR's driver publishes motor currents [A], and since 2026 also torques"
     )
 
     def values(self, message: Any) -> JointValues:
