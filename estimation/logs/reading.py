@@ -15,6 +15,7 @@ from estimation.logs.campaigns import MAPPING, in_order, log_files
 from estimation.logs.columns import BY_FIELD, QUANTITIES, Quantity, column_name, parse_name, refuse_text, unit_factors
 from estimation.logs.formats import is_bag_folder
 from estimation.logs.log_tables import read_log_table, without_broken_derivatives
+from estimation.logs.mapped_tables import UNIT_NOTES
 from estimation.logs.mapping import LogMapping, read_mapping
 from estimation.logs.mapping_suggestions import suggest_mapping
 from estimation.logs.repairs import drop_repeated_rows
@@ -35,6 +36,7 @@ def read_log(
     torque: bool = True,
     mapping: LogMapping | str | PathLike[str] | None = None,
     joints: Sequence[str] | None = None,
+    kinds: Sequence[str] | None = None,
 ) -> Log:
     """Reads a log: ``t, q1..qn``, torque or current, and whatever optional columns there are.
 
@@ -47,6 +49,7 @@ def read_log(
         torque: whether torque or current must be there; a prediction needs the motion only.
         mapping: a mapping YAML, where the columns have other names, units, signs or another order.
         joints: names of the robot's joints in its order: a bag names its joints, in any order.
+        kinds: "revolute" or "prismatic" of each joint: units of angles do not apply to linear axes.
 
     Returns:
         The log in SI units. ``metadata`` holds what the file says of itself, ``file`` (its path),
@@ -57,7 +60,7 @@ def read_log(
             record of another file, both counted from 1.
     """
     known = mapping if isinstance(mapping, LogMapping) or mapping is None else read_mapping(mapping)
-    table, notes = read_log_table(path, n, known, joints)
+    table, notes = read_log_table(path, n, known, joints, kinds)
     remedy = _remedy(table, known, n, joints)
     quantities = _checked_names(table, remedy)
     count = _count_joints(table, quantities, n, remedy)
@@ -70,7 +73,8 @@ def read_log(
     repairs = [*notes, *dropped, *repairs]
     if len(table) < 2:
         raise InputError("only one row", file=table.path, row=table.first_row, allowed="2 or more rows")
-    factors = unit_factors(table, quantities)
+    factors, unit_notes = unit_factors(table, quantities, kinds)
+    repairs = [*table.metadata.get(UNIT_NOTES, ()), *unit_notes, *repairs]
     signals = {
         quantity.field: _signal(table, quantity, count, factors)
         for quantity in QUANTITIES
@@ -98,6 +102,7 @@ def read_logs(
     *,
     mapping: LogMapping | str | PathLike[str] | None = None,
     joints: Sequence[str] | None = None,
+    kinds: Sequence[str] | None = None,
 ) -> tuple[Log, ...]:
     """Reads the logs of one robot.
 
@@ -107,6 +112,7 @@ def read_logs(
         n: the number of joints of the robot; without it the first log decides.
         mapping: see `read_log`.
         joints: see `read_log`.
+        kinds: see `read_log`.
 
     Raises:
         InputError: no file, a file twice, another number of joints, or a file that is not a log.
@@ -125,7 +131,7 @@ def read_logs(
                 "the log is given twice", file=path, remedy="give each log once; otherwise it would count twice"
             )
         seen.add(real)
-        log = read_log(path, n, mapping=mapping, joints=joints)
+        log = read_log(path, n, mapping=mapping, joints=joints, kinds=kinds)
         if logs and log.n != logs[0].n:
             raise InputError(
                 f"{log.n} joints, but {logs[0].metadata['file']} has {logs[0].n}",
@@ -252,7 +258,7 @@ def _signal(table: Table, quantity: Quantity, joints: int, factors: Mapping[str,
 
 
 def _metadata(table: Table) -> dict[str, Any]:
-    metadata = {key: value for key, value in table.metadata.items() if key not in ("units", "no_torque")}
+    metadata = {key: value for key, value in table.metadata.items() if key not in ("units", "no_torque", UNIT_NOTES)}
     period = metadata.get("period")
     if period is not None:
         try:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import fields
 from typing import Any
 
 import numpy as np
@@ -12,7 +11,7 @@ from numpy.typing import NDArray
 from robots.common.errors import InputError
 from robots.common.plain import all_finite, number
 from robots.geometry.chain import Chain, Joint
-from robots.limits import Limits
+from robots.limits import BOUNDS, Limits
 from robots.robot import Robot
 
 Array = NDArray[np.float64]
@@ -43,7 +42,7 @@ def describe_robot(robot: Robot) -> dict[str, Any]:
         "gravity": robot.chain.gravity.tolist(),
         "joints": joints,
         **{name: all_finite(getattr(robot, name)) for name in _BY_JOINT},
-        "limits": {item.name: all_finite(getattr(robot.limits, item.name)) for item in fields(Limits)},
+        "limits": {name: all_finite(getattr(robot.limits, name)) for name in BOUNDS},
     }
 
 
@@ -55,7 +54,7 @@ def build_robot(data: Mapping[str, Any]) -> Robot:
     """
     joints = tuple(Joint(**joint) for joint in data["joints"])
     n, limits = len(joints), data.get("limits", {})
-    bounds = {item.name: _array(limits.get(item.name), n, np.inf) for item in fields(Limits) if item.name != "lower"}
+    bounds: dict[str, Any] = {name: _array(limits.get(name), n, np.inf) for name in BOUNDS if name != "lower"}
     return Robot(
         name=data["name"],
         chain=Chain(joints, np.array(data["gravity"])),

@@ -18,6 +18,7 @@ from oed.cli.commands.identify import identify
 from oed.cli.commands.pareto import pareto
 from oed.cli.commands.predict import predict
 from oed.cli.commands.retime import retime
+from oed.cli.commands.robot import robot, robots
 from oed.cli.commands.simulate import simulate
 from oed.cli.commands.thermal import thermal
 from oed.cli.help.groups import Commands
@@ -34,6 +35,8 @@ FUNCTIONS = (
     diagnose,
     predict,
     example,
+    robot,
+    robots,
     effects,
     doctor,
 )

@@ -26,6 +26,7 @@ from oed.cli.options import (
     SeedOption,
     TipOption,
     TorqueMarginOption,
+    UnlimitedOption,
     VelocityFractionOption,
     WorkersOption,
     numbers,
@@ -88,7 +89,7 @@ def design(
     noise: Annotated[
         str | None,
         typer.Option(
-            help="Standard deviation of the torque noise of each joint [N m], comma-separated.", show_default=False
+            help="Standard deviation of the torque noise of each joint [N m or N], comma-separated.", show_default=False
         ),
     ] = None,
     after: Annotated[
@@ -129,6 +130,7 @@ def design(
     tip: TipOption = None,
     joints: JointsOption = None,
     lock: LockOption = None,
+    unlimited: UnlimitedOption = False,
     png: PngOption = False,
     force: ForceOption = False,
     json: JsonOption = False,
@@ -145,7 +147,7 @@ def design(
 
             refuse_others(context)
             summary, data = design_discriminating(
-                robot_from(robot, tip, joints, lock),
+                robot_from(robot, tip, joints, lock, unlimited=unlimited),
                 discriminate,
                 noise=numbers("--noise", noise),
                 friction=friction,
@@ -169,7 +171,7 @@ def design(
         from robots.common.files import ResultFolder
 
         with ResultFolder(out, force, names=["trajectory.csv", "design.json", "report.html"]) as folder:
-            described = robot_from(robot, tip, joints, lock)
+            described = robot_from(robot, tip, joints, lock, unlimited=unlimited)
             prior, effects = prior_from(after, described.n) if after else (None, ())
             result = run(
                 described,

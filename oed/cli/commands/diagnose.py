@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import ExitStack
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -85,6 +86,12 @@ def diagnose(
     ] = 0.02,
     seed: SeedOption = 0,
     out: OutOption = Path("diagnosed"),
+    urdf: Annotated[
+        Path | None,
+        typer.Option(
+            "--urdf", help="Also write a URDF with the extended model's bodies and friction.", show_default=False
+        ),
+    ] = None,
     tip: TipOption = None,
     joints: JointsOption = None,
     lock: LockOption = None,
@@ -101,9 +108,9 @@ def diagnose(
     with console.working() as progress:
         described = robot_from(robot, tip, joints, lock)
         if limits:
-            if log or held_out or payload or gravity or not trajectory:
+            if log or held_out or payload or gravity or urdf or not trajectory:
                 raise typer.BadParameter(
-                    "--limits needs --trajectory; --log, --held-out, --payload and --gravity do not apply",
+                    "--limits needs --trajectory; --log, --held-out, --payload, --gravity and --urdf do not apply",
                     ctx=context,
                 )
             summary, data = _limits(described, trajectory, model, noise, out, force, progress)
@@ -112,7 +119,7 @@ def diagnose(
                 raise typer.BadParameter("give --log, or --limits with --trajectory", ctx=context)
             known = (payload, gravity)
             summary, data = _diagnosis(
-                described, log, held_out or [], known, own_clocks, friction, seed, out, png, force, progress
+                described, log, held_out or [], known, own_clocks, friction, seed, out, urdf, png, force, progress
             )
     console.result(f"{summary}\nwritten to {out.resolve()}", data)
 
@@ -212,6 +219,7 @@ def _diagnosis(
     friction: str,
     seed: int,
     out: Path,
+    urdf: Path | None,
     png: bool,
     force: bool,
     progress: Progress,
@@ -220,13 +228,16 @@ def _diagnosis(
     from estimation import on_one_clock, read_logs
     from estimation.diagnosis.experiment_plans.experiment_motions import at_rate
     from estimation.diagnosis.pipeline import diagnose as run
+    from estimation.exports import urdf_text
     from oed.exports import write_trajectory
     from oed.reports import save_diagnosis_report
-    from robots.common.files import ResultFolder
+    from robots.common.files import ResultFolder, open_atomic
 
-    with ResultFolder(out, force, names=["diagnosis.json", "model.json", "report.html"]) as folder:
-        read = list(read_logs(logs, n=robot.n))
-        other = list(read_logs(held_out, n=robot.n)) if held_out else []
+    with ExitStack() as files:
+        folder = files.enter_context(ResultFolder(out, force, names=["diagnosis.json", "model.json", "report.html"]))
+        stream = None if urdf is None else files.enter_context(open_atomic(urdf, force=force))
+        read = list(read_logs(logs, n=robot.n, kinds=robot.chain.kinds))
+        other = list(read_logs(held_out, n=robot.n, kinds=robot.chain.kinds)) if held_out else []
         # Held-out logs are numbered after the others.
         both = with_known_setup([*read, *other], *known)
         if own_clocks:
@@ -234,11 +245,14 @@ def _diagnosis(
         read, other = both[: len(read)], both[len(read) :]
         result = run(robot, read, held_out=other or None, friction=friction, seed=seed, progress=progress)
         result.save(folder.path("diagnosis.json").parent)
+        if stream is not None:
+            stream.write(urdf_text(result.model, robot).encode())
         following = result.next_experiment
         if following is not None:
             for number, made in enumerate(following.motions, start=1):
                 path = folder.path(f"next_experiment_{number}.csv")
                 motion = at_rate(made, robot.period)
-                write_trajectory(path, motion, {"robot": robot.name, "experiment": following.kind})
+                stated = {"robot": robot.name, "experiment": following.kind}
+                write_trajectory(path, motion, stated, kinds=robot.chain.kinds)
         save_diagnosis_report(result, folder, png=png)
     return result.summary(), result.to_dict()

@@ -60,7 +60,8 @@ def identify(
     seed: SeedOption = 0,
     out: OutOption = Path("identified"),
     urdf: Annotated[
-        Path | None, typer.Option("--urdf", help="Also write a URDF with the identified links.", show_default=False)
+        Path | None,
+        typer.Option("--urdf", help="Also write a URDF with identified bodies and friction.", show_default=False),
     ] = None,
     c_code: Annotated[
         Path | None, typer.Option("--c-code", help="Also write C code for torque and gravity.", show_default=False)
@@ -93,7 +94,11 @@ def identify(
             streams = {path: files.enter_context(open_atomic(path, force=force)) for path in (urdf, c_code) if path}
             described = robot_from(robot, tip, joints, lock)
             logs = with_known_setup(
-                read_logs(log, n=described.n, mapping=mapping, joints=described.joint_names), payload, gravity
+                read_logs(
+                    log, n=described.n, mapping=mapping, joints=described.joint_names, kinds=described.chain.kinds
+                ),
+                payload,
+                gravity,
             )
             options: dict[str, Any] = {
                 "friction": friction,

@@ -67,7 +67,9 @@ def predict(
             page_file = files.enter_context(open_atomic(report, force=force)) if report else None
             identified = load_model(model)
             robot = identified.robot
-            read = read_log(log, n=robot.n, torque=False, mapping=mapping, joints=robot.joint_names)
+            read = read_log(
+                log, n=robot.n, torque=False, mapping=mapping, joints=robot.joint_names, kinds=robot.chain.kinds
+            )
             (recorded,) = with_known_setup([read], payload, gravity)
             progress.start("predicting", None)
             later, clock = clock_shift(identified, recorded)
@@ -108,7 +110,9 @@ def _heat(
 
     file = path / "model.json" if path.is_dir() else path
     thermal = thermal_from_dict(model, codec.loads(file.read_text(encoding="utf-8")))
-    earlier = read_logs(before, n=model.robot.n, mapping=mapping, joints=model.robot.joint_names) if before else []
+    robot = model.robot
+    names, kinds = robot.joint_names, robot.chain.kinds
+    earlier = read_logs(before, n=robot.n, mapping=mapping, joints=names, kinds=kinds) if before else []
     if thermal is None:
         if ambient is not None:
             raise InputError(

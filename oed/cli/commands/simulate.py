@@ -120,7 +120,7 @@ def simulate(
             else:
                 raise InputError("the file does not name its robot", file=trajectory, remedy="give --robot")
             log = run(virtual, motion, seed=seed)
-            write_log(target, log, force=force)
+            write_log(target, log, force=force, kinds=described.chain.kinds)
             data = {"file": str(target), "samples": len(log), "duration": log.duration, "robot": described.name}
             size = f"{len(log)} samples, {log.duration:.1f} s"
     console.result(f"{size} of a virtual {data['robot']} written to {target}", data)

@@ -93,7 +93,12 @@ def thermal(
             described = robot_from(robot, tip, joints, lock)
             if joint is not None and joint > described.n:
                 raise InputError(f"--joint {joint}", allowed=f"1 to {described.n}")
-            logs = _surrounded(read_logs(log, n=described.n, mapping=mapping, joints=described.joint_names), ambient)
+            logs = _surrounded(
+                read_logs(
+                    log, n=described.n, mapping=mapping, joints=described.joint_names, kinds=described.chain.kinds
+                ),
+                ambient,
+            )
             identified = identify(described, logs, friction=friction, seed=seed, progress=progress)
             options: dict[str, Any] = {"alpha": alpha, "seed": seed, "progress": progress}
             result = fit_campaign(described, logs, order=wanted, model=identified.model, **options)

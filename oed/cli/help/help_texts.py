@@ -49,6 +49,8 @@ EXAMPLES = {
     "diagnose": ("oed diagnose --robot er3a --log log.csv --held-out held_out.csv --out diagnosed",),
     "predict": ("oed predict --model model --log other.csv --out predicted.csv",),
     "example": ("oed example --out example",),
+    "robots": ("oed robots",),
+    "robot": ("oed robot show ur10", "oed robot show arm.urdf --tip tool0 --json"),
     "effects": ("oed effects", "oed effects --json"),
     "doctor": ("oed doctor",),
 }

@@ -42,7 +42,7 @@ def read_design(
     file = Path(folder) / DESIGN
     try:
         data = json.loads(existing_file(file).read_text(encoding="utf-8"))
-        known = robot or load_robot(data["robot"]["origin"])
+        known = robot or load_robot(data["robot"]["origin"], unlimited=True)
         settings = data["settings"]
         base = find_base_parameters(design_model(known, settings))
         if settings.get("essential"):

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from dataclasses import fields, replace
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -13,7 +13,7 @@ from estimation.models.extension import Extension
 from estimation.models.model import Model
 from robots import load_robot
 from robots.common.errors import InputError
-from robots.limits import Limits
+from robots.limits import BOUNDS
 from robots.regressor import default_model
 from robots.terms.effects import EFFECTS, situation
 
@@ -91,8 +91,8 @@ def test_the_robot_of_a_file_is_that_of_the_model(base, tmp_path):
     model = replace(base, torque_model=replace(base.torque_model, robot=robot))
     model.save(tmp_path / "model.json")
     loaded = load_model(tmp_path).robot
-    for item in fields(Limits):
-        np.testing.assert_array_equal(getattr(loaded.limits, item.name), getattr(robot.limits, item.name))
+    for name in (*BOUNDS, "kinds"):
+        np.testing.assert_array_equal(getattr(loaded.limits, name), getattr(robot.limits, name))
     for quantity in ("gear_ratio", "rotor_inertia", "torque_constant"):
         np.testing.assert_array_equal(getattr(loaded, quantity), getattr(robot, quantity))
 
