@@ -3,8 +3,8 @@
 Run it with ``python benchmarks/payloads.py [SEEDS [WORKERS [OUT]]]``. The robots are those of `tests/truth`: pinocchio
 models under position control, with 2.5 % coloured torque noise and quantised encoders. Their friction has a Stribeck
 part, which no fitted model has. Each case has 60 s without payload, 60 s of the same path with it (way a: the
-difference of the logs), and 60 s of another path with it (way b: a model of the log without payload). A body is drawn at
-random: its centre lies up to 0.15 m from the flange, and its shape is a box.
+difference of the logs), and 60 s of another path with it (way b: a model of the log without payload). A body is a
+random box; its centre lies up to 0.15 m in front of the flange.
 """
 
 from __future__ import annotations
@@ -157,8 +157,8 @@ def main(words: Sequence[str]) -> None:
 def table(outcomes: Iterable[Outcome]) -> str:
     """Lists median errors, the share within the issue's bounds or intervals, and the coverage."""
     everything = list(outcomes)
-    head = "| robot | way | mass | error of mass, median (worst) | error of centre, median (worst) | half-width: mass, centre "
-    head += "| good | coverage: mass and centre | inertia |"
+    head = "| robot | way | mass | error of mass, median (worst) | error of centre, median (worst) "
+    head += "| half-width: mass, centre | good | coverage: mass and centre | inertia |"
     lines = [head, "|---|---|---|---|---|---|---|---|---|"]
     groups = [(kind, way, mass) for kind in KINDS for way in ("difference", "model") for mass in MASSES]
     for kind, way, mass in [*groups, ("", "difference", 0.0), ("", "model", 0.0), ("", "", 0.0)]:
@@ -185,7 +185,9 @@ def table(outcomes: Iterable[Outcome]) -> str:
         )
     for one in everything:
         if one.problem or one.warnings or (one.way == "difference" and one.method != "difference"):
-            lines.append(f"{one.kind} seed {one.seed}, {one.mass:g} kg, {one.way}: {one.problem or one.warnings or one.method}")
+            lines.append(
+                f"{one.kind} seed {one.seed}, {one.mass:g} kg, {one.way}: {one.problem or one.warnings or one.method}"
+            )
     return "\n".join(lines)
 
 

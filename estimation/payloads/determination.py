@@ -95,7 +95,9 @@ def missing_motion(robot: Robot, q: ArrayLike, gravity: Array | None) -> str:
     ]
     if not steady and not wrist:
         return ""
-    names = " and ".join(f"joint {j + 1} ({robot.joint_names[j]}, moved {np.degrees(ranges[j]):.2g} deg)" for j in wrist)
+    names = " and ".join(
+        f"joint {j + 1} ({robot.joint_names[j]}, moved {np.degrees(ranges[j]):.2g} deg)" for j in wrist
+    )
     move = f"move {names} by 90 deg or more" if wrist else "move the wrist joints farther"
     goal = f", so that gravity turns along {', '.join(steady)} of the flange" if steady else ""
     return f"{move}{goal}; `oed design --robot R --payload-only` designs such a motion"

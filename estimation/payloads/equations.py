@@ -17,6 +17,7 @@ from estimation.regressions.preparation import Rows
 from robots.geometry.inertia import SIZE
 from robots.regressor import TorqueModel
 from robots.signals import Motion
+from robots.terms.situations.flange_body import last_link
 from robots.terms.situations.sensitivities import moved_body
 
 Array = NDArray[np.float64]
@@ -63,7 +64,7 @@ class Arm:
         if not carries:
             Y = model.regressor(*state, columns=self.columns)
             return np.concatenate([Y, np.zeros((*Y.shape[:2], SIZE))], axis=2)
-        Y = model.regressor(*state, columns=(*self.columns, *_last_link(model)))
+        Y = model.regressor(*state, columns=(*self.columns, *last_link(model)))
         Y[:, :, -SIZE:] = Y[:, :, -SIZE:] @ moved_body(model.robot.chain.tip)
         return Y
 
@@ -132,8 +133,3 @@ class PairedEquations(Equations):
 def _turned(own: Array, other: Array) -> Array:
     """Joins differences and sums along the axis of the joints."""
     return np.concatenate([own - other, own + other], axis=1) / np.sqrt(2.0)
-
-
-def _last_link(model: TorqueModel) -> tuple[int, ...]:
-    """Indices of the last link's ten columns."""
-    return tuple(k for k, column in enumerate(model.columns) if column.term == "rigid_body")[-SIZE:]

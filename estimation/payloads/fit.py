@@ -56,7 +56,9 @@ def fit_payload(arm: Arm, equations: Sequence[Equations], *, period: float, seed
         seed: of the noise drawn to correct the standard errors.
     """
     parts = [(some, at) for some in equations for at in some.chunks()]
-    moments = _sum([Moments.of(some.regressor(at.start, at.stop), some.target[at], some.mask[at]) for some, at in parts])
+    moments = _sum(
+        [Moments.of(some.regressor(at.start, at.stop), some.target[at], some.mask[at]) for some, at in parts]
+    )
     known, scatter, target = _prior(arm, moments)
     weights = moments.level(np.zeros(arm.size)) ** -2
     values = np.zeros(arm.size)

@@ -89,7 +89,9 @@ def identify_payload(
     assert known is not None
     bar.update(0.5, "fitting the payload")
     for log in loaded:
-        require_known(known.torque_model, known.columns, known.gravities, log.gravity) if log.gravity is not None else None
+        require_known(
+            known.torque_model, known.columns, known.gravities, log.gravity
+        ) if log.gravity is not None else None
     cutoff = float(known.provenance.get("cutoff_hz", CUTOFF))
     arm = _arm_of_logs(estimate) if estimate is not None and free else _arm_of_model(known)
     carried, bare = _usable(machine, loaded), _usable(machine, free)
@@ -120,9 +122,7 @@ def _prepared(robot: Robot, loaded: Sequence[Log], free: Sequence[Log], model: M
     lowest, highest = np.asarray(model.provenance["recorded"]["position"], dtype=float)
     still = still_joints([log.positions.q for log in prepared], highest - lowest)
     # Friction holds a joint that stands with any torque.
-    return [
-        replace(log, still=own, held=own) if own.any() else log for log, own in zip(prepared, still, strict=True)
-    ]
+    return [replace(log, still=own, held=own) if own.any() else log for log, own in zip(prepared, still, strict=True)]
 
 
 def _arm_of_logs(estimate: Estimate) -> Arm:
@@ -165,9 +165,7 @@ def _extra(model: Model, rows: Rows) -> Array | None:
     return whole - model.torque(motion.q, motion.dq, motion.ddq, gravity=rows.gravity)
 
 
-def _equations(
-    arm: Arm, sources: Sequence[Source], loaded: int
-) -> tuple[list[Equations], PathMatch | None]:
+def _equations(arm: Arm, sources: Sequence[Source], loaded: int) -> tuple[list[Equations], PathMatch | None]:
     if len(sources) != 2 or loaded != 1:
         return [Equations(arm, source) for source in sources], None
     own, other = (source.rows.motion for source in sources)
@@ -233,8 +231,9 @@ def _warnings(body: PhysicalBody, ratio: float, match: PathMatch | None) -> list
     if match is not None and not match.same:
         joint = int(np.argmax(match.distance))
         found.append(
-            f"The logs follow different paths (up to {match.largest[joint]:.2g} rad or m apart, joint {joint + 1}): they "
-            "were fitted jointly. What the model of the arm misses does not cancel; repeat one path for a better result."
+            f"The logs follow different paths (up to {match.largest[joint]:.2g} rad or m apart, joint {joint + 1}), and "
+            "were fitted jointly. What the model of the arm misses does not cancel then. Repeat one path for a better "
+            "result."
         )
     if body.contradicted:
         found.append(

@@ -49,9 +49,9 @@ def quantities(values: Array, covariance: Array, body: Array) -> tuple[Quantity,
     """Gives mass, centre of mass, and inertia about the centre of mass with their intervals.
 
     The intervals are those of least squares without constraints, which hold the truth as often as stated. The part
-    that no body can have is cut off, which costs no coverage; an interval about a negative moment of inertia is moved
-    to zero first, and one that excludes the consistent value is extended to it. The interval of the centre is Fieller's,
-    so that a mass near zero makes it infinite.
+    that no body can have is cut off, which costs no coverage. An interval about a negative moment of inertia is moved
+    to zero first, and one that excludes the consistent value is extended to it. The interval of the centre is
+    Fieller's, so that a mass near zero makes it infinite.
 
     Args:
         values: least squares (10,).

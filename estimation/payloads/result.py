@@ -120,7 +120,9 @@ class PayloadEstimate:
             title = TITLES.get(item.name, f"{item.name} about the centre of mass")
             value = f"{item.value:.4g} ({item.lower:.4g} to {item.upper:.4g}) {item.unit}"
             lines.append(f"  {title:28} {value}{mark}")
-        lines.append("  joint                 torque RMS   without payload   with payload   (errors in % of torque RMS)")
+        lines.append(
+            "  joint                 torque RMS   without payload   with payload   (errors in % of torque RMS)"
+        )
         for joint in self.joints:
             shares = [100 * value / joint.torque_rms if joint.torque_rms else np.nan for value in _errors(joint)]
             lines.append(

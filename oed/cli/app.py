@@ -13,6 +13,7 @@ from oed.cli.commands.diagnose import diagnose
 from oed.cli.commands.export import export
 from oed.cli.commands.identify import identify
 from oed.cli.commands.pareto import pareto
+from oed.cli.commands.payload import payload
 from oed.cli.commands.predict import predict
 from oed.cli.commands.retime import retime
 from oed.cli.commands.simulate import simulate
@@ -26,7 +27,7 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
     rich_markup_mode=None,
 )
-for command in (design, pareto, retime, export, campaign, simulate, identify, thermal, diagnose, predict):
+for command in (design, pareto, retime, export, campaign, simulate, identify, thermal, diagnose, predict, payload):
     app.command(cls=Command)(command)
 
 

@@ -49,9 +49,7 @@ def zyx_angles(rotation: Array) -> Array:
     b = np.arctan2(-rotation[2, 0], level)
     if level < 1e-9:  # A and C turn about one axis: all of it goes to A
         return np.array([np.arctan2(-rotation[0, 1], rotation[1, 1]), b, 0.0])
-    return np.array(
-        [np.arctan2(rotation[1, 0], rotation[0, 0]), b, np.arctan2(rotation[2, 1], rotation[2, 2])]
-    )
+    return np.array([np.arctan2(rotation[1, 0], rotation[0, 0]), b, np.arctan2(rotation[2, 1], rotation[2, 2])])
 
 
 def _fields(names: str, values: Array) -> str:

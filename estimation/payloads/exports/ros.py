@@ -31,4 +31,3 @@ class RosParameters(PayloadExport):
         for name in ("xx", "yy", "zz", "xy", "xz", "yz"):
             lines.append(f"      i{name}: {number(I['xyz'.index(name[0]), 'xyz'.index(name[1])])}")
         return "\n".join([*lines, ""])
-

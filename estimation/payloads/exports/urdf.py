@@ -30,9 +30,7 @@ class UrdfLink(PayloadExport):
         xyz = " ".join(f"{value:.12g}" for value in body.centre)
         ElementTree.SubElement(inertial, "origin", xyz=xyz, rpy="0 0 0")
         ElementTree.SubElement(inertial, "mass", value=f"{body.mass:.12g}")
-        values = {
-            f"i{'xyz'[i]}{'xyz'[j]}": f"{body.inertia[i, j]:.12g}" for i in range(3) for j in range(i, 3)
-        }
+        values = {f"i{'xyz'[i]}{'xyz'[j]}": f"{body.inertia[i, j]:.12g}" for i in range(3) for j in range(i, 3)}
         ElementTree.SubElement(inertial, "inertia", values)
         joint = ElementTree.SubElement(root, "joint", name="payload_joint", type="fixed")
         ElementTree.SubElement(joint, "parent", link="flange")

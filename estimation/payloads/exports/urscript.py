@@ -29,7 +29,7 @@ class UrScript(PayloadExport):
         mass = number(body.mass)
         return (
             f"# {title}\n"
-            "# Mass [kg], centre of gravity [m] in the tool flange frame, inertia about it [kg m2]: xx yy zz xy xz yz.\n"
+            "# Mass [kg]; centre of gravity [m] in the flange frame; inertia about it [kg m2]: xx yy zz xy xz yz.\n"
             f"# Older controllers: set_payload({mass}, [{cog}])\n"
             f"set_target_payload({mass}, [{cog}], [{inertia}])\n"
         )
