@@ -14,7 +14,7 @@ from robots.regressor import TorqueModel
 from robots.robot import Robot
 from robots.signals import Log, Motion
 from robots.terms import RigidBody
-from robots.terms.situations.flange_body import carrying
+from robots.terms.situations.flange_body import carrying, require_flange
 from robots.terms.situations.sensitivities import moved_body
 
 Array = NDArray[np.float64]
@@ -45,6 +45,7 @@ def load_of(robot: Robot, log: Log) -> Load | None:
     """Gives a log's payload; None without."""
     if log.payload is None or not log.payload.any():
         return None
+    require_flange(robot)
     return Load(_rigid_body(robot.under(log.gravity)), moved_body(robot.chain.tip) @ log.payload)
 
 

@@ -28,6 +28,7 @@ from robots.common.parallel import one_blas_thread
 from robots.common.progress import SILENT, Progress
 from robots.robot import Robot
 from robots.signals import Log
+from robots.terms.situations.flange_body import require_flange
 
 Array = NDArray[np.float64]
 
@@ -87,6 +88,7 @@ def identify_payload(
         estimate = identify(machine, free, seed=seed, progress=progress)
         known = estimate.model
     assert known is not None
+    require_flange(known.robot)
     bar.update(0.5, "fitting the payload")
     for log in loaded:
         require_known(
@@ -189,7 +191,7 @@ def _result(
     rms = np.sqrt(np.concatenate([rows.tau**2 for rows in mine]).mean(axis=0))
     # Of paired logs the first n channels are the differences.
     residual, without = found.residual[: robot.n], found.without[: robot.n]
-    ratio = float(np.median(residual / np.maximum(np.asarray(model.provenance["residual_rms"]), np.finfo(float).tiny)))
+    ratio = _error_ratio(model, rms, residual)
     if ratio > FOREIGN:
         raise NotIdentifiableError(
             f"no payload explains the torque: the errors are {ratio:.2g} times those without payload",
@@ -226,14 +228,30 @@ def _result(
     )
 
 
+def _error_ratio(model: Model, rms: Array, residual: Array) -> float:
+    """How many times the torque errors without payload the errors with it are, for the median joint.
+
+    Noise may grow with the torque: absolute and relative errors are compared, and the smaller ratio counts.
+
+    Args:
+        model: of the robot without payload.
+        rms: torque RMS of the log with the payload (n,).
+        residual: its torque errors (n,).
+    """
+    tiny = np.finfo(float).tiny
+    free = np.maximum(np.asarray(model.provenance["residual_rms"], dtype=float), tiny)
+    torque = np.maximum(np.asarray(model.provenance["torque_rms"], dtype=float), tiny)
+    return float(np.median(np.minimum(residual / free, residual / np.maximum(rms, tiny) / (free / torque))))
+
+
 def _warnings(body: PhysicalBody, ratio: float, match: PathMatch | None) -> list[str]:
     found = []
     if match is not None and not match.same:
         joint = int(np.argmax(match.distance))
         found.append(
-            f"The logs follow different paths (up to {match.largest[joint]:.2g} rad or m apart, joint {joint + 1}), and "
-            "were fitted jointly. What the model of the arm misses does not cancel then. Repeat one path for a better "
-            "result."
+            f"The logs follow different paths (up to {match.largest[joint]:.2g} rad or m apart, joint {joint + 1}) "
+            "and were fitted jointly. What the model of the arm misses does not cancel then. Repeat one path for a "
+            "better result."
         )
     if body.contradicted:
         found.append(

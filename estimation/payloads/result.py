@@ -99,7 +99,7 @@ class PayloadEstimate:
     @cached_property
     def quantities(self) -> tuple[Quantity, ...]:
         """Mass, centre of mass, and inertia about the centre of mass, in the axes of `frame`."""
-        turn = moved_body(np.linalg.inv(self.frame))
+        turn = moved_body(np.asarray(np.linalg.inv(self.frame), dtype=np.float64))
         return quantities(turn @ self.values, turn @ self.covariance @ turn.T, turn @ self.body.parameters)
 
     @cached_property

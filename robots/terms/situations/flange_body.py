@@ -15,6 +15,9 @@ from robots.terms.situations.sensitivities import moved_body
 
 Array = NDArray[np.float64]
 
+FLANGE = "chain.tip"
+"""In `Robot.assumed` where the pose of the flange on the last link is not known."""
+
 
 def with_body(model: TorqueModel, parameters: Array, body: Array) -> Array:
     """Adds a body at the flange to a model's standard parameters.
@@ -28,10 +31,11 @@ def with_body(model: TorqueModel, parameters: Array, body: Array) -> Array:
         The parameters with the body (p,).
 
     Raises:
-        InputError: a body of another shape, or a model without links.
+        InputError: a body of another shape, a model without links, or a robot whose flange is not known.
     """
     result = np.array(parameters)
     if body.any():
+        require_flange(model.robot)
         last = last_link(model)
         if body.shape != (10,) or not last:
             raise InputError(f"a body of shape {body.shape}", allowed="(10,), on a model with rigid links")
@@ -50,11 +54,28 @@ def carrying(robot: Robot, body: ArrayLike | None) -> Robot:
     Args:
         robot: the robot; without known inertias it stays as it is.
         body: ten inertial parameters in the flange's frame (10,); None for none.
+
+    Raises:
+        InputError: a robot whose flange is not known.
     """
     values = None if body is None else np.asarray(body, dtype=float)
     if values is None or not values.any():
         return robot
+    require_flange(robot)
     return _carrying(robot, tuple(values.tolist()))
+
+
+def require_flange(robot: Robot) -> None:
+    """Refuses a robot whose flange is not known, such as that of an older model file.
+
+    Raises:
+        InputError: naming the robot.
+    """
+    if FLANGE in robot.assumed:
+        raise InputError(
+            f"the model file of {robot.name} does not state the pose of the flange, which a payload refers to",
+            remedy="it was written by another version: identify the model again",
+        )
 
 
 @lru_cache(maxsize=16)
