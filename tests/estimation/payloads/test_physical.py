@@ -26,7 +26,7 @@ def test_well_determined_parameters_stay_where_the_data_have_them() -> None:
 
 @pytest.mark.parametrize("seed", range(4))
 def test_the_nearest_body_is_that_of_another_solver(seed: int) -> None:
-    """cvxpy with SCS or Clarabel minimises the same distance over the same cone to a per cent."""
+    """Another formulation, through cvxpy, minimises the same distance over the same cone to a per cent."""
     values = np.random.default_rng(seed).multivariate_normal(TRUTH, np.diag((2 * SPREAD) ** 2))
     found = physical_body(values, np.diag(SPREAD**2))
     x = cvxpy.Variable(10)

@@ -46,7 +46,8 @@ def franka(text: str) -> tuple[float, np.ndarray, np.ndarray]:
 def kuka(text: str) -> tuple[float, np.ndarray, np.ndarray]:
     """Millimetres, degrees, and moments about principal axes: A about Z, B about the new Y, C about the new X."""
     line = next(line for line in text.splitlines() if not line.startswith(";"))
-    shape = r"LOAD_DATA\[1\]=\{M (\S+),CM \{X (\S+),Y (\S+),Z (\S+),A (\S+),B (\S+),C (\S+)\},J \{X (\S+),Y (\S+),Z (\S+)\}\}"
+    place = r"X (\S+),Y (\S+),Z (\S+)"
+    shape = rf"LOAD_DATA\[1\]=\{{M (\S+),CM \{{{place},A (\S+),B (\S+),C (\S+)\}},J \{{{place}\}}\}}"
     found = re.fullmatch(shape, line)
     assert found
     m, x, y, z, a, b, c, jx, jy, jz = map(float, found.groups())
