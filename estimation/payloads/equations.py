@@ -34,7 +34,7 @@ class Arm:
         model: the torque model.
         columns: indices (b,) of its columns that carry a parameter.
         values: the parameters b0 (b,).
-        precision: of what is known of them besides the logs (b, b), see `weight`.
+        precision: of what is known of them without the logs (b, b), see `weight`.
         target: what that knowledge says of d (b,).
         weight: by which the knowledge counts against rows whose noise is correlated: rows count as if they were
             independent, and carry that many times less information.

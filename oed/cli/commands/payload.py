@@ -100,7 +100,7 @@ def payload(
 
         if not without and model is None:
             raise InputError(
-                "a log with a payload alone does not tell the payload from the arm",
+                "a log with a payload alone does not separate the payload from the arm",
                 allowed="--without LOG, of the same path without the payload, or --model MODEL.JSON",
             )
         if without and model is not None:

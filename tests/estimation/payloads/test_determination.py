@@ -1,4 +1,4 @@
-"""What a log cannot tell of a payload, and which motion would."""
+"""What a log does not determine of a payload, and which motion would."""
 
 from __future__ import annotations
 
