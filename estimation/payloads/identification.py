@@ -37,6 +37,8 @@ CUTOFF = 5.0
 FRICTION_DRIFT = 0.3
 # Torque errors this many times those of the log without payload are in doubt; this many times, they are no payload's.
 DOUBTFUL, FOREIGN = 2.0, 6.0
+# Stands for a mass [kg] that came out as zero.
+SMALLEST_MASS = 1e-6
 
 
 @one_blas_thread()
@@ -89,11 +91,10 @@ def identify_payload(
         known = estimate.model
     assert known is not None
     require_flange(known.robot)
-    bar.update(0.5, "fitting the payload")
+    bar.start("fitting the payload", None)
     for log in loaded:
-        require_known(
-            known.torque_model, known.columns, known.gravities, log.gravity
-        ) if log.gravity is not None else None
+        if log.gravity is not None:
+            require_known(known.torque_model, known.columns, known.gravities, log.gravity)
     cutoff = float(known.provenance.get("cutoff_hz", CUTOFF))
     arm = _arm_of_logs(estimate) if estimate is not None and free else _arm_of_model(known)
     carried, bare = _usable(machine, loaded), _usable(machine, free)
@@ -105,6 +106,7 @@ def identify_payload(
     equations, match = _equations(arm, sources, len(carried))
     period = float(np.median([log.positions.period for log in prepared]))
     found = fit_payload(arm, equations, period=period, seed=seed)
+    bar.finish()
     return _result(machine, known, sources, found, match, loaded, free)
 
 
@@ -197,11 +199,7 @@ def _result(
             f"no payload explains the torque: the errors are {ratio:.2g} times those without payload",
             remedy="check that the logs are of one robot, and that nothing touches the payload",
         )
-    bad = found.values if found.values[0] > 0 else np.concatenate([[max(-found.values[0], 1e-6)], found.values[1:]])
-    if found.values[0] <= 0:
-        body = PhysicalBody(parameters=bad, nearest=bad, distance=0.0)
-    else:
-        body = physical_body(found.values, found.covariance)
+    body = _body(found)
     require_determined(quantities(found.values, found.covariance, body.parameters), robot, q, gravity)
     method = "model" if not free else "difference" if match is not None and match.same else "joint fit"
     return PayloadEstimate(
@@ -226,6 +224,14 @@ def _result(
             "shift": None if match is None else match.shift,
         },
     )
+
+
+def _body(found: PayloadFit) -> PhysicalBody:
+    """The body of a fit; without a positive mass there is none, and the smallest mass takes its place in messages."""
+    if found.values[0] > 0:
+        return physical_body(found.values, found.covariance)
+    values = np.concatenate([[max(-found.values[0], SMALLEST_MASS)], found.values[1:]])
+    return PhysicalBody(parameters=values, nearest=values, distance=0.0)
 
 
 def _error_ratio(model: Model, rms: Array, residual: Array) -> float:
