@@ -112,7 +112,7 @@ def _payload(values: str) -> NDArray[np.float64]:
     from estimation.payloads.body import read_body
     from robots.terms.situations.flange_body import point_mass
 
-    if values.endswith(".json") or Path(values).is_dir() or Path(values).is_file():
+    if values.endswith(".json") or (values and Path(values).exists()):
         return read_body(values).parameters
     mass, x, y, z = map(float, values.split(","))
     return point_mass(mass, (x, y, z))

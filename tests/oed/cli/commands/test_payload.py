@@ -22,6 +22,7 @@ def payload_file(tmp_path: Path) -> Path:
     return file
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("options", "words"),
     [
@@ -97,6 +98,7 @@ def test_two_logs_give_a_payload_a_report_and_controller_files(run, tmp_path: Pa
     assert "--force" in again.err
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("text", ["1.5,0.02,-0.01,0.08", "1=1.5,0.02,-0.01,0.08"])
 def test_predict_takes_a_payload_without_the_logs_number(run, experiment: Path, tmp_path: Path, text: str) -> None:
     """One log needs no number, and the torque differs from that without the payload."""
@@ -107,6 +109,7 @@ def test_predict_takes_a_payload_without_the_logs_number(run, experiment: Path, 
     assert first.read_text() != second.read_text()
 
 
+@pytest.mark.slow
 def test_predict_reads_a_payload_file(run, experiment: Path, payload_file: Path, tmp_path: Path) -> None:
     """A payload.json counts with its inertia."""
     first, second = tmp_path / "one.csv", tmp_path / "two.csv"
@@ -117,6 +120,7 @@ def test_predict_reads_a_payload_file(run, experiment: Path, payload_file: Path,
     assert first.read_text() != second.read_text()
 
 
+@pytest.mark.slow
 def test_simulate_adds_the_payloads_torque(run, robot: Path, experiment: Path, tmp_path: Path) -> None:
     """The second joint of the small robot carries 2 kg, 0.3 m out: gravity's moment is that of the closed form."""
     from estimation import read_log
@@ -139,6 +143,7 @@ def test_simulate_adds_the_payloads_torque(run, robot: Path, experiment: Path, t
     assert np.mean(logs[1].tau[rest, 1] - logs[0].tau[rest, 1]) == pytest.approx(-np.mean(moment[rest]), abs=noise)
 
 
+@pytest.mark.slow
 def test_a_body_that_cannot_exist_is_refused(run, robot: Path, experiment: Path, tmp_path: Path) -> None:
     """A negative mass, by `simulate` and by `design`."""
     for command in (
