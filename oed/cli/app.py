@@ -16,6 +16,7 @@ from oed.cli.commands.example import example
 from oed.cli.commands.export import export
 from oed.cli.commands.identify import identify
 from oed.cli.commands.pareto import pareto
+from oed.cli.commands.payload import payload
 from oed.cli.commands.predict import predict
 from oed.cli.commands.retime import retime
 from oed.cli.commands.robot import robot, robots
@@ -34,6 +35,7 @@ FUNCTIONS = (
     thermal,
     diagnose,
     predict,
+    payload,
     example,
     robot,
     robots,

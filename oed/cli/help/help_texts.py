@@ -16,7 +16,18 @@ OTHER = "Other commands"
 OPTIONS = {
     "Robot": ("robot", "tip", "joints", "lock", "unlimited", "home"),
     "Input": (
-        *("trajectory", "log", "held_out", "before", "own_clocks", "mapping", "torque_is", "model", "campaign_folder"),
+        *(
+            "trajectory",
+            "log",
+            "without",
+            "held_out",
+            "before",
+            "own_clocks",
+            "mapping",
+            "torque_is",
+            "model",
+            "campaign_folder",
+        ),
         *("payload", "gravity", "ambient", "plant", "after", "task", "design", "extension"),
     ),
     "Output": (
@@ -48,6 +59,10 @@ EXAMPLES = {
     "thermal": ("oed thermal --robot er3a --log logs --order auto --out thermal",),
     "diagnose": ("oed diagnose --robot er3a --log log.csv --held-out held_out.csv --out diagnosed",),
     "predict": ("oed predict --model model --log other.csv --out predicted.csv",),
+    "payload": (
+        "oed payload --robot ur10 --log with.csv --without without.csv --to urscript --out payload",
+        "oed payload --model model --log with.csv --to franka kuka --out payload",
+    ),
     "example": ("oed example --out example",),
     "robots": ("oed robots",),
     "robot": ("oed robot show ur10", "oed robot show arm.urdf --tip tool0 --json"),
