@@ -88,6 +88,7 @@ def read_logs(
     paths: str | PathLike[str] | Sequence[str | PathLike[str]],
     n: int | None = None,
     *,
+    torque: bool = True,
     mapping: LogMapping | str | PathLike[str] | None = None,
     joints: Sequence[str] | None = None,
 ) -> tuple[Log, ...]:
@@ -97,6 +98,7 @@ def read_logs(
         paths: files, each once, or folders: all logs of a folder are one campaign, in the order of its clock. A
             ``mapping.yaml`` in a folder is that of its logs.
         n: the number of joints of the robot; without it the first log decides.
+        torque: see `read_log`.
         mapping: see `read_log`.
         joints: see `read_log`.
 
@@ -117,7 +119,7 @@ def read_logs(
                 "the log is given twice", file=path, remedy="give each log once; otherwise it would count twice"
             )
         seen.add(real)
-        log = read_log(path, n, mapping=mapping, joints=joints)
+        log = read_log(path, n, torque=torque, mapping=mapping, joints=joints)
         if logs and log.n != logs[0].n:
             raise InputError(
                 f"{log.n} joints, but {logs[0].metadata['file']} has {logs[0].n}",

@@ -10,10 +10,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from estimation.gate import GateReport
 from estimation.logs.clocks import clock_shift_between, earlier_logs_on_clock
 from estimation.logs.known_setup import HEAT, require_plain
 from estimation.models.model import Model
 from estimation.predictions.band import band_of_motion, beyond_the_recorded
+from estimation.predictions.checked_motions import checked_motion, joined
 from estimation.preprocessing import LowPass, Smoother, SmoothingSpline, resample, smooth
 from estimation.preprocessing.smoothing import low_pass
 from estimation.regressions.preparation import torque_of
@@ -47,6 +49,7 @@ class Prediction:
             not seen the like. None without a band.
         beyond: what exceeds the recorded motions, in words.
         cutoff: of the model's smoothing [Hz]: above it, no motion is known.
+        gate: the check of the log; None without one.
     """
 
     motion: Motion
@@ -57,6 +60,7 @@ class Prediction:
     extrapolates: NDArray[np.bool_] | None = None
     beyond: tuple[str, ...] = ()
     cutoff: float = np.inf
+    gate: GateReport | None = None
 
     @property
     def error_rms(self) -> Array:
@@ -148,6 +152,7 @@ class Prediction:
             "extrapolates": None if self.extrapolates is None else self.extrapolates.mean(axis=0).tolist(),
             "beyond_the_recorded": list(self.beyond),
             "cutoff_hz": finite(self.cutoff),
+            "gate": None if self.gate is None else self.gate.to_dict(),
             **{name: all_finite(values) for name, values in quantities.items()},
         }
 
@@ -185,8 +190,13 @@ def predict(
     ambient: float | None = None,
     later: float | None = None,
     before: Sequence[Log] = (),
+    check: bool = True,
 ) -> Prediction:
     """Predicts the torques of a log's motion.
+
+    The log passes the gate first, as for `identify`. What the gate says of torques does not concern the prediction: it
+    is refused for the motion only. Angles are unwrapped, outliers of positions are interpolated, and the motion is not
+    interpolated over gaps.
 
     Args:
         model: an identified model.
@@ -199,13 +209,14 @@ def predict(
         later: how much later [s] than its own clock says the log counts; by default what `clock_shift` says.
         before: logs of what the robot did before, for a model whose effects keep heat: without any it begins cold.
             With `later` their times are as they count (`warmed`). Beside `thermal`, `start` says what was before.
+        check: whether the log passes the gate first.
 
     Returns:
-        The torques at the log's own times.
+        The torques at the log's own times; without those of parts that are too short to be smoothed.
 
     Raises:
-        InputError: another number of joints, or too few rows; a gravity that shows parameters which the model lacks; a
-            payload or a gravity beside heat; logs before the motion that come after it, or of a model that keeps none.
+        InputError: another number of joints, too few rows, or a motion that the gate refuses; a gravity that shows
+            parameters which the model lacks; a payload or a gravity beside heat; logs before the motion that come after it, or of a model that keeps none.
     """
     robot = model.robot
     if log.n != robot.n:
@@ -213,7 +224,9 @@ def predict(
             f"{log.n} joints", file=log.metadata.get("file"), allowed=f"{robot.n}, as in the model of {robot.name}"
         )
     cutoff = float(model.provenance.get("cutoff_hz", 10.0))
-    motion = smooth(resample(log.t, log.q), _smoother(model, cutoff))
+    gate, parts = checked_motion(robot, log) if check else (None, [log])
+    log = joined(parts)
+    motion = Motion.concatenate([smooth(resample(part.t, part.q), _smoother(model, cutoff)) for part in parts])
     has_torque = log.tau is not None or log.current is not None
     if thermal is None:
         states = (motion.q, motion.dq, motion.ddq)
@@ -238,6 +251,7 @@ def predict(
         extrapolates=None if band is None else band[1],
         beyond=beyond_the_recorded(model, motion),
         cutoff=cutoff,
+        gate=gate,
     )
 
 

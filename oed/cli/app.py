@@ -8,6 +8,7 @@ import typer
 
 from oed.cli.command import Command
 from oed.cli.commands.campaign import campaign
+from oed.cli.commands.check import check
 from oed.cli.commands.design import design
 from oed.cli.commands.diagnose import diagnose
 from oed.cli.commands.export import export
@@ -26,7 +27,7 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
     rich_markup_mode=None,
 )
-for command in (design, pareto, retime, export, campaign, simulate, identify, thermal, diagnose, predict):
+for command in (design, pareto, retime, export, campaign, simulate, check, identify, thermal, diagnose, predict):
     app.command(cls=Command)(command)
 
 

@@ -83,7 +83,7 @@ def repair_log(robot: Robot, log: Log, which: str) -> RepairedLog:
         for finding in gate.findings
         if _is_reported(finding)
     ]
-    log = gate.on_time(log)
+    log = gate.corrected(log)
     return RepairedLog(_stretches(_filled(log) if len(gate.spikes) else log, gate), tuple(notes))
 
 

@@ -13,6 +13,7 @@ from oed.cli.options import (
     JointsOption,
     JsonOption,
     LockOption,
+    MappingOption,
     OutOption,
     PngOption,
     QuietOption,
@@ -46,6 +47,7 @@ def diagnose(
             show_default=False,
         ),
     ] = None,
+    mapping: MappingOption = None,
     payload: PayloadOption = None,
     gravity: GravityOption = None,
     own_clocks: Annotated[
@@ -101,9 +103,9 @@ def diagnose(
     with console.working() as progress:
         described = robot_from(robot, tip, joints, lock)
         if limits:
-            if log or held_out or payload or gravity or not trajectory:
+            if log or held_out or mapping or payload or gravity or not trajectory:
                 raise typer.BadParameter(
-                    "--limits needs --trajectory; --log, --held-out, --payload and --gravity do not apply",
+                    "--limits needs --trajectory; --log, --held-out, --mapping, --payload and --gravity do not apply",
                     ctx=context,
                 )
             summary, data = _limits(described, trajectory, model, noise, out, force, progress)
@@ -112,7 +114,7 @@ def diagnose(
                 raise typer.BadParameter("give --log, or --limits with --trajectory", ctx=context)
             known = (payload, gravity)
             summary, data = _diagnosis(
-                described, log, held_out or [], known, own_clocks, friction, seed, out, png, force, progress
+                described, log, held_out or [], mapping, known, own_clocks, friction, seed, out, png, force, progress
             )
     console.result(f"{summary}\nwritten to {out.resolve()}", data)
 
@@ -207,6 +209,7 @@ def _diagnosis(
     robot: Robot,
     logs: list[Path],
     held_out: list[Path],
+    mapping: Path | None,
     known: tuple[list[str] | None, list[str] | None],
     own_clocks: bool,
     friction: str,
@@ -225,8 +228,9 @@ def _diagnosis(
     from robots.common.files import ResultFolder
 
     with ResultFolder(out, force, names=["diagnosis.json", "model.json", "report.html"]) as folder:
-        read = list(read_logs(logs, n=robot.n))
-        other = list(read_logs(held_out, n=robot.n)) if held_out else []
+        names = robot.joint_names
+        read = list(read_logs(logs, n=robot.n, mapping=mapping, joints=names))
+        other = list(read_logs(held_out, n=robot.n, mapping=mapping, joints=names)) if held_out else []
         # Held-out logs are numbered after the others.
         both = with_known_setup([*read, *other], *known)
         if own_clocks:

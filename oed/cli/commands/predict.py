@@ -77,7 +77,10 @@ def predict(
             if page_file is not None:
                 page = prediction_page(result, robot.name, robot.chain.kinds)
                 page_file.write(render(page).encode())
-    summary = "\n".join([result.summary(), *(word for word in (heat.assumed, clock) if word), f"written to {out}"])
+    found = [result.gate.summary()] if result.gate is not None and result.gate.findings else []
+    summary = "\n".join(
+        [*found, result.summary(), *(word for word in (heat.assumed, clock) if word), f"written to {out}"]
+    )
     words = {"heat": heat.assumed or None, "clock": clock or None}
     console.result(summary, {"file": str(out), **result.to_dict(), **words})
 

@@ -24,6 +24,7 @@ ORDER = {
         "repeated_rows",
         "stuck_columns",
         "resolution",
+        "wrapped_angles",
         "spikes",
         "reader_notes",
         "clipping",
