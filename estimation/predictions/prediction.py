@@ -216,7 +216,8 @@ def predict(
 
     Raises:
         InputError: another number of joints, too few rows, or a motion that the gate refuses; a gravity that shows
-            parameters which the model lacks; a payload or a gravity beside heat; logs before the motion that come after it, or of a model that keeps none.
+            parameters which the model lacks; a payload or a gravity beside heat; logs before the motion that come after
+            it, or of a model that keeps none.
     """
     robot = model.robot
     if log.n != robot.n:
