@@ -13,11 +13,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from estimation.logs.campaigns import MAPPING, in_order, log_files
+from estimation.logs.clocks import advice_on_times
 from estimation.logs.columns import BY_FIELD, QUANTITIES, Quantity, column_name, parse_name, refuse_text, unit_factors
 from estimation.logs.formats import is_bag_folder, read_foreign
 from estimation.logs.mapped_tables import count_joints, map_table
 from estimation.logs.mapping import LogMapping, read_mapping
-from estimation.logs.repairs import drop_repeated_rows
+from estimation.logs.repairs import repair_rows
 from robots.common.errors import InputError
 from robots.common.tables.table import Table
 from robots.signals import FloatArray, Log
@@ -60,7 +61,7 @@ def read_log(
     for name in table.names:
         refuse_text(table, name)
     whole = table
-    table, kept, repairs = drop_repeated_rows(table)
+    table, kept, repairs = repair_rows(table)
     if len(table) < 2:
         raise InputError("only one row", file=table.path, row=table.first_row, allowed="2 or more rows")
     factors = unit_factors(table, quantities)
@@ -81,7 +82,7 @@ def read_log(
     try:
         return Log(**signals, name=table.path.stem, metadata=metadata)
     except InputError as error:
-        _raise_for_file(error, whole, kept)
+        _raise_for_file(error, whole, kept, signals)
 
 
 def read_logs(
@@ -270,11 +271,13 @@ def _header_row(table: Table) -> int | None:
     return table.first_row - 1 or None
 
 
-def _raise_for_file(error: InputError, table: Table, kept: NDArray[np.intp]) -> NoReturn:
+def _raise_for_file(
+    error: InputError, table: Table, kept: NDArray[np.intp], signals: Mapping[str, FloatArray]
+) -> NoReturn:
     """Raises an error about an array as one about the file: its column by name, its row by line."""
     quantity = BY_FIELD[error.column or "t"]
     if error.problem.startswith("time"):
-        remedy = "sort the rows by time and keep one of each time"
+        remedy = advice_on_times(signals["t"], signals["q"])
     else:
         remedy = "repair or remove these rows, or leave out all columns of the quantity; an empty cell counts as nan"
     raise InputError(

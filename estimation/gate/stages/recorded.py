@@ -8,6 +8,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from estimation.gate.measurements.clock_steps import ClockSteps, find_clock_steps
 from estimation.gate.measurements.columns import Columns
 from estimation.gate.measurements.hung_columns import Hang, cut_hangs, find_hangs
 from estimation.gate.measurements.late_rows import CorrectedTimes, correct_times
@@ -67,7 +68,12 @@ class Recorded:
     @cached_property
     def timing(self) -> Timing:
         """Its time steps and gaps."""
-        return measure_timing(self.log.t)
+        return measure_timing(self.log.t, self.log.t[self.clock_steps.rows])
+
+    @cached_property
+    def clock_steps(self) -> ClockSteps:
+        """Steps of the clock."""
+        return find_clock_steps(self.log.t, self.columns)
 
     @cached_property
     def columns(self) -> Columns:
