@@ -17,6 +17,20 @@ from robots.signals import Log
 
 # Units are found by several checks; one finding of each kind is enough.
 UNITS = ("unit_of_time", "unit_of_position", "motor_side_position")
+# Causes, those of them that count as warnings, too, and findings of the fits that they explain.
+CAUSES = ("gravity_direction", "static_poses", "swapped_columns", "torque_meaning", "unit_of_position", "wrapped_angle")
+FITTED = ("gravity_direction", "swapped_columns")
+CONSEQUENCES = (
+    "badly_excited",
+    "beyond_limits",
+    "delay",
+    "moved_by_others",
+    "negative_friction",
+    "poorly_explained",
+    "position_sign",
+    "torque_sign",
+    "unit_of_torque",
+)
 
 
 # Values of 1e300 overflow when they are squared. They are reported, and never fitted.
@@ -58,7 +72,7 @@ def _report(context: Context, file: str) -> GateReport:
         samples=len(recorded.log),
         duration=recorded.original.duration,
         period=recorded.timing.period,
-        findings=worst_first(_without_repetitions(context.findings)),
+        findings=worst_first(_without_consequences(_without_repetitions(context.findings))),
         parts=recorded.parts,
         motion_parts=recorded.motion_parts,
         spikes=recorded.spikes,
@@ -84,3 +98,13 @@ def _without_repetitions(findings: Sequence[Finding]) -> list[Finding]:
         known.add(key)
         kept.append(finding)
     return kept
+
+
+def _without_consequences(findings: Sequence[Finding]) -> list[Finding]:
+    """Leaves out what a refused cause explains: its advice would mislead."""
+    sure = (finding.severity == "refuse" or finding.name in FITTED for finding in findings if finding.name in CAUSES)
+    if not any(sure):
+        return list(findings)
+    if any(finding.name == "static_poses" for finding in findings):
+        return [finding for finding in findings if finding.name == "static_poses"]
+    return [finding for finding in findings if finding.name not in CONSEQUENCES]

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 
 # Findings that do not concern a prediction, and findings on torques, which only make its error wrong.
-NOT_OF_MOTION = frozenset({"badly_excited", "hardly_moves", "no_motion", "poorly_explained", "short", "uninformative"})
+NOT_OF_MOTION = frozenset({"badly_excited", "hardly_moves", "no_motion", "poorly_explained", "short", "undetermined"})
 OF_TORQUE = frozenset(
     {
         "constant_torque",
