@@ -13,6 +13,7 @@ from estimation.gate.check import Check
 from estimation.gate.context import Context, Stage
 from estimation.gate.finding import Finding
 from estimation.gate.quick_fits.candidate_fits import STANDARD, CandidateFits, Meaning
+from estimation.gate.quick_fits.described_torques import described_torques, scales
 from robots.robot import Robot
 
 Array = NDArray[np.float64]
@@ -39,7 +40,7 @@ class _Cause:
     """A meaning of the log, and what kind of cause it would be.
 
     Attributes:
-        kind: ``gravity``, ``weightless``, ``order``, ``unit``, or ``sign``, which other checks report.
+        kind: ``gravity``, ``weightless``, ``order``, ``unit``; or ``sign`` and ``size``, which other checks report.
         meaning: of the log.
         joint: counted from 0, for a unit.
     """
@@ -73,13 +74,14 @@ class LikelyCauses(Check):
         causes = _gravities(fits)
         if doubtful:
             bad = np.flatnonzero(context.fitted.unexplained > DOUBTFUL).tolist()
+            causes += _sizes(context)
             causes += [_ordered(fits, before, bad), *_units(context.robot, bad), *_signs(context.robot, bad)]
         found = _best(fits, causes, before)
         if found is None:
             return []
         cause, after = found
         cause, after = _refined(fits, cause, after)
-        if cause.kind == "sign":
+        if cause.kind in ("sign", "size"):
             return []
         return [_finding(context, cause, before - after, float(np.exp(after)))]
 
@@ -158,6 +160,15 @@ def _signs(robot: Robot, joints: list[int]) -> list[_Cause]:
     return causes
 
 
+def _sizes(context: Context) -> list[_Cause]:
+    """Lists torques of the described size, if the description has links and some joints are far from it."""
+    described = np.asarray(context.robot.inertia, dtype=float).ravel()
+    if not np.isfinite(described).all() or not described.any():
+        return []
+    factors = scales(described_torques(context.fitted), context.robot.n)
+    return [_Cause("size", Meaning(tau_factor=factors))] if (factors != 1.0).any() else []
+
+
 def _best(fits: CandidateFits, causes: list[_Cause], before: float) -> tuple[_Cause, float] | None:
     """Gives the cause with the smallest error, if that is clearly smaller than before."""
     few = np.array([fits.cost(cause.meaning, few=True) for cause in causes])
@@ -167,6 +178,12 @@ def _best(fits: CandidateFits, causes: list[_Cause], before: float) -> tuple[_Ca
         least = OTHER_COLUMNS if causes[place].kind in ("order", "unit") else BETTER
         if before - after > least and (found is None or after < found[1]):
             found = causes[place], after
+    weightless = [cause for cause in causes if cause.kind == "weightless"]
+    # Gravity along the axes of a planar arm acts on no joint.
+    if found is not None and found[0].kind == "gravity" and weightless:
+        after = fits.cost(weightless[0].meaning)
+        if after < found[1] + SNAP:
+            found = weightless[0], after
     return found
 
 
