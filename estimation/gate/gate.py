@@ -11,6 +11,7 @@ from estimation.gate.context import Context, Stage
 from estimation.gate.finding import Finding
 from estimation.gate.report import GateReport, worst_first
 from estimation.logs.known_setup import robot_for_log
+from estimation.regressions.torque_meanings import as_joint_torque
 from robots.common.errors import InputError
 from robots.robot import Robot
 from robots.signals import Log
@@ -44,7 +45,8 @@ def check_log(robot: Robot, log: Log) -> GateReport:
 
     Args:
         robot: with n joints; limits, gear ratios and inertias are used if they are known.
-        log: of n joints; without torque and current only the motion is checked.
+        log: of n joints; without torque and current only the motion is checked. Torques of another stated meaning are
+            converted first.
 
     Returns:
         The findings, each with its number, severity, and what to do.
@@ -55,6 +57,7 @@ def check_log(robot: Robot, log: Log) -> GateReport:
     file = str(log.metadata.get("file", log.name))
     if log.n != robot.n:
         raise InputError(f"{log.n} joints", file=file or None, allowed=f"{robot.n}, as {robot.name} has")
+    log = as_joint_torque(robot, log)
     context = Context(robot_for_log(robot, log), log)
     for check in checks_in_order():
         if context.reaches(check.stage):

@@ -19,6 +19,7 @@ from estimation.logs.formats import is_bag_folder, read_foreign
 from estimation.logs.mapped_tables import count_joints, map_table
 from estimation.logs.mapping import LogMapping, read_mapping
 from estimation.logs.repairs import repair_rows
+from estimation.logs.torque_meanings import KEY, parse_meaning
 from robots.common.errors import InputError
 from robots.common.tables.table import Table
 from robots.signals import FloatArray, Log
@@ -79,6 +80,9 @@ def read_log(
             allowed="columns of joint torque [N m] or motor current [A]",
         )
     metadata = _metadata(table) | ({"repairs": repairs} if repairs else {})
+    if known is not None and known.torque_is is not None:
+        parse_meaning(known.torque_is, count)
+        metadata[KEY] = known.torque_is
     try:
         return Log(**signals, name=table.path.stem, metadata=metadata)
     except InputError as error:

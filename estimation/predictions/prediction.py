@@ -19,6 +19,7 @@ from estimation.predictions.checked_motions import checked_motion, joined
 from estimation.preprocessing import LowPass, Smoother, SmoothingSpline, resample, smooth
 from estimation.preprocessing.smoothing import low_pass
 from estimation.regressions.preparation import torque_of
+from estimation.regressions.torque_meanings import as_joint_torque
 from robots.common.errors import InputError
 from robots.common.plain import all_finite, finite
 from robots.common.tables.table_files import write_table
@@ -225,6 +226,8 @@ def predict(
             f"{log.n} joints", file=log.metadata.get("file"), allowed=f"{robot.n}, as in the model of {robot.name}"
         )
     cutoff = float(model.provenance.get("cutoff_hz", 10.0))
+    if log.tau is not None or log.current is not None:
+        log = as_joint_torque(robot, log)
     gate, parts = checked_motion(robot, log) if check else (None, [log])
     log = joined(parts)
     motion = Motion.concatenate([smooth(resample(part.t, part.q), _smoother(model, cutoff)) for part in parts])

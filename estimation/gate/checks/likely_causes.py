@@ -9,11 +9,11 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
+from estimation.gate.candidates.candidate_fits import STANDARD, CandidateFits, Meaning
+from estimation.gate.candidates.described_torques import described_torques, scales
 from estimation.gate.check import Check
 from estimation.gate.context import Context, Stage
 from estimation.gate.finding import Finding
-from estimation.gate.quick_fits.candidate_fits import STANDARD, CandidateFits, Meaning
-from estimation.gate.quick_fits.described_torques import described_torques, scales
 from robots.robot import Robot
 
 Array = NDArray[np.float64]

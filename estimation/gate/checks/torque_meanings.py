@@ -6,11 +6,11 @@ from typing import ClassVar
 
 import numpy as np
 
+from estimation.gate.candidates.described_torques import DescribedTorque, Multiple, described_torques, pooled
 from estimation.gate.check import Check
 from estimation.gate.checks.likely_causes import without_gravity
 from estimation.gate.context import Context, Stage
 from estimation.gate.finding import Finding
-from estimation.gate.quick_fits.described_torques import DescribedTorque, Multiple, described_torques, pooled
 from robots.robot import Robot
 
 # Relative standard deviation by which the torque of one joint may differ from its description: links that are 20 % off.
@@ -180,8 +180,8 @@ def _computed(context: Context, torques: list[DescribedTorque]) -> Finding | Non
     return Finding(
         name="torque_meaning",
         severity="warning",
-        text=f"the torques seem to be targets that a controller computed, not measurements: a rigid body without friction "
-        f"leaves {100 * worst:.2g} % of them unexplained at most",
+        text="the torques seem to be targets that a controller computed, not measurements: a rigid body without "
+        f"friction leaves {100 * worst:.2g} % of them unexplained at most",
         action="log the measured torque or current; ignore this for a simulation without friction and noise",
         value=100 * worst,
         unit="%",

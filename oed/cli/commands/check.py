@@ -18,7 +18,7 @@ from oed.cli.options import (
     TipOption,
     robot_from,
 )
-from oed.cli.set_up import GravityOption, PayloadOption, with_known_setup
+from oed.cli.set_up import GravityOption, PayloadOption, TorqueIsOption, with_known_setup, with_torque_meaning
 
 
 def check(
@@ -27,6 +27,7 @@ def check(
     mapping: MappingOption = None,
     payload: PayloadOption = None,
     gravity: GravityOption = None,
+    torque_is: TorqueIsOption = None,
     tip: TipOption = None,
     joints: JointsOption = None,
     lock: LockOption = None,
@@ -44,7 +45,8 @@ def check(
         described = robot_from(robot, tip, joints, lock)
         progress.start("checking the logs", None)
         read = read_logs(logs, n=described.n, torque=False, mapping=mapping, joints=described.joint_names)
-        reports = [check_log(described, log) for log in with_known_setup(read, payload, gravity)]
+        known = with_torque_meaning(described, with_known_setup(read, payload, gravity), torque_is)
+        reports = [check_log(described, log) for log in known]
     refused = [report for report in reports if report.refused]
     console.result(
         "\n".join(report.summary() for report in reports),

@@ -22,7 +22,7 @@ from oed.cli.options import (
     TipOption,
     robot_from,
 )
-from oed.cli.set_up import GravityOption, PayloadOption, with_known_setup
+from oed.cli.set_up import GravityOption, PayloadOption, TorqueIsOption, with_known_setup, with_torque_meaning
 from robots.common.progress import Progress
 
 if TYPE_CHECKING:
@@ -50,6 +50,7 @@ def diagnose(
     mapping: MappingOption = None,
     payload: PayloadOption = None,
     gravity: GravityOption = None,
+    torque_is: TorqueIsOption = None,
     own_clocks: Annotated[
         bool,
         typer.Option(
@@ -103,9 +104,9 @@ def diagnose(
     with console.working() as progress:
         described = robot_from(robot, tip, joints, lock)
         if limits:
-            if log or held_out or mapping or payload or gravity or not trajectory:
+            if log or held_out or mapping or payload or gravity or torque_is or not trajectory:
                 raise typer.BadParameter(
-                    "--limits needs --trajectory; --log, --held-out, --mapping, --payload and --gravity do not apply",
+                    "--limits needs --trajectory; --log, --held-out, --mapping, --payload, --gravity and --torque-is do not apply",
                     ctx=context,
                 )
             summary, data = _limits(described, trajectory, model, noise, out, force, progress)
@@ -114,7 +115,19 @@ def diagnose(
                 raise typer.BadParameter("give --log, or --limits with --trajectory", ctx=context)
             known = (payload, gravity)
             summary, data = _diagnosis(
-                described, log, held_out or [], mapping, known, own_clocks, friction, seed, out, png, force, progress
+                described,
+                log,
+                held_out or [],
+                mapping,
+                known,
+                torque_is,
+                own_clocks,
+                friction,
+                seed,
+                out,
+                png,
+                force,
+                progress,
             )
     console.result(f"{summary}\nwritten to {out.resolve()}", data)
 
@@ -211,6 +224,7 @@ def _diagnosis(
     held_out: list[Path],
     mapping: Path | None,
     known: tuple[list[str] | None, list[str] | None],
+    torque_is: str | None,
     own_clocks: bool,
     friction: str,
     seed: int,
@@ -232,7 +246,7 @@ def _diagnosis(
         read = list(read_logs(logs, n=robot.n, mapping=mapping, joints=names))
         other = list(read_logs(held_out, n=robot.n, mapping=mapping, joints=names)) if held_out else []
         # Held-out logs are numbered after the others.
-        both = with_known_setup([*read, *other], *known)
+        both = with_torque_meaning(robot, with_known_setup([*read, *other], *known), torque_is)
         if own_clocks:
             both = on_one_clock(both)
         read, other = both[: len(read)], both[len(read) :]

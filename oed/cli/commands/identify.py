@@ -24,7 +24,7 @@ from oed.cli.options import (
     TipOption,
     robot_from,
 )
-from oed.cli.set_up import GravityOption, PayloadOption, with_known_setup
+from oed.cli.set_up import GravityOption, PayloadOption, TorqueIsOption, with_known_setup, with_torque_meaning
 
 
 def identify(
@@ -33,6 +33,7 @@ def identify(
     mapping: MappingOption = None,
     payload: PayloadOption = None,
     gravity: GravityOption = None,
+    torque_is: TorqueIsOption = None,
     method: Annotated[str, typer.Option(help="Estimator, or `all` to compare them.")] = "wls",
     friction: Annotated[
         str,
@@ -86,9 +87,8 @@ def identify(
             # Opened before the work: an existing file ends the command early, and an error leaves no file behind.
             streams = {path: files.enter_context(open_atomic(path, force=force)) for path in (urdf, c_code) if path}
             described = robot_from(robot, tip, joints, lock)
-            logs = with_known_setup(
-                read_logs(log, n=described.n, mapping=mapping, joints=described.joint_names), payload, gravity
-            )
+            read = read_logs(log, n=described.n, mapping=mapping, joints=described.joint_names)
+            logs = with_torque_meaning(described, with_known_setup(read, payload, gravity), torque_is)
             options: dict[str, Any] = {
                 "friction": friction,
                 "position": position,

@@ -11,7 +11,7 @@ import typer
 
 from oed.cli.console import Console
 from oed.cli.options import ForceOption, JsonOption, MappingOption, QuietOption
-from oed.cli.set_up import GravityOption, PayloadOption, with_known_setup
+from oed.cli.set_up import GravityOption, PayloadOption, TorqueIsOption, with_known_setup, with_torque_meaning
 
 if TYPE_CHECKING:
     from estimation.models.model import Model
@@ -24,6 +24,7 @@ def predict(
     mapping: MappingOption = None,
     payload: PayloadOption = None,
     gravity: GravityOption = None,
+    torque_is: TorqueIsOption = None,
     before: Annotated[
         list[Path] | None,
         typer.Option(
@@ -68,7 +69,7 @@ def predict(
             identified = load_model(model)
             robot = identified.robot
             read = read_log(log, n=robot.n, torque=False, mapping=mapping, joints=robot.joint_names)
-            (recorded,) = with_known_setup([read], payload, gravity)
+            (recorded,) = with_torque_meaning(robot, with_known_setup([read], payload, gravity), torque_is)
             progress.start("predicting", None)
             later, clock = clock_shift(identified, recorded)
             heat = _heat(model, identified, recorded, before or [], ambient, mapping, later)
