@@ -18,7 +18,7 @@ from robots.robot import Robot
 Array = NDArray[np.float64]
 
 # Rows and ridge by which most candidates are excluded before CHOICE_ROWS decide.
-FEW_ROWS, RIDGE = 500, 1e-5
+FEW_ROWS, RIDGE = 300, 1e-5
 # First angles [rad] and most steps of the search for the direction of gravity, and its size [m/s2].
 SIMPLEX, EVALUATIONS = ((0.0, 0.0), (0.15, 0.0), (0.0, 0.15)), 60
 STANDARD = 9.81
@@ -49,6 +49,7 @@ class CandidateFits:
     def __init__(self, fitted: Fitted) -> None:
         self.robot: Robot = fitted.robot
         self._rows, self._spread = fitted.rows, fitted.logged_spread
+        self._kept: dict[tuple[object, ...], Rows] = {}
 
     def cost(self, meaning: Meaning, *, few: bool = False) -> float:
         """Gives the mean log of the held-out error over the torque's standard deviation.
@@ -104,19 +105,33 @@ class CandidateFits:
         return direction(found.x)
 
     def _meant(self, meaning: Meaning, most: int) -> Rows:
-        stride = max(1, len(self._rows.q) // most)
+        rows = self._moved(meaning, most)
+        if meaning.tau_from is None and meaning.tau_factor is None:
+            return rows
         excerpts = []
-        for part in self._rows.excerpts:
-            thin = part.thinned(stride)
-            changed = {}
-            for name, source, factor in (
-                ("q", meaning.q_from, meaning.q_factor),
-                ("dq", meaning.q_from, meaning.q_factor),
-                ("ddq", meaning.q_from, meaning.q_factor),
-                ("raw", meaning.tau_from, meaning.tau_factor),
-            ):
-                values = getattr(thin, name)
-                values = values if source is None else values[:, source]
-                changed[name] = values if factor is None else values * factor
-            excerpts.append(replace(thin, **changed))
-        return Rows.of(self.robot, tuple(excerpts), gravity=meaning.gravity)
+        for part in rows.excerpts:
+            assert part.raw is not None
+            raw = part.raw if meaning.tau_from is None else part.raw[:, meaning.tau_from]
+            excerpts.append(replace(part, raw=raw if meaning.tau_factor is None else raw * meaning.tau_factor))
+        # The regressor does not depend on the torques, nor do its products.
+        changed = replace(rows, excerpts=tuple(excerpts))
+        changed.__dict__["_grams"] = rows._grams
+        return changed
+
+    def _moved(self, meaning: Meaning, most: int) -> Rows:
+        """Gives the rows with other positions or another gravity; the last ones are kept."""
+        parts = (meaning.q_from, meaning.q_factor, meaning.gravity)
+        key = (most, *(None if part is None else part.tobytes() for part in parts))
+        if key not in self._kept:
+            stride = max(1, len(self._rows.q) // most)
+            excerpts = []
+            for part in self._rows.excerpts:
+                thin = part.thinned(stride)
+                changed = {}
+                for name in ("q", "dq", "ddq"):
+                    values = getattr(thin, name)
+                    values = values if meaning.q_from is None else values[:, meaning.q_from]
+                    changed[name] = values if meaning.q_factor is None else values * meaning.q_factor
+                excerpts.append(replace(thin, **changed))
+            self._kept = {key: Rows.of(self.robot, tuple(excerpts), gravity=meaning.gravity)}
+        return self._kept[key]

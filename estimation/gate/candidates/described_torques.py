@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from estimation.gate.quick_fits.gravity_rows import gravity_rows
-from estimation.gate.quick_fits.joint_fit import OWN
+from estimation.gate.quick_fits.joint_fit import OWN, JointFit
 from estimation.gate.stages.fitted import Fitted
 
 Array = NDArray[np.float64]
@@ -17,6 +17,10 @@ Array = NDArray[np.float64]
 REMAINS = 0.02
 # A torque has another size if its factor is known to this share, and beyond this one.
 SURE, FAR = 0.2, 2.5
+# Least correlation with the described torque, and its least share of the measured one, above and below the described size.
+SHAPED, LARGE, SMALL = 0.95, 0.5, 0.15
+# Share of the fitted torque's power up to which it may be error of the fit.
+NOISY = 0.3
 
 
 @dataclass(frozen=True)
@@ -41,8 +45,10 @@ class DescribedTorque:
         whole: factor on the whole rigid-body torque.
         inertial: factor on the torque of accelerations and velocities, beside the next.
         gravity: factor on the torque of gravity.
-        shape: correlation of the fitted rigid-body torque with the described one, both without friction and offset.
+        shape: correlation of the fitted rigid-body torque with the described one, both without friction and offset,
+            corrected for the errors of the fit; NaN if these are too large.
         size: standard deviation of the measured torque over that of the described one.
+        share: standard deviation of that multiple, without friction and offset, over that of the measured torque.
         friction: standard deviation of the fitted friction over that of the measured torque.
     """
 
@@ -51,6 +57,7 @@ class DescribedTorque:
     inertial: Multiple
     gravity: Multiple
     shape: float
+    share: float
     size: float
     friction: float
 
@@ -75,14 +82,13 @@ def described_torques(fitted: Fitted) -> list[DescribedTorque]:
         still = rigid - heavy[joint] + rotor * rows.ddq[:, joint]
         own = fit.Y[:, -OWN + 1 :] if rotor else fit.Y[:, -OWN:]
         tau = fit.Y @ fit.values + fit.residual
-        fitted_rigid = fit.Y[:, :-OWN] @ fit.values[:-OWN]
-        fitted_rigid = fitted_rigid + (fit.Y[:, -OWN] * fit.values[-OWN] if rotor else 0.0)
-        both = np.column_stack([still + heavy[joint], still, heavy[joint], tau, fitted_rigid])
+        body = fit.Y[:, : -OWN + 1] if rotor else fit.Y[:, :-OWN]
+        body = body - own @ np.linalg.lstsq(own, body, rcond=None)[0]
+        both = np.column_stack([still + heavy[joint], still, heavy[joint], tau])
         rest = both - own @ np.linalg.lstsq(own, both, rcond=None)[0]
         least = REMAINS * (both[:, 0].std() + 1e-12)
         whole = _multiples(rest[:, :1], rest[:, 3], rows.block, least)[0]
         inertial, gravity = _multiples(rest[:, 1:3], rest[:, 3], rows.block, least)
-        size = float(np.sqrt((rest[:, 0] @ rest[:, 0]) * (rest[:, 4] @ rest[:, 4])))
         friction = fit.Y[:, -OWN + 1 : -1] @ fit.values[-OWN + 1 : -1]
         found.append(
             DescribedTorque(
@@ -90,12 +96,26 @@ def described_torques(fitted: Fitted) -> list[DescribedTorque]:
                 whole=whole,
                 inertial=inertial,
                 gravity=gravity,
-                shape=float(rest[:, 0] @ rest[:, 4]) / size if size > 0 else 0.0,
+                shape=_shape(fit, body, rest[:, 0]),
+                share=float(abs(whole.value) * rest[:, 0].std() / max(float(tau.std()), 1e-300)),
                 size=float(tau.std() / max(float(both[:, 0].std()), 1e-12)),
                 friction=float(friction.std() / max(float(tau.std()), 1e-300)),
             )
         )
     return found
+
+
+def _shape(fit: JointFit, body: Array, described: Array) -> float:
+    """Correlates the fitted torque of some columns (M, k), the first of the fit, with a described one (M,)."""
+    k, rows = body.shape[1], len(body)
+    fitted = body @ fit.values[:k]
+    covariance = (fit.inverse @ (fit.scores.T @ fit.scores) @ fit.inverse)[:k, :k]
+    noise = float(np.sum(covariance * (body.T @ body))) / rows
+    power = float(fitted @ fitted) / rows
+    if not noise < NOISY * power:
+        return np.nan
+    size = np.sqrt((power - noise) * float(described @ described) / rows)
+    return float(fitted @ described) / rows / float(size) if size > 0 else np.nan
 
 
 def pooled(multiples: list[Multiple], own: float) -> Multiple:
@@ -112,12 +132,23 @@ def pooled(multiples: list[Multiple], own: float) -> Multiple:
     return Multiple(float(weights @ [one.value for one in known] / weights.sum()), float(weights.sum() ** -0.5))
 
 
+def tells_size(torque: DescribedTorque) -> bool:
+    """Whether a torque is a known multiple of the described one, and large enough beside friction.
+
+    More than the described torque may also be an effect that looks like it.
+    """
+    value = torque.whole.value
+    if not torque.whole.error < SURE * abs(value) or value <= 0 or torque.shape < SHAPED:
+        return False
+    return torque.share > (LARGE if value > 1 else SMALL)
+
+
 def scales(torques: list[DescribedTorque], n: int) -> Array:
     """Gives the factors (n,) that bring torques to the described size, 1 of joints that are near it or not known."""
     factors = np.ones(n)
     for torque in torques:
         value = torque.whole.value
-        if torque.whole.error < SURE * abs(value) and value > 0 and abs(np.log(value)) > np.log(FAR):
+        if tells_size(torque) and abs(np.log(value)) > np.log(FAR):
             factors[torque.joint] = 1.0 / value
     return factors
 

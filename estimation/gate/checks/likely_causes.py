@@ -113,7 +113,7 @@ def _ordered(fits: CandidateFits, before: float, bad: list[int]) -> _Cause:
     both = [straight, straight[::-1], np.roll(straight, 1), np.roll(straight, -1)]
     starts = [(order, order) for order in both[: 1 if fits.robot.n < 3 else None]]
     best, lowest = (straight, straight), before
-    kinds = (True, True), (False, True), (True, False)
+    kinds = (True, True), (True, False), (False, True)
     for start in starts:
         q, tau = start
         cost = before if start is starts[0] else fits.cost(Meaning(q_from=q, tau_from=tau), few=True)
@@ -127,6 +127,7 @@ def _ordered(fits: CandidateFits, before: float, bad: list[int]) -> _Cause:
                     continue
                 swap = straight.copy()
                 swap[list(pair)] = pair[::-1]
+                # Torques last: the regressor of the same positions is used again.
                 for kind in allowed:
                     order = (q[swap] if kind[0] else q, tau[swap] if kind[1] else tau)
                     tried.append((fits.cost(Meaning(q_from=order[0], tau_from=order[1]), few=True), kind, order))

@@ -6,7 +6,13 @@ from typing import ClassVar
 
 import numpy as np
 
-from estimation.gate.candidates.described_torques import DescribedTorque, Multiple, described_torques, pooled
+from estimation.gate.candidates.described_torques import (
+    DescribedTorque,
+    Multiple,
+    described_torques,
+    pooled,
+    tells_size,
+)
 from estimation.gate.check import Check
 from estimation.gate.checks.likely_causes import without_gravity
 from estimation.gate.context import Context, Stage
@@ -21,9 +27,9 @@ KNOWN, SHARE = 0.2, 0.2
 LIGHT, HEAVY, APART = 0.45, 0.55, 0.45
 # Torques are external if both factors are below this.
 LITTLE = 0.3
-# They are no currents if a joint whose factor is known to this share lacks the described shape (correlation), or if no
-# joint shows friction (share of the torque), which drives always have.
-PRECISE, SHAPED, NO_FRICTION = 0.02, 0.98, 0.06
+# They are no currents if a joint lacks the described shape (correlation), or if no joint shows friction (share of the
+# torque), which drives always have. Joints count whose factor is known to this share of it, or of TENTH if it is less.
+PRECISE, TENTH, SHAPED, NO_FRICTION = 0.04, 0.1, 0.98, 0.105
 # Factor by which the mean of the joints (geometric), or a single joint, differs from the description, to be in another
 # unit. These are some 3.3 and 3.7 standard deviations of descriptions that are 20 % off.
 SCALE, SINGLE = 1.8, 2.5
@@ -94,9 +100,9 @@ def _external(torques: list[DescribedTorque], a: Multiple, b: Multiple) -> Findi
     """Names torques that contain little of the described ones, and not in proportion."""
     if not all(abs(factor.value) < LITTLE for factor in (a, b) if np.isfinite(factor.error)):
         return None
-    precise = [torque for torque in torques if torque.whole.error < PRECISE * abs(torque.whole.value)]
-    shaped = all(torque.shape > SHAPED for torque in precise)
-    if shaped and not all(torque.friction < NO_FRICTION for torque in torques):
+    precise = [t for t in torques if t.whole.error < PRECISE * max(abs(t.whole.value), TENTH)]
+    shaped = all(torque.whole.value > 0 and not torque.shape < SHAPED for torque in precise)
+    if not precise or (shaped and not all(torque.friction < NO_FRICTION for torque in precise)):
         return None
     return Finding(
         name="torque_meaning",
@@ -110,9 +116,10 @@ def _external(torques: list[DescribedTorque], a: Multiple, b: Multiple) -> Findi
 
 def _scaled(robot: Robot, torques: list[DescribedTorque]) -> Finding | None:
     """Names currents, motor torques and other units, by the factors of the joints."""
+    torques = [torque for torque in torques if tells_size(torque)]
     factors = np.array([torque.whole.value for torque in torques])
     joints = np.array([torque.joint for torque in torques])
-    if (factors <= 0).any():
+    if not len(factors):
         return None
     logs = np.log(factors)
     off = np.abs(logs) > np.log(SINGLE)
@@ -200,7 +207,8 @@ def _nominal(context: Context, torques: list[DescribedTorque]) -> list[Finding]:
         Finding(
             name="nominal_error",
             severity="warning",
-            text=f"the described torques of joints {joints} are up to {ratio:.2g} times the measured ones, and the fit is good",
+            text=f"the described torques of joints {joints} are up to {ratio:.2g} times the measured ones, although "
+            "the fit is good",
             action="check the meaning and the unit of the torque columns, and the robot's description",
             value=100 * ratio,
             unit="%",
