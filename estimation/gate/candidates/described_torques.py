@@ -17,7 +17,8 @@ Array = NDArray[np.float64]
 REMAINS = 0.02
 # A torque has another size if its factor is known to this share, and beyond this one.
 SURE, FAR = 0.2, 2.5
-# Least correlation with the described torque, and its least share of the measured one, above and below the described size.
+# Least correlation with the described torque, and its least share of the measured one above and below the described
+# size.
 SHAPED, LARGE, SMALL = 0.95, 0.5, 0.15
 # Share of the fitted torque's power up to which it may be error of the fit.
 NOISY = 0.3

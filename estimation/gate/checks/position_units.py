@@ -66,7 +66,8 @@ def _suspect(robot: Robot, columns: Columns) -> _Suspicion | None:
     """Finds the unit that brings all positions inside the joints' limits."""
     beyond = _beyond(robot, columns)
     moving = columns.travel > 0
-    if (beyond & moving).sum() < AGREE * max(int(moving.sum()), 1):
+    found, whole = int((beyond & moving).sum()), max(int(moving.sum()), 1)
+    if found < AGREE * whole or (whole == 2 and found < whole):
         return None
     revolute = np.array([joint.kind == "revolute" for joint in robot.chain.joints])
     candidates = {

@@ -28,7 +28,8 @@ LIGHT, HEAVY, APART = 0.45, 0.55, 0.45
 # Torques are external if both factors are below this.
 LITTLE = 0.3
 # They are no currents if a joint lacks the described shape (correlation), or if no joint shows friction (share of the
-# torque), which drives always have. Joints count whose factor is known to this share of it, or of TENTH if it is less.
+# torque), which drives always have. Joints count whose factor is known to this share of it, or of TENTH or half
+# of the largest if it is less.
 PRECISE, TENTH, SHAPED, NO_FRICTION = 0.04, 0.1, 0.98, 0.105
 # Factor by which the mean of the joints (geometric), or a single joint, differs from the description, to be in another
 # unit. These are some 3.3 and 3.7 standard deviations of descriptions that are 20 % off.
@@ -100,7 +101,8 @@ def _external(torques: list[DescribedTorque], a: Multiple, b: Multiple) -> Findi
     """Names torques that contain little of the described ones, and not in proportion."""
     if not all(abs(factor.value) < LITTLE for factor in (a, b) if np.isfinite(factor.error)):
         return None
-    precise = [t for t in torques if t.whole.error < PRECISE * max(abs(t.whole.value), TENTH)]
+    least = min(TENTH, 0.5 * max(abs(torque.whole.value) for torque in torques))
+    precise = [t for t in torques if t.whole.error < PRECISE * max(abs(t.whole.value), least)]
     shaped = all(torque.whole.value > 0 and not torque.shape < SHAPED for torque in precise)
     if not precise or (shaped and not all(torque.friction < NO_FRICTION for torque in precise)):
         return None

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from estimation.gate.measurements.columns import Columns
-from estimation.gate.measurements.timing import FEWEST
+from estimation.gate.measurements.timing import FEWEST, GAP_STEPS, GAP_TIME
 
 Array = NDArray[np.float64]
 
@@ -56,6 +56,8 @@ def find_clock_steps(t: Array, columns: Columns) -> ClockSteps:
         return none
     period = float(np.median(steps))
     candidates = np.flatnonzero(np.abs(steps - period) > max(LEAST, SHARE * period))
+    # The log is cut at longer steps in any case.
+    candidates = candidates[steps[candidates] <= max(GAP_STEPS * period, GAP_TIME)]
     candidates = candidates[(candidates >= SIDE - 1) & (candidates < len(t) - SIDE)]
     candidates = candidates[_between_calm(steps, candidates, period)]
     if not len(candidates):

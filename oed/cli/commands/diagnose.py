@@ -106,8 +106,8 @@ def diagnose(
         if limits:
             if log or held_out or mapping or payload or gravity or torque_is or not trajectory:
                 raise typer.BadParameter(
-                    "--limits needs --trajectory; --log, --held-out, --mapping, --payload, --gravity and --torque-is do "
-                    "not apply",
+                    "--limits needs --trajectory; --log, --held-out, --mapping, --payload, --gravity and --torque-is "
+                    "do not apply",
                     ctx=context,
                 )
             summary, data = _limits(described, trajectory, model, noise, out, force, progress)
