@@ -24,8 +24,8 @@ WELL, VERY_WELL = 0.1, 0.04
 # Held-out error of a single joint over its torque's standard deviation, from which columns and units are doubted.
 DOUBTFUL = 0.2
 # Decrease of the error from which an exchange of columns is followed up, and by which an axis may be worse than the
-# refined direction of gravity within this angle [rad].
-FOLLOWED, SNAP, NEAR = 0.01, 0.02, 0.05
+# refined direction of gravity.
+FOLLOWED, SNAP = 0.01, 0.02
 # Decrease of the held-out error (mean log), for a warning and for a refusal, and that by other columns or units.
 # Right simulated logs, with descriptions that are 20 % off, stay below 0.05, and measured ones below 0.35.
 BETTER, CERTAIN, OTHER_COLUMNS = 0.15, 0.4, 0.4
@@ -189,7 +189,7 @@ def _best(fits: CandidateFits, causes: list[_Cause], before: float) -> tuple[_Ca
 
 
 def _refined(fits: CandidateFits, cause: _Cause, after: float) -> tuple[_Cause, float]:
-    """Refines a direction of gravity; one near an axis of the base frame is along it."""
+    """Refines a direction of gravity; one along an axis of the base frame is preferred if it explains as much."""
     if cause.kind != "gravity":
         return cause, after
     assert cause.meaning.gravity is not None
@@ -197,9 +197,11 @@ def _refined(fits: CandidateFits, cause: _Cause, after: float) -> tuple[_Cause, 
     cost = fits.cost(Meaning(gravity=refined))
     if after < cost:
         refined, cost = cause.meaning.gravity, after
-    axis = STANDARD * np.round(refined / STANDARD)
-    if axis.any() and _angle(axis, refined) < NEAR and fits.cost(Meaning(gravity=axis)) < cost + SNAP:
-        refined = axis
+    # What does not act on any joint, as gravity along the axes of a planar arm, is not made up.
+    axes = [sign * STANDARD * axis for axis in np.eye(3) for sign in (1.0, -1.0)]
+    costs = [fits.cost(Meaning(gravity=axis)) for axis in axes]
+    if min(costs) < cost + SNAP:
+        refined = axes[int(np.argmin(costs))]
     return _Cause("gravity", Meaning(gravity=refined)), cost
 
 

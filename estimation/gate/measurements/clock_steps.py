@@ -56,8 +56,8 @@ def find_clock_steps(t: Array, columns: Columns) -> ClockSteps:
         return none
     period = float(np.median(steps))
     candidates = np.flatnonzero(np.abs(steps - period) > max(LEAST, SHARE * period))
-    # The log is cut at longer steps in any case.
-    candidates = candidates[steps[candidates] <= max(GAP_STEPS * period, GAP_TIME)]
+    # The log is cut at longer steps in any case, and the motion during them is not known.
+    candidates = candidates[steps[candidates] <= 2 * max(GAP_STEPS * period, GAP_TIME)]
     candidates = candidates[(candidates >= SIDE - 1) & (candidates < len(t) - SIDE)]
     candidates = candidates[_between_calm(steps, candidates, period)]
     if not len(candidates):

@@ -1,4 +1,4 @@
-"""Specification of causes: base, order of columns and units of single joints are named, and the advice leads to a fit."""
+"""Specification of causes: base, order of columns and single units are named, and the advice leads to a fit."""
 
 from __future__ import annotations
 
@@ -34,11 +34,11 @@ def stands(arm, fourier_motion):
     [(-9.81, 0.0, 0.0), (0.0, 0.0, 9.81), (3.36, 0.0, -9.22)],
     ids=["wall", "ceiling", "tilted by 20 degrees"],
 )
-@pytest.mark.parametrize("seed", [1])
+@pytest.mark.parametrize("seed", [0])
 def test_a_base_mounted_otherwise_is_named_with_its_gravity(arm, stands, gravity, seed):
     """The gravity in the advice is within 3 degrees of the true one, and with it the log fits.
 
-    The arm moves in the x-z plane, in which two joints show the direction well.
+    The arm moves in the x-z plane. What gravity has along y acts on no joint, and is left out.
     """
     log = stands(gravity, seed)
     report = check_log(arm, log)
@@ -69,7 +69,7 @@ def test_exchanged_columns_are_named_in_their_order(er3a, good, kind, order):
     report = check_log(er3a, replace(log, q=q, tau=tau))
     (finding,) = found(report, "swapped_columns")
     assert report.refused
-    lists = {key: columns for key, columns in re.findall(r"(position|torque): \{columns: \[([^\]]+)\]", finding.text)}
+    lists = dict(re.findall(r"(position|torque): \{columns: \[([^\]]+)\]", finding.text))
     places = {key: [int(re.sub(r"\D", "", name)) - 1 for name in names.split(",")] for key, names in lists.items()}
     straight = list(range(6))
     mended_q, mended_tau = q[:, places.get("position", straight)], tau[:, places.get("torque", straight)]
