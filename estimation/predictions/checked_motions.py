@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -12,6 +12,8 @@ from estimation.gate import GateReport, check_log
 from estimation.gate.measurements.columns import Columns
 from estimation.gate.measurements.outliers import find_outliers
 from estimation.gate.measurements.timing import FEWEST
+from estimation.models.model import Model
+from estimation.preprocessing import LowPass, Smoother, SmoothingSpline
 from robots.robot import Robot
 from robots.signals import Log
 
@@ -65,3 +67,10 @@ def joined(parts: Sequence[Log]) -> Log:
         if getattr(first, name) is not None
     }
     return Log(**arrays, payload=first.payload, gravity=first.gravity, name=first.name, metadata=first.metadata)
+
+
+def smoother_of(model: Model, cutoff: float) -> Smoother:
+    """Gives the smoother of the model's data for another motion; a low-pass instead of harmonics."""
+    smoothing = model.provenance.get("smoothing")
+    kind = smoothing.get("kind") if isinstance(smoothing, Mapping) else None
+    return SmoothingSpline(cutoff) if kind == SmoothingSpline.name else LowPass(cutoff)

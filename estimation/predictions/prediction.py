@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -15,8 +15,8 @@ from estimation.logs.clocks import clock_shift_between, earlier_logs_on_clock
 from estimation.logs.known_setup import HEAT, require_plain
 from estimation.models.model import Model
 from estimation.predictions.band import band_of_motion, beyond_the_recorded
-from estimation.predictions.checked_motions import checked_motion, joined
-from estimation.preprocessing import LowPass, Smoother, SmoothingSpline, resample, smooth
+from estimation.predictions.checked_motions import checked_motion, joined, smoother_of
+from estimation.preprocessing import resample, smooth
 from estimation.preprocessing.smoothing import low_pass
 from estimation.regressions.preparation import torque_of
 from estimation.regressions.torque_meanings import as_joint_torque
@@ -195,9 +195,8 @@ def predict(
 ) -> Prediction:
     """Predicts the torques of a log's motion.
 
-    The log passes the gate first, as for `identify`. What the gate says of torques does not concern the prediction: it
-    is refused for the motion only. Angles are unwrapped, outliers of positions are interpolated, and the motion is not
-    interpolated over gaps.
+    The log passes the gate first, and is refused for its motion only. Angles are unwrapped, outliers of positions are
+    interpolated, and gaps are not.
 
     Args:
         model: an identified model.
@@ -213,7 +212,7 @@ def predict(
         check: whether the log passes the gate first.
 
     Returns:
-        The torques at the log's own times; without those of parts that are too short to be smoothed.
+        The torques at the log's own times, without parts that are too short to be smoothed.
 
     Raises:
         InputError: another number of joints, too few rows, or a motion that the gate refuses; a gravity that shows
@@ -226,18 +225,17 @@ def predict(
             f"{log.n} joints", file=log.metadata.get("file"), allowed=f"{robot.n}, as in the model of {robot.name}"
         )
     cutoff = float(model.provenance.get("cutoff_hz", 10.0))
-    if log.tau is not None or log.current is not None:
-        log = as_joint_torque(robot, log)
+    log = as_joint_torque(robot, log) if log.tau is not None or log.current is not None else log
     gate, parts = checked_motion(robot, log) if check else (None, [log])
     log = joined(parts)
-    motion = Motion.concatenate([smooth(resample(part.t, part.q), _smoother(model, cutoff)) for part in parts])
+    motion = Motion.concatenate([smooth(resample(part.t, part.q), smoother_of(model, cutoff)) for part in parts])
     has_torque = log.tau is not None or log.current is not None
     if thermal is None:
         states = (motion.q, motion.dq, motion.ddq)
         if later is None:
             later = clock_shift(model, log)[0]
             before = warmed(model, before, log, later)[0]
-        smoother, clock = _smoother(model, cutoff), motion.t + later
+        smoother, clock = smoother_of(model, cutoff), motion.t + later
         earlier = [smooth(resample(own.t, own.q), smoother) for own in before]
         predicted = model.torque(*states, clock, gravity=log.gravity, payload=log.payload, before=earlier)
     else:
@@ -305,10 +303,3 @@ def warmed(model: Model, before: Sequence[Log], log: Log, later: float) -> tuple
 
 
 COLD = "thermal friction: the robot is assumed cold at the start; give earlier logs with --before if it was warm"
-
-
-def _smoother(model: Model, cutoff: float) -> Smoother:
-    """The smoother of the model's data for another motion; a low-pass instead of harmonics."""
-    smoothing = model.provenance.get("smoothing")
-    kind = smoothing.get("kind") if isinstance(smoothing, Mapping) else None
-    return SmoothingSpline(cutoff) if kind == SmoothingSpline.name else LowPass(cutoff)

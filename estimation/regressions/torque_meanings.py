@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from estimation.logs.known_setup import robot_for_log
-from estimation.logs.torque_meanings import KEY, parse_meaning
+from estimation.logs.torque_source import KEY, parse_meaning
 from estimation.preprocessing import LowPass, resample, smooth
 from robots.common.errors import InputError
 from robots.regressor import TorqueModel

@@ -56,12 +56,12 @@ def with_torque_meaning(robot: Robot, logs: Sequence[Log], torque_is: str | None
     Args:
         robot: of the logs.
         logs: with their payloads and gravity vectors; a log without torque stays as it is.
-        torque_is: see `estimation.logs.torque_meanings.parse_meaning`; None for what the mapping states.
+        torque_is: see `estimation.logs.torque_source.parse_meaning`; None for what the mapping states.
 
     Raises:
         InputError: an unknown meaning, or a description that lacks what is needed.
     """
-    from estimation.logs.torque_meanings import parse_meaning
+    from estimation.logs.torque_source import parse_meaning
     from estimation.regressions.torque_meanings import as_joint_torque
 
     if torque_is is not None:

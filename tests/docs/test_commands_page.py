@@ -15,8 +15,7 @@ PAGE = (Path(__file__).parents[2] / "docs" / "commands.md").read_text(encoding="
 SECTIONS = dict(re.findall(r"^## `oed (\w+)`\n(.*?)(?=^## |\Z)", PAGE, flags=re.MULTILINE | re.DOTALL))
 # What every command has is described once, at the top of the page.
 COMMON = {"--force", "--json", "--quiet", "--help"}
-# These write no file that could be overwritten.
-WRITE_NOTHING = {"check"}
+WRITE_NOTHING = {"check", "doctor", "effects"}
 
 
 def commands() -> dict[str, Any]:
