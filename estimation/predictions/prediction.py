@@ -193,10 +193,7 @@ def predict(
     before: Sequence[Log] = (),
     check: bool = True,
 ) -> Prediction:
-    """Predicts the torques of a log's motion.
-
-    The log passes the gate first, and is refused for its motion only. Angles are unwrapped, outliers of positions are
-    interpolated, and gaps are not.
+    """Predicts the torques of a log's motion, which is checked and repaired first (`checked_motion`).
 
     Args:
         model: an identified model.
@@ -293,13 +290,8 @@ def warmed(model: Model, before: Sequence[Log], log: Log, later: float) -> tuple
     shifts = [clock_shift(model, own)[0] for own in before]
     placed, anew = earlier_logs_on_clock(before, log, float(log.t[0]) + later, shifts)
     count = "one log" if len(before) == 1 else f"{len(before)} logs"
-    return (
-        placed,
-        (
-            f"thermal friction: initial temperatures from {count} before; the first is assumed to start "
-            f"cold{f'; {anew}' if anew else ''}"
-        ),
-    )
+    assumed = f"thermal friction: initial temperatures from {count} before; the first is assumed to start cold"
+    return placed, f"{assumed}; {anew}" if anew else assumed
 
 
 COLD = "thermal friction: the robot is assumed cold at the start; give earlier logs with --before if it was warm"
