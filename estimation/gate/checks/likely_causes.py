@@ -65,9 +65,8 @@ class LikelyCauses(Check):
         """Reports at most one cause."""
         before = context.smoothed.choice.cost
         doubtful = before > np.log(WELL) or float(np.nanmax(context.fitted.unexplained, initial=0.0)) > DOUBTFUL
-        if (before < np.log(VERY_WELL) and not doubtful) or context.found(
-            ("unit_of_position", "unit_of_time", "motor_side_position")
-        ):
+        explained = any(finding.severity != "info" for finding in context.found(EXPLAINED))
+        if explained or (before < np.log(VERY_WELL) and not doubtful):
             return []
         fits = CandidateFits(context.fitted)
         before = fits.cost(Meaning())

@@ -68,7 +68,8 @@ class TorqueMeanings(Check):
     def run(self, context: Context) -> list[Finding]:
         """Reports one meaning at most, or large nominal errors without one."""
         described = np.asarray(context.robot.inertia, dtype=float).ravel()
-        if not np.isfinite(described).all() or not described.any() or context.found(EXPLAINED):
+        explained = any(finding.severity != "info" for finding in context.found(EXPLAINED))
+        if not np.isfinite(described).all() or not described.any() or explained:
             return []
         if context.cleaned.columns.prefix != "tau":
             return []
