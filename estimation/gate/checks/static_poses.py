@@ -16,6 +16,8 @@ Array = NDArray[np.float64]
 
 # A row is in another pose than the one before if a joint has moved by this share of its travel in between.
 OTHER = 0.01
+# Median way between poses over the travel, at least: the steps of a coarse encoder are smaller.
+FAR = 0.08
 # Share of the way between poses up to which the arm may move in them, fewest poses, and fewest rows a pose; fewer are
 # poses of one row each if neighbouring steps differ by more than they are large.
 STILL, POSES, ROWS, ROUGH = 0.05, 5, 4, 1.0
@@ -62,7 +64,7 @@ def count_poses(q: Array, t: Array) -> int:
     steps = np.abs(np.diff(q, axis=0)).max(axis=1)
     edges = np.concatenate([[0], np.flatnonzero(steps > OTHER) + 1, [len(q)]])
     poses = len(edges) - 1
-    if poses < POSES:
+    if poses < POSES or float(np.median(steps[edges[1:-1] - 1])) < FAR:
         return 0
     if len(q) < ROWS * poses:
         rough = np.abs(np.diff(q, n=2, axis=0)).sum() > ROUGH * np.abs(np.diff(q, axis=0)).sum()
