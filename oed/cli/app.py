@@ -8,6 +8,7 @@ import typer
 
 from oed.cli.command import HELP
 from oed.cli.commands.campaign import campaign
+from oed.cli.commands.check import check
 from oed.cli.commands.design import design
 from oed.cli.commands.diagnose import diagnose
 from oed.cli.commands.doctor import doctor
@@ -31,6 +32,7 @@ FUNCTIONS = (
     export,
     campaign,
     simulate,
+    check,
     identify,
     thermal,
     diagnose,

@@ -14,6 +14,7 @@ from oed.cli.options import (
     JointsOption,
     JsonOption,
     LockOption,
+    MappingOption,
     OutOption,
     PngOption,
     QuietOption,
@@ -22,7 +23,7 @@ from oed.cli.options import (
     TipOption,
     robot_from,
 )
-from oed.cli.set_up import GravityOption, PayloadOption, with_known_setup
+from oed.cli.set_up import GravityOption, PayloadOption, TorqueIsOption, with_known_setup, with_torque_meaning
 from robots.common.progress import Progress
 
 if TYPE_CHECKING:
@@ -47,8 +48,10 @@ def diagnose(
             show_default=False,
         ),
     ] = None,
+    mapping: MappingOption = None,
     payload: PayloadOption = None,
     gravity: GravityOption = None,
+    torque_is: TorqueIsOption = None,
     own_clocks: Annotated[
         bool,
         typer.Option(
@@ -108,9 +111,10 @@ def diagnose(
     with console.working() as progress:
         described = robot_from(robot, tip, joints, lock)
         if limits:
-            if log or held_out or payload or gravity or urdf or not trajectory:
+            if log or held_out or mapping or payload or gravity or torque_is or urdf or not trajectory:
                 raise typer.BadParameter(
-                    "--limits needs --trajectory; --log, --held-out, --payload, --gravity and --urdf do not apply",
+                    "--limits needs --trajectory; --log, --held-out, --mapping, --payload, --gravity, --torque-is and "
+                    "--urdf do not apply",
                     ctx=context,
                 )
             summary, data = _limits(described, trajectory, model, noise, out, force, progress)
@@ -119,7 +123,20 @@ def diagnose(
                 raise typer.BadParameter("give --log, or --limits with --trajectory", ctx=context)
             known = (payload, gravity)
             summary, data = _diagnosis(
-                described, log, held_out or [], known, own_clocks, friction, seed, out, urdf, png, force, progress
+                described,
+                log,
+                held_out or [],
+                mapping,
+                known,
+                torque_is,
+                own_clocks,
+                friction,
+                seed,
+                out,
+                urdf,
+                png,
+                force,
+                progress,
             )
     console.result(f"{summary}\nwritten to {out.resolve()}", data)
 
@@ -214,7 +231,9 @@ def _diagnosis(
     robot: Robot,
     logs: list[Path],
     held_out: list[Path],
+    mapping: Path | None,
     known: tuple[list[str] | None, list[str] | None],
+    torque_is: str | None,
     own_clocks: bool,
     friction: str,
     seed: int,
@@ -236,10 +255,11 @@ def _diagnosis(
     with ExitStack() as files:
         folder = files.enter_context(ResultFolder(out, force, names=["diagnosis.json", "model.json", "report.html"]))
         stream = None if urdf is None else files.enter_context(open_atomic(urdf, force=force))
-        read = list(read_logs(logs, n=robot.n, kinds=robot.chain.kinds))
-        other = list(read_logs(held_out, n=robot.n, kinds=robot.chain.kinds)) if held_out else []
+        given = {"n": robot.n, "mapping": mapping, "joints": robot.joint_names, "kinds": robot.chain.kinds}
+        read = list(read_logs(logs, **given))
+        other = list(read_logs(held_out, **given)) if held_out else []
         # Held-out logs are numbered after the others.
-        both = with_known_setup([*read, *other], *known)
+        both = with_torque_meaning(robot, with_known_setup([*read, *other], *known), torque_is)
         if own_clocks:
             both = on_one_clock(both)
         read, other = both[: len(read)], both[len(read) :]

@@ -52,6 +52,10 @@ EXAMPLES = {
         "oed simulate --trajectory experiment/trajectory.csv --out log.csv",
         "oed simulate --trajectory experiment/trajectory.csv --plant plant.yaml --seed 1 --out log.csv",
     ),
+    "check": (
+        "oed check log.csv --robot er3a",
+        "oed check logs --robot arm.urdf --torque-is current --json",
+    ),
     "identify": (
         "oed identify --robot er3a --log log.csv --out model",
         "oed identify --robot ur10 --log rtde_recording.csv bag_folder --method all --out model",
