@@ -18,7 +18,7 @@ from estimation.logs.formats import is_bag_folder
 from estimation.logs.log_tables import read_log_table, without_broken_derivatives
 from estimation.logs.mapped_tables import UNIT_NOTES
 from estimation.logs.mapping import LogMapping, read_mapping
-from estimation.logs.mapping_suggestions import suggest_mapping
+from estimation.logs.mapping_suggestions import PLAIN_REMEDY, remedy_for_columns
 from estimation.logs.repairs import repair_rows
 from estimation.logs.torque_source import KEY, parse_meaning
 from robots.common.errors import InputError
@@ -28,7 +28,6 @@ from robots.signals import FloatArray, Log
 LISTED = 10
 """Columns of a file that an error message lists."""
 
-_PLAIN_REMEDY = "rename the columns, or describe them in a mapping (--mapping)"
 
 
 def read_log(
@@ -63,7 +62,7 @@ def read_log(
     """
     known = mapping if isinstance(mapping, LogMapping) or mapping is None else read_mapping(mapping)
     table, notes = read_log_table(path, n, known, joints, kinds)
-    remedy = _remedy(table, known, n, joints)
+    remedy = PLAIN_REMEDY if known else remedy_for_columns((*table.names, *table.skipped), n, joints)
     quantities = _checked_names(table, remedy)
     count = _count_joints(table, quantities, n, remedy)
     for name in table.names:
@@ -186,14 +185,6 @@ def _checked_names(table: Table, remedy: str) -> dict[str, Quantity]:
     return quantities
 
 
-def _remedy(table: Table, mapping: LogMapping | None, n: int | None, joints: Sequence[str] | None) -> str:
-    """Says what to do about a missing column: if possible, with the mapping that would fit."""
-    suggested = None if mapping is not None else suggest_mapping((*table.names, *table.skipped), n, joints)
-    if suggested is None:
-        return _PLAIN_REMEDY
-    return f"check this mapping, save it as mapping.yaml and add --mapping mapping.yaml:\n{suggested}".rstrip()
-
-
 def _listed(table: Table, prefix: str = "") -> str:
     """Lists columns of a file, unknown ones first, then those of a prefix."""
     names = [*table.skipped, *(name for name in table.names if name.startswith(prefix))]
@@ -222,7 +213,7 @@ def _count_joints(table: Table, quantities: Mapping[str, Quantity], n: int | Non
                     column=f"{quantity.prefix}{joint}",
                     row=_header_row(table),
                     allowed=f"one column for each of q1..q{joints}" if joints else "q1..qn",
-                    remedy=_PLAIN_REMEDY
+                    remedy=PLAIN_REMEDY
                     + (f"; or remove all columns {quantity.prefix}1.." if found and quantity.prefix != "q" else "")
                     if joints
                     else remedy,
