@@ -29,7 +29,6 @@ LISTED = 10
 """Columns of a file that an error message lists."""
 
 
-
 def read_log(
     path: str | PathLike[str],
     n: int | None = None,

@@ -10,6 +10,7 @@ import typer
 
 from oed.cli.console import Console
 from oed.cli.options import (
+    FittedFrictionOption,
     ForceOption,
     JointsOption,
     JsonOption,
@@ -59,9 +60,7 @@ def diagnose(
             help="Each log's time starts at its own zero. Logs are put one after the other, one minute apart.",
         ),
     ] = False,
-    friction: Annotated[
-        str, typer.Option(help="Friction of the base model: polynomial or coulomb-viscous.")
-    ] = "polynomial",
+    friction: FittedFrictionOption = "auto",
     limits: Annotated[
         bool,
         typer.Option(

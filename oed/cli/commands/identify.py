@@ -10,6 +10,7 @@ import typer
 
 from oed.cli.console import Console
 from oed.cli.options import (
+    FittedFrictionOption,
     ForceOption,
     JointsOption,
     JsonOption,
@@ -44,13 +45,7 @@ def identify(
             "`all` to compare them."
         ),
     ] = "wls",
-    friction: Annotated[
-        str,
-        typer.Option(
-            help="Friction model: auto (bends within the recorded speeds, grows linearly beyond), polynomial or "
-            "coulomb-viscous."
-        ),
-    ] = "auto",
+    friction: FittedFrictionOption = "auto",
     position: Annotated[
         bool | None,
         typer.Option(
