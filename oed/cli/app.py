@@ -8,14 +8,17 @@ import typer
 
 from oed.cli.command import Command
 from oed.cli.commands.campaign import campaign
+from oed.cli.commands.controller import controller
 from oed.cli.commands.design import design
 from oed.cli.commands.diagnose import diagnose
 from oed.cli.commands.export import export
 from oed.cli.commands.identify import identify
 from oed.cli.commands.pareto import pareto
 from oed.cli.commands.predict import predict
+from oed.cli.commands.record import record
 from oed.cli.commands.retime import retime
 from oed.cli.commands.simulate import simulate
+from oed.cli.commands.stream import stream
 from oed.cli.commands.thermal import thermal
 
 app = typer.Typer(
@@ -26,7 +29,8 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
     rich_markup_mode=None,
 )
-for command in (design, pareto, retime, export, campaign, simulate, identify, thermal, diagnose, predict):
+COMMANDS = (design, pareto, retime, export, stream, record, controller, campaign, simulate, identify, thermal, diagnose)
+for command in (*COMMANDS, predict):
     app.command(cls=Command)(command)
 
 

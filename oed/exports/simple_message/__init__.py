@@ -1,6 +1,6 @@
 """The ROS-Industrial simple_message protocol: messages, and their bytes (industrial_core 0.7, REP-I0004)."""
 
-from oed.exports.simple_message.codec import DEFAULT, WireFormat
+from oed.exports.simple_message.codec import DEFAULT, WireFormat, shortest
 from oed.exports.simple_message.errors import MessageError
 from oed.exports.simple_message.kinds import Comm, Kind, Reply, Special, Valid
 from oed.exports.simple_message.messages import (
@@ -38,5 +38,6 @@ __all__ = [
     "TorqueFeedback",
     "Valid",
     "WireFormat",
+    "shortest",
     "trajectory_points",
 ]
