@@ -13,6 +13,10 @@ from oed.exports.simple_message import FullPoint, Point, Valid, WireFormat, shor
 Array = NDArray[np.float64]
 
 
+REST = 1e-6
+"""Speed, share of a speed, or step below which a point is one to stay at."""
+
+
 class Outcome(Enum):
     """What became of a point."""
 
@@ -32,12 +36,14 @@ class Stored:
         q: positions (n,).
         dq: velocities (n,); None where the message has none.
         ddq: accelerations (n,); None where the message has none.
+        rest: whether the robot may stay here.
     """
 
     time: float
     q: Array
     dq: Array | None
     ddq: Array | None
+    rest: bool
 
 
 class PointBuffer:
@@ -105,10 +111,7 @@ class PointBuffer:
     @property
     def at_rest(self) -> bool:
         """Whether the last point is one at which the robot may stay."""
-        last = self.points[-1]
-        if last.dq is not None:
-            return bool(np.abs(last.dq).max() < 1e-6)
-        return len(self.points) < 2 or bool(np.abs(last.q - self.points[-2].q).max() < 1e-6)
+        return self.points[-1].rest
 
     def sample(self, times: Array) -> tuple[Array, Array, Array]:
         """Interpolates positions, velocities and accelerations (m, n) at times (m,) within the stored points.
@@ -144,10 +147,14 @@ class PointBuffer:
         if isinstance(point, Point):
             before = self.points[-1].time if self.points else 0.0
             duration = shortest(point.duration) if self._short else point.duration
-            return Stored(before + duration if self.points else 0.0, q, None, None)
+            return Stored(before + duration if self.points else 0.0, q, None, None, point.velocity < REST)
         dq = np.array(point.velocities[:n]) if Valid.VELOCITY in point.valid else None
         ddq = np.array(point.accelerations[:n]) if Valid.ACCELERATION in point.valid else None
-        return Stored(shortest(point.time) if self._short else point.time, q, dq, ddq)
+        time = shortest(point.time) if self._short else point.time
+        if dq is not None:
+            return Stored(time, q, dq, ddq, bool(np.abs(dq).max() < REST))
+        before = self.points[-1].q if self.points else q
+        return Stored(time, q, dq, ddq, bool(np.abs(q - before).max() < REST))
 
 
 def _given(values: list[Array | None], integral: Array, t: Array) -> Array:

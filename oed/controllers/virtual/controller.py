@@ -213,6 +213,7 @@ class VirtualController:
             self._waiting.clear()
             self._player.stop()
             self._answer(client, frame, Reply.SUCCESS)
+            self._motion.release(client)
             return
         if message.sequence == Special.START_STREAMING:
             self._answer(client, frame, Reply.SUCCESS)

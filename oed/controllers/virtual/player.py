@@ -18,6 +18,9 @@ Array = NDArray[np.float64]
 LOAD = 0.1
 """A buffer that is not full starts to play after so long [s] without a new point."""
 
+GONE = 2.0
+"""Time that waits for points waits no longer than this [s]."""
+
 AHEAD = 1000
 """Samples whose torque is computed at once, at most."""
 
@@ -67,6 +70,7 @@ class Player:
         self._error = 0
         self._last_accepted = 0.0
         self._ticks = 0
+        self._refilling = False
         self._numbers: list[int] = []
         self._ahead: list[Sample] = []
         self._standing: Sample | None = None
@@ -151,6 +155,9 @@ class Player:
                     self._robot.begin(clock)
         if self._phase != Phase.PLAYING:
             return self._stand()
+        if self._refilling and not self._buffer.full and now - self._last_accepted <= LOAD:
+            return None
+        self._refilling = False
         sample = self._next()
         if sample is not None:
             self.pose, self._standing = sample.q, None
@@ -161,7 +168,9 @@ class Player:
                 self._phase = Phase.IDLE
                 self.played_trajectories += 1
             return self._stand()
-        if self._options.wait_for_points:
+        if self._options.wait_for_points and now - self._last_accepted < GONE:
+            # Piece by piece: one point at a time would cost a simulation each.
+            self._refilling = True
             return None
         self.fail(UNDERRUN)
         return self._stand()

@@ -55,6 +55,11 @@ class Port(ABC):
     def send(self, client: Client, data: bytes) -> None:
         """Sends bytes; a client that is gone is forgotten."""
 
+    def release(self, client: Client) -> None:
+        """Lets another client take the place of one that has finished."""
+        if client in self.clients:
+            self.clients[client] = -SILENCE
+
     @abstractmethod
     def forget(self) -> None:
         """Ends all links."""
