@@ -131,11 +131,12 @@ def test_another_protocol(transport, robot, log: Path) -> None:
     server = socket.socket(socket.AF_INET, kind)
     server.bind(("127.0.0.1", 0))
     server.settimeout(3.0)
+    if transport == "tcp":
+        server.listen()
 
     def serve() -> None:
         with suppress(OSError):
             if transport == "tcp":
-                server.listen()
                 with server.accept()[0] as connection:
                     connection.sendall(b"SSH-2.0-OpenSSH_9.6\r\n")
                     connection.recv(10)
