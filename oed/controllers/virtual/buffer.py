@@ -153,8 +153,8 @@ class PointBuffer:
         time = shortest(point.time) if self._short else point.time
         if dq is not None:
             return Stored(time, q, dq, ddq, bool(np.abs(dq).max() < REST))
-        before = self.points[-1].q if self.points else q
-        return Stored(time, q, dq, ddq, bool(np.abs(q - before).max() < REST))
+        last = self.points[-1].q if self.points else q
+        return Stored(time, q, dq, ddq, bool(np.abs(q - last).max() < REST))
 
 
 def _given(values: list[Array | None], integral: Array, t: Array) -> Array:
