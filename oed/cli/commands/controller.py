@@ -172,9 +172,11 @@ def controller(
         "trajectories": virtual.player.played_trajectories,
         "malformed": virtual.malformed,
         "error": virtual.player.error,
+        "stalled": round(virtual.stalled, 3),
     }
     console.result(
         f"{data['points']} points received, {data['trajectories']} trajectories played, {data['malformed']} messages "
-        "not understood",
+        "not understood"
+        + (f"; this computer was late by {virtual.stalled:.2g} s in sum" if virtual.stalled else ""),
         data,
     )

@@ -33,8 +33,8 @@ DELAYED = 100_000
 """Datagrams on their way, at most."""
 
 LONGEST_WAIT, SHORTEST_WAIT = 0.02, 0.0005
-CATCH_UP = 500
-"""Samples that are made up for in one turn of the loop, at most."""
+STALL = 0.05
+"""A delay of this program beyond this [s] is no time of the controller: its clock stands still for so long."""
 
 
 class VirtualController:
@@ -76,6 +76,7 @@ class VirtualController:
         self._stopping = threading.Event()
         self._thread: threading.Thread | None = None
         self.malformed = self.refused = self.restarts = self.points = 0
+        self.stalled = 0.0
 
     def _open_ports(self) -> tuple[Port, Port]:
         o = self.options
@@ -255,7 +256,10 @@ class VirtualController:
     def _advance(self, now: float) -> None:
         """Goes on with the controller's time, and sends what is due."""
         step = self.options.feedback_period / self.options.speed
-        due = min(int((now - self._due_from) / step), CATCH_UP)
+        if now - self._due_from > max(STALL, 2 * step):
+            self.stalled += now - self._due_from
+            self._due_from = now - step
+        due = int((now - self._due_from) / step + 1e-9)
         for _ in range(due):
             clock = self._clock_ticks * self.options.feedback_period
             sample = self._player.tick(clock, now)
@@ -274,8 +278,6 @@ class VirtualController:
                     data = self.options.form.encode(status_frame(self._player, self._state_now))
                     for client in list(self._state.clients):
                         self._send(self._state, client, data)
-        if due == CATCH_UP:
-            self._due_from = max(self._due_from, now - step * CATCH_UP)
         if self._waiting:
             waiting, self._waiting = self._waiting, {}
             for (client, _), frame in waiting.items():
