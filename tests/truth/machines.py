@@ -96,17 +96,23 @@ def draw_machine(kind: str, rng: np.random.Generator) -> Machine:
     )
 
 
-def perturbed(model: pin.Model, rng: np.random.Generator) -> pin.Model:
-    """Draws a copy of a model with other masses, centres of mass and inertias, which are physically consistent."""
+def perturbed(model: pin.Model, rng: np.random.Generator, error: float = CAD_ERROR) -> pin.Model:
+    """Draws a copy of a model with other masses, centres of mass and inertias, which are physically consistent.
+
+    Args:
+        model: the model.
+        rng: random numbers.
+        error: largest relative error of masses, centres of mass and second moments.
+    """
     copy = pin.Model(model)
     for joint in range(1, model.njoints):
         body = model.inertias[joint]
-        shift = rng.uniform(-CAD_ERROR, CAD_ERROR, 3) * np.abs(body.lever) + rng.uniform(-1, 1, 3) * 2e-3
+        shift = rng.uniform(-error, error, 3) * np.abs(body.lever) + rng.uniform(-1, 1, 3) * 2e-3
         moments, axes = np.linalg.eigh(body.inertia)
         # Scaling the three second moments of mass keeps the triangle inequality of the principal moments of inertia.
-        second = np.maximum(moments.sum() / 2 - moments, 1e-9) * rng.uniform(1 - CAD_ERROR, 1 + CAD_ERROR, 3)
+        second = np.maximum(moments.sum() / 2 - moments, 1e-9) * rng.uniform(1 - error, 1 + error, 3)
         inertia = axes @ np.diag(second.sum() - second) @ axes.T
-        mass = body.mass * rng.uniform(1 - CAD_ERROR, 1 + CAD_ERROR)
+        mass = body.mass * rng.uniform(1 - error, 1 + error)
         copy.inertias[joint] = pin.Inertia(float(mass), body.lever + shift, inertia)
     return copy
 

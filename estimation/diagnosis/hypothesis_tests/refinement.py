@@ -53,13 +53,15 @@ def refine(
             fitted = sum(not hypothesis.effect.shapes[k].is_left(shape[k]) for k in loose)
         group = problem.measured(hypothesis, shape)
         result = score(problem, group, accepted)
-        gain, coefficients = result.bounded(*hypothesis.coefficient_bounds(situation.robot, shape))
-        member = FittedEffect(hypothesis, shape, group, gain, coefficients, result.degrees + fitted, result.visible)
+        found = result.limited(hypothesis, situation.robot, shape)
+        member = FittedEffect(
+            hypothesis, shape, group, found.gain, found.coefficients, found.degrees + fitted, result.visible
+        )
         worth = member.bic_gain
         if not best or worth > best[0].bic_gain:
             best[:] = [member]
         # The search maximises the gain. The BIC has a step where an optional parameter begins to count.
-        return gain
+        return found.gain
 
     def search(free: list[int], start: tuple[float, ...]) -> None:
         at = list(start)

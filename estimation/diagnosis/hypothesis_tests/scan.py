@@ -196,10 +196,10 @@ def _outcome(problem: Problem, entry: Entry, accepted: Accepted) -> Outcome:
         if not result.degrees:
             continue
         # Coefficients stay within physical bounds: a negative stiffness is not a finding.
-        gain = result.bounded(*entry.hypothesis.coefficient_bounds(robot, shape))[0]
-        evidence = neg_log_p(gain, result.degrees) - math.log(entry.tries)
+        found = result.limited(entry.hypothesis, robot, shape)
+        evidence = neg_log_p(found.gain, found.degrees) - math.log(entry.tries)
         if not best.degrees or evidence > best.evidence:
-            best = Outcome(entry.hypothesis, shape, gain, result.visible, max(evidence, 0.0), result.degrees)
+            best = Outcome(entry.hypothesis, shape, found.gain, result.visible, max(evidence, 0.0), found.degrees)
     return best
 
 

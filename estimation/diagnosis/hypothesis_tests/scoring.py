@@ -10,7 +10,9 @@ from scipy.optimize import lsq_linear
 
 from estimation.diagnosis.calibration import MIN_VISIBLE_ENERGY
 from estimation.diagnosis.hypothesis_tests.groups import Group
+from estimation.diagnosis.hypothesis_tests.hypotheses import Hypothesis
 from estimation.diagnosis.hypothesis_tests.problem import Problem
+from robots.robot import Robot
 
 Array = NDArray[np.float64]
 
@@ -60,6 +62,21 @@ def accept(problem: Problem, groups: tuple[Group, ...]) -> Accepted:
 
 
 @dataclass(frozen=True, eq=False)
+class Limited:
+    """Fit of a group within what is physically possible.
+
+    Attributes:
+        gain: chi-square explained.
+        coefficients: (k,).
+        degrees: number of visible directions in which they may vary.
+    """
+
+    gain: float
+    coefficients: Array
+    degrees: int
+
+
+@dataclass(frozen=True, eq=False)
 class Score:
     """Regression of a group on the residual, with base model and accepted groups projected out.
 
@@ -103,14 +120,37 @@ class Score:
             return 0.0, c
         if np.all((c >= lower) & (c <= upper)):
             return self.gain, c
-        # min |A c - y|^2, with A'A the Gram matrix in its visible directions.
-        y = self.root @ self.cross
         if len(c) == 1:  # fast path: most of the thousands of columns in a scan
-            A, c = 1.0 / self.root, np.asarray(np.clip(c, lower, upper))
+            c = np.asarray(np.clip(c, lower, upper))
         else:
-            A = np.asarray(np.linalg.pinv(self.root.T))
-            c = np.asarray(lsq_linear(A, y, bounds=(lower, upper), method="bvls").x)
-        return max(float(y @ y - np.sum((A @ c - y) ** 2)), 0.0), c
+            matrix, target = self._least_squares()
+            c = np.asarray(lsq_linear(matrix, target, bounds=(lower, upper), method="bvls").x)
+        return self._explained(c), c
+
+    def limited(self, hypothesis: Hypothesis, robot: Robot, shape: tuple[float, ...]) -> Limited:
+        """Fits the coefficients of a hypothesis within what is physically possible.
+
+        Args:
+            hypothesis: effect and joint of the group.
+            robot: the robot.
+            shape: values of its shape parameters.
+        """
+        effect, degrees = hypothesis.effect, self.degrees
+        c = effect.nearest(*self._least_squares(), shape) if degrees and effect.constrained else None
+        if c is None:
+            gain, c = self.bounded(*hypothesis.coefficient_bounds(robot, shape))
+            return Limited(gain, c, degrees)
+        tangent = effect.tangent(c, shape)
+        return Limited(self._explained(c), c, degrees if tangent is None else min(degrees, tangent.shape[1]))
+
+    def _least_squares(self) -> tuple[Array, Array]:
+        """Returns A (r, k) and y (r,): the best coefficients minimise |A c - y|^2, and A'A is their Gram matrix."""
+        matrix = 1.0 / self.root if len(self.raw) == 1 else np.asarray(np.linalg.pinv(self.root.T))
+        return matrix, self.root @ self.cross
+
+    def _explained(self, coefficients: Array) -> float:
+        matrix, target = self._least_squares()
+        return max(float(target @ target - np.sum((matrix @ coefficients - target) ** 2)), 0.0)
 
 
 def score(problem: Problem, group: Group, accepted: Accepted) -> Score:

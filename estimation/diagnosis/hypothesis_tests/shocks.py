@@ -53,10 +53,7 @@ def gain_beside_shock(problem: Problem, member: FittedEffect, accepted: Accepted
     likely = _chance(problem, elsewhere, joints, float(sizes[best, place].max())) >= SHOCK_COUNT
     struck = joints if likely else joints[largest : largest + 1]
     beside = accept(problem, (*accepted.groups, _shock(problem, struck, place, offset)))
-    situation = problem.state_for(member.hypothesis.effect)
-    gain, _ = score(problem, member.group, beside).bounded(
-        *member.hypothesis.coefficient_bounds(situation.robot, member.shape)
-    )
+    gain = score(problem, member.group, beside).limited(member.hypothesis, problem.situation.robot, member.shape).gain
     return replace(member, gain=gain) if likely or gain < MAX_GLITCH_SHARE * member.gain else member
 
 

@@ -291,7 +291,7 @@ def formula_errors(problem: Problem, member: FittedEffect, coefficients: Array) 
 def _gain(problem: Problem, member: FittedEffect, shape: tuple[float, ...], others: Accepted) -> float:
     """Returns the chi-square explained at a shape, with coefficients within the bounds for that shape."""
     result = score(problem, problem.measured(member.hypothesis, shape), others)
-    return result.bounded(*member.hypothesis.coefficient_bounds(problem.situation.robot, shape))[0]
+    return result.limited(member.hypothesis, problem.situation.robot, shape).gain
 
 
 def with_value(shape: tuple[float, ...], k: int, value: float) -> tuple[float, ...]:

@@ -163,9 +163,8 @@ def remeasure(problem: Problem, member: FittedEffect, beside: Accepted) -> Fitte
         The member with new gain, coefficients and visible share.
     """
     result = score(problem, member.group, beside)
-    bounds = member.hypothesis.coefficient_bounds(problem.situation.robot, member.shape)
-    gain, coefficients = result.bounded(*bounds)
-    return replace(member, gain=gain, coefficients=coefficients, visible=result.visible)
+    found = result.limited(member.hypothesis, problem.situation.robot, member.shape)
+    return replace(member, gain=found.gain, coefficients=found.coefficients, visible=result.visible)
 
 
 def _acts_on(problem: Problem, hypothesis: Hypothesis) -> tuple[int, ...]:

@@ -40,6 +40,7 @@ class Effect(ABC):
         above_band: whether it is searched above the frequencies at which accelerations are known.
         needs_full_rate: whether its torque may change within a few samples, other than by the sign of a velocity. In
             thinned logs it is evaluated before the thinning.
+        constrained: whether the values of its coefficients limit each other, see `nearest`.
         undetermined_text: the finding's sentence if the logs determine none of its coefficients; empty by default.
         shapes: the parameters in which the columns are not linear.
         rivals: effects that resemble it, the closest first.
@@ -56,6 +57,7 @@ class Effect(ABC):
     reading: ClassVar[Reading] = Reading.ADDS
     above_band: ClassVar[AboveBand] = AboveBand.NO
     needs_full_rate: ClassVar[bool] = False
+    constrained: ClassVar[bool] = False
     undetermined_text: ClassVar[str] = ""
     shapes: ClassVar[tuple[Shape, ...]] = ()
     rivals: ClassVar[tuple[str, ...]] = ()
@@ -86,6 +88,22 @@ class Effect(ABC):
     def ranges(self, robot: Robot, joint: Place, shape: tuple[float, ...]) -> tuple[tuple[float, float], ...]:
         """Returns the range of each coefficient at given shape values; by default that of `parameters`."""
         return tuple((coefficient.lower, coefficient.upper) for coefficient in self.parameters(robot, joint))
+
+    def nearest(self, matrix: Array, target: Array, shape: tuple[float, ...]) -> Array:
+        """Finds the possible coefficients (k,) that minimise ``|matrix @ coefficients - target|``.
+
+        Only for an effect that is `constrained`: the `ranges` are all that limits others.
+
+        Args:
+            matrix: (r, k).
+            target: (r,).
+            shape: one value per entry of `shapes`.
+        """
+        raise NotImplementedError(self.name)
+
+    def tangent(self, coefficients: Array, shape: tuple[float, ...]) -> Array | None:
+        """Gives the directions (k, d) in which coefficients (k,) may vary, for given shape values; None for all."""
+        return None
 
     def ties(self, coefficients: Array) -> tuple[tuple[int, int, float], ...]:
         """Lists pairs of a coefficient and a shape parameter that describe the same quantity.

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from robots.terms.effect_bases.base import Coefficient, Effect, Place, Shape, Situation
 from robots.terms.effect_bases.capabilities import GearLoad, Persistence
+from robots.terms.effect_bases.carried_bodies import nearest_body, nearest_point_mass, point_mass_tangent
 from robots.terms.effect_bases.states import change_times
 
 if TYPE_CHECKING:
@@ -18,10 +19,11 @@ Array = NDArray[np.float64]
 
 
 class PayloadChange(Effect):
-    """tau = Y_tool (m, m c, Ixx, Iyy, Izz) from the time t_c on: a body at the flange, in the flange's frame.
+    """tau = Y_tool (m, m c, I) from the time t_c on: a body at the flange, in the flange's frame.
 
-    The products of inertia are left out, because those of usual tools are comparatively small. The moments of inertia
-    are used only if `own_inertia` is 1, because those of a small body hardly show.
+    It is a body that can exist, picked up or put down: its pseudo-inertia is positive semidefinite, or negative.
+    Without moments of inertia of its own (`own_inertia` 0) it is a point mass, because those of a small body hardly
+    show.
     """
 
     name: ClassVar[str] = "payload_change"
@@ -29,6 +31,7 @@ class PayloadChange(Effect):
     persistence: ClassVar[Persistence] = Persistence.TIME
     gear_load: ClassVar[GearLoad] = GearLoad.CAUSES
     whole_robot: ClassVar[bool] = True
+    constrained: ClassVar[bool] = True
     shapes: ClassVar[tuple[Shape, ...]] = (
         Shape("change_time", "s", -np.inf, np.inf, "linear", inexact=0.03),
         Shape("own_inertia", "", 0.0, 1.0, "linear", default=1.0),
@@ -37,11 +40,11 @@ class PayloadChange(Effect):
     experiments: ClassVar[tuple[str, ...]] = ("static_hold", "repeat")
 
     def parameters(self, robot: Robot, joint: Place) -> tuple[Coefficient, ...]:
-        """Describes the changes of mass, first moments and moments of inertia in the flange's frame."""
+        """Describes the changes of mass, first moments and inertias in the flange's frame."""
         return (
             Coefficient("mass_change", "kg"),
             *(Coefficient(f"moment_change_{axis}", "kg m") for axis in "xyz"),
-            *(Coefficient(f"inertia_change_{axis}", "kg m2") for axis in "xyz"),
+            *(Coefficient(f"inertia_change_{axes}", "kg m2") for axes in ("x", "xy", "xz", "y", "yz", "z")),
         )
 
     def grid(self, situation: Situation, joint: Place) -> tuple[tuple[float, ...], ...]:
@@ -59,11 +62,16 @@ class PayloadChange(Effect):
         return ((None, 1.0),)
 
     def columns(self, situation: Situation, joint: Place, shape: tuple[float, ...] = ()) -> Array:
-        """Evaluates the torque of all joints per kg, kg m and kg m2 (N, n, 7)."""
-        X = situation.sensitivity("tool")[:, :, USED] * (situation.t >= shape[0]).astype(float)[:, None, None]
-        if not shape[1]:
-            X[:, :, 4:] = 0.0
-        return X
+        """Evaluates the torque of all joints per kg, kg m and kg m2 (N, n, 10)."""
+        return situation.sensitivity("tool") * (situation.t >= shape[0]).astype(float)[:, None, None]
+
+    def nearest(self, matrix: Array, target: Array, shape: tuple[float, ...]) -> Array:
+        """Finds the best body, or point mass, that was picked up or put down."""
+        return nearest_body(matrix, target) if shape[1] else nearest_point_mass(matrix, target)
+
+    def tangent(self, coefficients: Array, shape: tuple[float, ...]) -> Array | None:
+        """Gives the directions in which a point mass may vary; a body may vary in all."""
+        return None if shape[1] or not coefficients[0] else point_mass_tangent(coefficients)
 
     def describe(
         self,
@@ -77,7 +85,3 @@ class PayloadChange(Effect):
         """Describes the values in one sentence."""
         change = "increased" if coefficients[0] > 0 else "decreased"
         return f"The payload {change} by {abs(coefficients[0]):.3g} kg at t = {shape[0]:.2f} s."
-
-
-USED = (0, 1, 2, 3, 4, 7, 9)
-"""Indices of the inertial parameters used: all but the products of inertia."""

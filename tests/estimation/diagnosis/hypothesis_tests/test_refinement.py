@@ -16,6 +16,7 @@ from estimation.diagnosis.hypothesis_tests.groups import Group
 from estimation.diagnosis.hypothesis_tests.hypotheses import Hypothesis
 from estimation.diagnosis.hypothesis_tests.joint_agreement import PerJointEvidence
 from estimation.diagnosis.hypothesis_tests.scan import Outcome
+from estimation.diagnosis.hypothesis_tests.scoring import Limited
 from estimation.diagnosis.searches import acceptance
 from estimation.diagnosis.searches.acceptance import SURE, exceeds_leakage, is_certain, passes_bic
 from estimation.diagnosis.searches.candidate_screening import screen_candidates
@@ -225,7 +226,7 @@ def test_a_search_starts_again_from_other_summits(far: bool, expected: float, mo
     def score(problem: object, shape: tuple[float, ...], accepted: object) -> SimpleNamespace:
         at = float(np.log10(shape[0]))
         gain = 50 * np.exp(-0.5 * ((at + 1) / 0.3) ** 2) + 80 * np.exp(-0.5 * ((at + 3) / 0.3) ** 2)
-        return SimpleNamespace(bounded=lambda *_: (float(gain), np.ones(1)), degrees=1, visible=1.0)
+        return SimpleNamespace(limited=lambda *_: Limited(float(gain), np.ones(1), 1), visible=1.0)
 
     monkeypatch.setattr(refinement, "score", score)
     monkeypatch.setattr(Hypothesis, "coefficient_bounds", lambda *_: ((-np.inf, np.inf),))
@@ -265,7 +266,7 @@ def test_what_an_effect_is_whole_without_is_a_parameter_only_where_it_pays(
     def score(problem: object, shape: tuple[float, ...], accepted: object) -> SimpleNamespace:
         top = -1.0 + shape[1] * (np.log10(0.03) + 1.0)
         gain = 100 - 400 * (np.log10(shape[0]) - top) ** 2 + brings * (1 - (shape[1] - 1) ** 2)
-        return SimpleNamespace(bounded=lambda *_: (float(gain), np.ones(1)), degrees=1, visible=1.0)
+        return SimpleNamespace(limited=lambda *_: Limited(float(gain), np.ones(1), 1), visible=1.0)
 
     monkeypatch.setattr(refinement, "score", score)
     monkeypatch.setattr(Hypothesis, "coefficient_bounds", lambda *_: ((-np.inf, np.inf),))
@@ -288,7 +289,7 @@ def test_friction_that_turns_round_over_no_way_is_no_presliding(
 
     def score(problem: object, shape: tuple[float, ...], accepted: object) -> SimpleNamespace:
         gain = 300 - 10 * np.log(shape[0] / best) ** 2
-        return SimpleNamespace(bounded=lambda *_: (float(gain), np.ones(1)), degrees=1, visible=1.0)
+        return SimpleNamespace(limited=lambda *_: Limited(float(gain), np.ones(1), 1), visible=1.0)
 
     monkeypatch.setattr(refinement, "score", score)
     monkeypatch.setattr(refinement, "gain_from_reversal_errors", lambda *_: 0.0)

@@ -88,8 +88,6 @@ def test_columns_fit_the_parameters(effect, seen):
         size = np.abs(X).max(axis=(0, 1))
         if effect.name == "spring" and point[0] > 0:  # with a lever, its third order is no column
             size = np.delete(size, 2)
-        if effect.name == "payload_change" and not point[1]:  # a small body's own inertia is none
-            size = size[:4]
         if effect.name == "external_contact":  # one a joint, or a wrench's six
             size = size[: now.robot.n]
         if effect.name != "torque_sensor_drift":  # of which a straight line is one column of eight
