@@ -33,7 +33,7 @@ DELAYED = 100_000
 """Datagrams on their way, at most."""
 
 LONGEST_WAIT, SHORTEST_WAIT = 0.02, 0.0005
-STALL = 0.05
+STALL = 0.15
 """A delay of this program beyond this [s] is no time of the controller: its clock stands still for so long."""
 
 

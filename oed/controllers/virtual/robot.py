@@ -10,11 +10,12 @@ from numpy.typing import NDArray
 from robots.plants import Plant, PlantEffect
 from robots.plants.heat import HeatPiece, heat_piece, reference_friction
 from robots.signals import Motion
+from robots.terms.effect_bases.heat import HeatEffect
 
 Array = NDArray[np.float64]
 
-HISTORY = 60.0
-"""Effects with a memory see so much of the motion [s]; heat remembers everything."""
+HISTORY, HEAT_HISTORY = 20.0, 60.0
+"""Effects with a memory see so much of the motion [s], effects of heat more; the plant's own heat sees everything."""
 
 
 class VirtualRobot:
@@ -31,7 +32,8 @@ class VirtualRobot:
         self._period = period
         self._rng = np.random.default_rng(seed)
         static = all(isinstance(effect, PlantEffect) and effect.static for effect in plant.effects)
-        self._memory = 2 if static else int(HISTORY / period)
+        warm = any(isinstance(getattr(effect, "term", None), HeatEffect) for effect in plant.effects)
+        self._memory = 2 if static else int((HEAT_HISTORY if warm else HISTORY) / period)
         self._pieces: list[HeatPiece] = []
         self._coloured = self._rng.standard_normal(plant.robot.n)
         self._squares, self._count = np.zeros(plant.robot.n), 0
