@@ -176,7 +176,6 @@ def controller(
     }
     console.result(
         f"{data['points']} points received, {data['trajectories']} trajectories played, {data['malformed']} messages "
-        "not understood"
-        + (f"; this computer was late by {virtual.stalled:.2g} s in sum" if virtual.stalled else ""),
+        "not understood" + (f"; this computer was late by {virtual.stalled:.2g} s in sum" if virtual.stalled else ""),
         data,
     )

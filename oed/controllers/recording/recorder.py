@@ -59,6 +59,7 @@ class Recorder:
         """The controller's time of the last feedback, or ours where it sends none [s]."""
         self.rest_since = self.last_heard = time.monotonic()
         self.error: OedError | None = None
+        self.received = 0
         self._thread = threading.Thread(target=self._run, name="feedback", daemon=True)
         self._thread.start()
 
@@ -153,6 +154,7 @@ class Recorder:
                     if self._log is not None:
                         self._log.flush()
                     continue
+                self.received += 1
                 try:
                     frame = self._form.decode(data)
                 except MessageError as error:

@@ -75,7 +75,7 @@ class VirtualController:
         self._delayed_count = 0
         self._stopping = threading.Event()
         self._thread: threading.Thread | None = None
-        self.malformed = self.refused = self.restarts = self.points = 0
+        self.received = self.malformed = self.refused = self.restarts = self.points = 0
         self.stalled = 0.0
 
     def _open_ports(self) -> tuple[Port, Port]:
@@ -182,6 +182,7 @@ class VirtualController:
             self._travel(lambda: port.send(client, data))
 
     def _deliver(self, port: Port, client: Client, data: bytes) -> None:
+        self.received += 1
         known = client in port.clients
         answer = port.admit(client, data, time.monotonic())
         if answer is not None:

@@ -38,7 +38,7 @@ def controller(robot: Path) -> Iterator[tuple[str, str]]:
         ports = re.search(r"motion port (\d+), state port (\d+)", line)
     yield ports[1], ports[2]
     process.send_signal(signal.SIGTERM)
-    out, _ = process.communicate(timeout=20)
+    out, _ = process.communicate(timeout=120)
     assert process.returncode == 0
     assert json.loads(out)["malformed"] == 0
 
@@ -53,14 +53,14 @@ def test_interrupted_stream(robot: Path, controller, tmp_path: Path) -> None:
     while not (tmp_path / "log.csv").exists() or (tmp_path / "log.csv").stat().st_size < 20_000:
         assert process.poll() is None
     process.send_signal(signal.SIGINT)
-    _, err = process.communicate(timeout=20)
+    _, err = process.communicate(timeout=120)
     assert process.returncode == 130
     assert [line[:4] for line in err.splitlines() if not line.startswith("note")] == ["oed:"]
     assert "the robot was ordered to stop" in err
     assert len(read_log(tmp_path / "log.csv", 2)) > 50
 
     done = start("record", "--robot", robot, *place, "--log", tmp_path / "second.csv", "--duration", 0.3, "--json")
-    out, err = done.communicate(timeout=30)
+    out, err = done.communicate(timeout=120)
     assert done.returncode == 0, err
     assert json.loads(out)["rows"] == len(read_log(tmp_path / "second.csv", 2)) > 20
 

@@ -66,7 +66,7 @@ def controllers(robot: Robot) -> Iterator[Callable[..., tuple[VirtualController,
             state_port=controller.state_port,
             form=options.form,
             handshake=options.handshake,
-            connect_time=1.0,
+            connect_time=3.0,
             handshake_interval=0.1,
         )
         return controller, endpoint

@@ -76,7 +76,7 @@ def test_full_disk(tmp_path: Path) -> None:
     """On a full disk recording ends with one message, and the log is whole up to its last line."""
     path = tmp_path / "log.csv"
     done = subprocess.run(
-        [sys.executable, "-c", FULL_DISK, str(path)], capture_output=True, text=True, check=False, timeout=30
+        [sys.executable, "-c", FULL_DISK, str(path)], capture_output=True, text=True, check=False, timeout=120
     )
     assert "recording stopped" in done.stdout
     assert done.stderr == ""

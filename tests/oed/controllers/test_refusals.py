@@ -168,7 +168,7 @@ def test_wrong_byte_order_is_named(robot, controllers, log: Path) -> None:
 def test_two_clients(transport, robot, controllers, tmp_path: Path) -> None:
     """A second client is refused with one message, and the first goes on undisturbed."""
     motion = swing(robot, 500)
-    controller, endpoint = controllers(transport=transport, speed=1.0, wait_for_points=False)
+    controller, endpoint = controllers(transport=transport, speed=1.0)
     results = []
     first = threading.Thread(target=lambda: results.append(stream(motion, robot, endpoint, log=tmp_path / "first.csv")))
     first.start()

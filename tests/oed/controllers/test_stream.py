@@ -145,7 +145,7 @@ def test_what_goes_wrong_on_the_way(settings, problem: str, robot, controllers, 
     """Whatever ends the motion early is one message with its reason, and the log is whole up to there."""
     controller, endpoint = controllers(**settings)
     with pytest.raises((LinkError, ControllerError), match=problem) as caught:
-        stream(swing(robot), robot, endpoint, log=log, options=StreamOptions(patience=0.6))
+        stream(swing(robot), robot, endpoint, log=log, options=StreamOptions(patience=1.5))
     assert f"rows are in {log}" in str(caught.value)
     read = read_log(log, robot.n)
     assert len(read) > 2
