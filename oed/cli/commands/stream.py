@@ -121,7 +121,10 @@ def stream(
                     progress=progress,
                 )
         except KeyboardInterrupt:
-            kept = f"; the feedback up to here is in {log}" if log.exists() and not dry_run else ""
-            print(f"oed: interrupted; the robot was ordered to stop{kept}", file=sys.stderr)
+            if log.exists() and not dry_run:
+                text = f"the robot was ordered to stop; the feedback up to here is in {log}"
+            else:
+                text = "no point was sent"
+            print(f"oed: interrupted; {text}", file=sys.stderr)
             raise SystemExit(130) from None
     console.result(result.summary(), result.to_dict())

@@ -13,7 +13,7 @@ from robots.robot import Robot
 from robots.signals import Motion
 
 LOOKAHEAD, GAIN = 0.1, 300
-_POINT = re.compile(r"^ +servoj\(\[([^]]*)\].*\bt=([\d.]+)", re.MULTILINE)
+_POINT = re.compile(r"^ +servoj\(\[([^]]*)\], 0, 0, ([\d.]+)", re.MULTILINE)
 
 
 class UrScript(Form):
@@ -27,7 +27,8 @@ class UrScript(Form):
         """See `Form.write`."""
         require_joints(robot, 6, 6, "a UR controller")
         period = motion.period or 0.0
-        tail = f"t={number(period)}, lookahead_time={number(LOOKAHEAD)}, gain={GAIN})"
+        # The two zeros are an acceleration and a speed that the command does not use.
+        tail = f"0, 0, {number(period)}, {number(LOOKAHEAD)}, {GAIN})"
         lines = [
             f"def {options.name}():",
             f"  start = {_list(motion.q[0])}",
