@@ -6,11 +6,14 @@ from typing import Annotated
 
 import typer
 
-from oed.cli.command import Command
+from oed.cli.command import HELP
 from oed.cli.commands.campaign import campaign
 from oed.cli.commands.controller import controller
 from oed.cli.commands.design import design
 from oed.cli.commands.diagnose import diagnose
+from oed.cli.commands.doctor import doctor
+from oed.cli.commands.effects import effects
+from oed.cli.commands.example import example
 from oed.cli.commands.export import export
 from oed.cli.commands.identify import identify
 from oed.cli.commands.pareto import pareto
@@ -20,18 +23,43 @@ from oed.cli.commands.retime import retime
 from oed.cli.commands.simulate import simulate
 from oed.cli.commands.stream import stream
 from oed.cli.commands.thermal import thermal
+from oed.cli.help.groups import Commands
+
+FUNCTIONS = (
+    design,
+    pareto,
+    retime,
+    export,
+    stream,
+    record,
+    controller,
+    campaign,
+    simulate,
+    identify,
+    thermal,
+    diagnose,
+    predict,
+    example,
+    effects,
+    doctor,
+)
+
+
+class Program(Commands):
+    """The commands of ``oed``."""
+
+    functions = FUNCTIONS
+
 
 app = typer.Typer(
     name="oed",
+    cls=Program,
+    context_settings=HELP,
     help="Designs excitation experiments for robots, identifies their dynamics, and diagnoses model errors.",
     no_args_is_help=True,
-    add_completion=False,
     pretty_exceptions_enable=False,
     rich_markup_mode=None,
 )
-COMMANDS = (design, pareto, retime, export, stream, record, controller, campaign, simulate, identify, thermal, diagnose)
-for command in (*COMMANDS, predict):
-    app.command(cls=Command)(command)
 
 
 def _show_version(wanted: bool) -> None:
