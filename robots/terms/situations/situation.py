@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from itertools import pairwise
@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from robots.common.errors import InputError
 from robots.robot import Robot
+from robots.terms.base import Column
 from robots.terms.situations.of_model import rotor_inertias, sign_of, velocity_scale
 from robots.terms.situations.sensitivities import evaluate
 
@@ -269,9 +270,7 @@ def situation(
     full[list(chosen)] = given
     parts = {term: np.zeros_like(q) for term in ("rigid_body", "rotor_inertia", "friction", "other")}
     for name in parts:
-        of_term = [
-            i for i, c in enumerate(model.columns) if full[i] and (c.term if c.term in parts else "other") == name
-        ]
+        of_term = [i for i, c in enumerate(model.columns) if full[i] and _part_of(c, parts) == name]
         if of_term:
             parts[name] = model.torque(q, dq, ddq, full[of_term], columns=of_term)
     rigid = parts["rigid_body"] + parts["rotor_inertia"]
@@ -288,3 +287,10 @@ def situation(
         torque=rigid + parts["friction"] + parts["other"],
         velocity_scale=velocity_scale(model),
     )
+
+
+def _part_of(column: Column, parts: Collection[str]) -> str:
+    """Names the part of the torque to which a column belongs; friction may come from any friction term."""
+    if column.friction:
+        return "friction"
+    return column.term if column.term in parts else "other"

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -16,6 +17,7 @@ from estimation.diagnosis.base_models.baseline import base_parameters, build_bas
 from estimation.diagnosis.base_models.payload_and_gravity import build_situation, subtract_known_payload
 from estimation.diagnosis.recordings.log_reading import build_recording
 from estimation.diagnosis.simulations.forward_simulation import FittedRobot
+from robots.common.errors import InputError
 from robots.regressor import default_model
 from robots.robot import Robot
 from robots.signals import Log, Motion
@@ -138,11 +140,20 @@ def test_the_extended_model_predicts_on_the_base_as_described_and_as_tilted(
 
 
 def test_a_tilt_that_was_not_told_is_not_taken_for_nothing(upright: Robot, build: Build) -> None:
-    """With the known tilt, logs predict each other to the noise; without it, errors are large."""
+    """With the known tilt, logs predict each other to the noise; without it, the gate states the gravity that fits.
+
+    Without the gate, errors are large.
+    """
     logs = (build(0), build(1, TILTED))
     told = diagnose(upright, logs, candidates=SOME, friction=SIMPLE)
     assert told.verdict == "none"
-    untold = diagnose(upright, [logs[0], replace(logs[1], gravity=None)], candidates=SOME, friction=SIMPLE)
+    unstated = [logs[0], replace(logs[1], gravity=None)]
+    with pytest.raises(InputError, match="--gravity") as refused:
+        diagnose(upright, unstated, candidates=SOME, friction=SIMPLE)
+    stated = [float(v) for v in re.search(r"--gravity K=([-.0-9,]+),", str(refused.value))[1].split(",")]
+    # The arm's own parameters are 20 % off, so the direction is known to some degrees.
+    assert stated == pytest.approx(TILTED, abs=0.7)
+    untold = diagnose(upright, unstated, candidates=SOME, friction=SIMPLE, check=False)
     assert np.all(np.array(told.baseline) < 0.05)
     assert max(untold.baseline) > 0.3
 

@@ -16,7 +16,7 @@ from estimation.models.extension import Extension
 from estimation.predictions.prediction import predict
 from robots.robot import Robot
 from robots.signals import Log
-from robots.terms import FrictionPolynomial
+from robots.terms import FrictionTerm
 
 
 @pytest.mark.slow
@@ -111,7 +111,7 @@ def test_friction_turns_round_as_sharply_as_all_rows_say(arm: Robot, arm_log: Ca
     model = diagnose(arm, log).model
     for v0, worse in ((5e-4, 1.0), (0.016, 1.3)):
         terms = tuple(
-            replace(term, velocity_scale=v0) if isinstance(term, FrictionPolynomial) else term
+            replace(term, velocity_scale=v0) if isinstance(term, FrictionTerm) else term
             for term in model.torque_model.terms
         )
         wrong = replace(model, torque_model=replace(model.torque_model, terms=terms))

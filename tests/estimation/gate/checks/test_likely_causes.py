@@ -43,7 +43,7 @@ def test_a_base_mounted_otherwise_is_named_with_its_gravity(arm, stands, gravity
     log = stands(gravity, seed)
     report = check_log(arm, log)
     (finding,) = found(report, "gravity_direction")
-    values = re.search(r"--gravity 1=([-0-9.,e]+)", finding.action)
+    values = re.search(r"--gravity K=([-0-9.,e]+)", finding.action)
     advised = np.array([float(value) for value in values[1].split(",")])
     cosine = advised @ gravity / np.linalg.norm(advised) / np.linalg.norm(gravity)
     assert np.degrees(np.arccos(min(cosine, 1.0))) < 3.0
