@@ -29,6 +29,7 @@ from robots.regressor import TorqueModel, default_model
 from robots.robot import Robot
 from robots.signals import Log
 from robots.terms import BendingFriction, FrictionTerm, PositionTorque
+from robots.terms.friction import USUAL
 from robots.version import VERSION
 
 Array = NDArray[np.float64]
@@ -40,8 +41,8 @@ RELATIVE = 0.5
 NEGLIGIBLE = 0.02
 # A joint whose left-out torque is predicted hardly better than by a constant is not identified.
 HOPELESS = 0.95
-# Speeds are measured over so much time [s]; a joint that moves slower than this [rad/s or m/s] stands.
-SPAN, SLOWEST = 0.02, 1e-3
+# Speeds are measured over so much time [s].
+SPAN = 0.02
 # A torque that varies by less than this share of its size, or of 1 N m, is constant but for rounding.
 ROUNDING = 1e-9
 
@@ -110,7 +111,7 @@ def identify(
     prepared = prepare_all(robot, usable)
     by_position = friction == "auto" if position is None else position
     if friction == "auto":
-        friction = BendingFriction(speed=_usual_speeds(prepared))
+        friction = BendingFriction.within(_usual_speeds(prepared))
 
     def model(scales: float | tuple[float, ...], with_position: bool) -> TorqueModel:
         plain = default_model(robot, friction=friction, velocity_scale=scales, rotor=rotor, offset=offset)
@@ -164,15 +165,14 @@ def identify(
     )
 
 
-def _usual_speeds(logs: Sequence[Prepared]) -> tuple[float, ...]:
-    """Speed of each joint (n,) that it exceeds in a thousandth of the time only: noise makes single larger ones."""
+def _usual_speeds(logs: Sequence[Prepared]) -> Array:
+    """Speed of each joint (n,) that it exceeds in a thousandth of the time only."""
     found = []
     for log in logs:
         grid = log.positions
         span = min(max(1, round(SPAN / grid.period)), len(grid.q) - 1)
-        found.append(np.quantile(np.abs(grid.q[span:] - grid.q[:-span]), 0.999, axis=0) / (span * grid.period))
-    # Two digits, as a person would state it. Of a joint that stands any speed says nothing.
-    return tuple(float(f"{speed:.2g}") if speed > SLOWEST else 1.0 for speed in np.max(found, axis=0))
+        found.append(np.quantile(np.abs(grid.q[span:] - grid.q[:-span]), USUAL, axis=0) / (span * grid.period))
+    return np.asarray(np.max(found, axis=0))
 
 
 def _recorded(found: Fit) -> dict[str, list[list[float]]]:

@@ -2,11 +2,17 @@
 
 from __future__ import annotations
 
+import hashlib
 from collections.abc import Mapping, Sequence
+from os import PathLike
+from pathlib import Path
 from typing import Any
 
 from robots.common.files import sha256
 from robots.signals import Log
+
+BAG_FILES = (".db3", ".mcap")
+"""Suffixes of the files in a folder of rosbag 2 that hold messages."""
 
 
 def describe_logs(logs: Sequence[Log]) -> list[dict[str, object]]:
@@ -17,13 +23,32 @@ def describe_logs(logs: Sequence[Log]) -> list[dict[str, object]]:
         described.append(
             {
                 "name": log.name,
-                "sha256": sha256(file) if file else None,
+                "sha256": log_hash(file) if file else None,
                 "samples": len(log),
                 "start": float(log.t[0]),
                 "duration": log.duration,
             }
         )
     return described
+
+
+def log_hash(path: str | PathLike[str]) -> str:
+    """Returns the SHA-256 digest of a log as 64 hexadecimal digits.
+
+    A folder of rosbag 2 counts by the files that hold its messages. With one such file it has the digest of this file,
+    so that the folder and the file are the same log.
+
+    Args:
+        path: a file, or the folder of a rosbag 2.
+
+    Raises:
+        InputError: a file is missing or cannot be read.
+    """
+    place = Path(path)
+    if not place.is_dir():
+        return sha256(place)
+    digests = [sha256(file) for file in sorted(place.iterdir()) if file.suffix in BAG_FILES]
+    return digests[0] if len(digests) == 1 else hashlib.sha256("".join(digests).encode()).hexdigest()
 
 
 def are_same_log(log: Mapping[str, Any], other: Mapping[str, Any]) -> bool:

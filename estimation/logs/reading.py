@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
 from os import PathLike
 from pathlib import Path
 from typing import Any, NoReturn
@@ -14,9 +13,11 @@ from numpy.typing import NDArray
 
 from estimation.logs.campaigns import MAPPING, in_order, log_files
 from estimation.logs.columns import BY_FIELD, QUANTITIES, Quantity, column_name, parse_name, refuse_text, unit_factors
-from estimation.logs.formats import is_bag_folder, read_foreign
-from estimation.logs.mapped_tables import UNIT_NOTES, count_joints, map_table
+from estimation.logs.formats import is_bag_folder
+from estimation.logs.log_tables import read_log_table, without_broken_derivatives
+from estimation.logs.mapped_tables import UNIT_NOTES
 from estimation.logs.mapping import LogMapping, read_mapping
+from estimation.logs.mapping_suggestions import suggest_mapping
 from estimation.logs.repairs import drop_repeated_rows
 from robots.common.errors import InputError
 from robots.common.tables.table import Table
@@ -24,6 +25,8 @@ from robots.signals import FloatArray, Log
 
 LISTED = 10
 """Columns of a file that an error message lists."""
+
+_PLAIN_REMEDY = "rename the columns, or describe them in a mapping (--mapping)"
 
 
 def read_log(
@@ -38,9 +41,10 @@ def read_log(
     """Reads a log: ``t, q1..qn``, torque or current, and whatever optional columns there are.
 
     Args:
-        path: ``.csv`` (commas, semicolons or tabs; decimal points or commas; UTF-8; a leading ``#`` block may state
-            units, robot and period), ``.parquet``, ``.mat``, ``.npz``, or a ROS bag with joint states (``.bag``,
-            ``.mcap``, ``.db3``, or the folder of a rosbag 2).
+        path: ``.csv`` (commas, semicolons, tabs or blanks; decimal points or commas; UTF-8; a leading ``#`` block may
+            state units, robot and period), ``.parquet``, ``.mat``, ``.npz``, or a ROS bag with joint states (``.bag``,
+            ``.mcap``, ``.db3``, or the folder of a rosbag 2). Recordings of UR RTDE, libfranka, KUKA FRI and
+            ``rostopic echo -p`` are recognised by their columns.
         n: the number of joints of the robot, where it is known.
         torque: whether torque or current must be there; a prediction needs the motion only.
         mapping: a mapping YAML, where the columns have other names, units, signs or another order.
@@ -56,17 +60,21 @@ def read_log(
             record of another file, both counted from 1.
     """
     known = mapping if isinstance(mapping, LogMapping) or mapping is None else read_mapping(mapping)
-    table = _read_table(path, n, known, joints, kinds)
-    quantities = _checked_names(table)
-    count = _count_joints(table, quantities, n)
+    table, notes = read_log_table(path, n, known, joints, kinds)
+    remedy = _remedy(table, known, n, joints)
+    quantities = _checked_names(table, remedy)
+    count = _count_joints(table, quantities, n, remedy)
     for name in table.names:
         refuse_text(table, name)
+    table, dropped = without_broken_derivatives(table)
+    quantities = {name: quantities[name] for name in table.names}
     whole = table
     table, kept, repairs = drop_repeated_rows(table)
+    repairs = [*notes, *dropped, *repairs]
     if len(table) < 2:
         raise InputError("only one row", file=table.path, row=table.first_row, allowed="2 or more rows")
-    factors, notes = unit_factors(table, quantities, kinds)
-    repairs = [*table.metadata.get(UNIT_NOTES, ()), *notes, *repairs]
+    factors, unit_notes = unit_factors(table, quantities, kinds)
+    repairs = [*table.metadata.get(UNIT_NOTES, ()), *unit_notes, *repairs]
     signals = {
         quantity.field: _signal(table, quantity, count, factors)
         for quantity in QUANTITIES
@@ -79,6 +87,7 @@ def read_log(
             column="tau1",
             row=_header_row(table),
             allowed="columns of joint torque [N m] or motor current [A]",
+            remedy=table.metadata.get("no_torque", remedy),
         )
     metadata = _metadata(table) | ({"repairs": repairs} if repairs else {})
     try:
@@ -142,26 +151,7 @@ def read_logs(
     return tuple(logs)
 
 
-def _read_table(
-    path: str | PathLike[str],
-    n: int | None,
-    mapping: LogMapping | None,
-    joints: Sequence[str] | None,
-    kinds: Sequence[str] | None,
-) -> Table:
-    if mapping is None:
-        return read_foreign(path, lambda name: parse_name(name) is not None, joints=joints)
-    named = mapping.joints if mapping.joints is not None else joints
-    # Which columns the mapping names depends on the number of joints, and that on the columns: names come first.
-    table = read_foreign(path, lambda name: True, topic=mapping.topic, joints=named)
-    count = count_joints(mapping, table.names, n)
-    mapped = map_table(table, mapping, count, kinds)
-    kept = {name: values for name, values in mapped.columns.items() if parse_name(name) is not None}
-    left = tuple(name for name in mapped.columns if name not in kept)
-    return replace(mapped, columns=kept, skipped=(*mapped.skipped, *left))
-
-
-def _checked_names(table: Table) -> dict[str, Quantity]:
+def _checked_names(table: Table, remedy: str) -> dict[str, Quantity]:
     quantities: dict[str, Quantity] = {}
     for name in table.names:
         parsed = parse_name(name)
@@ -184,9 +174,17 @@ def _checked_names(table: Table) -> dict[str, Quantity]:
             column="t",
             row=_header_row(table),
             allowed="t (seconds), q1.. and tau1.. or i1..",
-            remedy="rename the columns, or describe them in a mapping (--mapping)",
+            remedy=remedy,
         )
     return quantities
+
+
+def _remedy(table: Table, mapping: LogMapping | None, n: int | None, joints: Sequence[str] | None) -> str:
+    """Says what to do about a missing column: if possible, with the mapping that would fit."""
+    suggested = None if mapping is not None else suggest_mapping((*table.names, *table.skipped), n, joints)
+    if suggested is None:
+        return _PLAIN_REMEDY
+    return f"check this mapping, save it as mapping.yaml and add --mapping mapping.yaml:\n{suggested}".rstrip()
 
 
 def _listed(table: Table, prefix: str = "") -> str:
@@ -197,7 +195,7 @@ def _listed(table: Table, prefix: str = "") -> str:
     return ", ".join(names[:LISTED]) + (f", ... ({len(names)} columns)" if len(names) > LISTED else "")
 
 
-def _count_joints(table: Table, quantities: Mapping[str, Quantity], n: int | None) -> int:
+def _count_joints(table: Table, quantities: Mapping[str, Quantity], n: int | None, remedy: str) -> int:
     """Returns the number of joints after checking that each quantity has its columns."""
     present: dict[str, set[int]] = {}
     for name, quantity in quantities.items():
@@ -217,8 +215,10 @@ def _count_joints(table: Table, quantities: Mapping[str, Quantity], n: int | Non
                     column=f"{quantity.prefix}{joint}",
                     row=_header_row(table),
                     allowed=f"one column for each of q1..q{joints}" if joints else "q1..qn",
-                    remedy="rename the columns, or describe them in a mapping (--mapping)"
-                    + (f"; or remove all columns {quantity.prefix}1.." if found and quantity.prefix != "q" else ""),
+                    remedy=_PLAIN_REMEDY
+                    + (f"; or remove all columns {quantity.prefix}1.." if found and quantity.prefix != "q" else "")
+                    if joints
+                    else remedy,
                 )
         extra = sorted(found - set(range(1, joints + 1)))
         if extra:
@@ -258,7 +258,7 @@ def _signal(table: Table, quantity: Quantity, joints: int, factors: Mapping[str,
 
 
 def _metadata(table: Table) -> dict[str, Any]:
-    metadata = {key: value for key, value in table.metadata.items() if key not in ("units", UNIT_NOTES)}
+    metadata = {key: value for key, value in table.metadata.items() if key not in ("units", "no_torque", UNIT_NOTES)}
     period = metadata.get("period")
     if period is not None:
         try:

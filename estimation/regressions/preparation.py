@@ -251,10 +251,12 @@ def torque_of(robot: Robot, log: Log) -> Array:
         raise InputError("neither torque nor current", allowed="tau1.. [N m] or i1.. [A]")
     constant = np.asarray(robot.torque_constant)
     if not np.isfinite(constant).all():
+        source = log.metadata.get("torque_source")
+        instead = source.get("instead") if isinstance(source, dict) else None
         raise InputError(
             "has currents, but the robot's description has no torque constant",
             joint=int(np.argmin(np.isfinite(constant))) + 1,
-            remedy="state torque_constant under drives in the robot YAML",
+            remedy="state torque_constant under drives in the robot YAML" + (f", or {instead}" if instead else ""),
         )
     return log.current * constant
 

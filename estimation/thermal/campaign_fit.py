@@ -8,12 +8,12 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg import cho_factor, cho_solve
 
 from estimation.identifications.identification import identify
 from estimation.logs.known_setup import HEAT, require_plain
 from estimation.models.model import Model
 from estimation.thermal.band import error_band
+from estimation.thermal.information import inverse_of, solve_normal
 from estimation.thermal.results.campaign_estimate import CampaignEstimate
 from estimation.thermal.results.estimate import ThermalEstimate
 from estimation.thermal.runs.condensed import Condensed, JointSums, condense
@@ -31,8 +31,6 @@ Array = NDArray[np.float64]
 
 # The fits of rigid body and heat take turns until no friction changes by more than this share.
 SETTLED, MOST_ROUNDS = 1e-4, 12
-# Least regularisation that keeps the inverse finite.
-FAINT = 1e-12
 
 
 @one_blas_thread()
@@ -173,7 +171,7 @@ class _AlternatingFit:
                 part, right = sums.scaled(factor)
                 gram[np.ix_(sums.used, sums.used)] += weight * part
                 cross[sums.used] += weight * right
-            self.values = _solve(gram, cross)
+            self.values = solve_normal(gram, cross)
             self.weights = 1.0 / np.maximum(self._residuals(), 1e-9) ** 2
 
     def _residuals(self) -> Array:
@@ -254,7 +252,7 @@ class _AlternatingFit:
             _, square = sums.friction_scale(values)
             block[own:, own:] = slopes.T @ (square[:, None] * slopes)
             information[np.ix_(which, which)] += weight * block
-        inverse = _solve(information, np.eye(len(information)))
+        inverse = inverse_of(information)
         errors = np.sqrt(np.maximum(np.diag(inverse), 0.0))
         found = [{name: float(errors[offsets[j] + k]) for k, name in enumerate(own)} for j, own in enumerate(names)]
         return inverse[:size, :size], found
@@ -291,10 +289,3 @@ def _with_errors(fit: ThermalEstimate, errors: Mapping[str, float]) -> ThermalEs
         for q in fit.parameters
     )
     return replace(fit, parameters=parameters)
-
-
-def _solve(matrix: Array, right: Array) -> Array:
-    scale = np.sqrt(np.maximum(np.diag(matrix), 1e-300))
-    scaled = matrix / scale[:, None] / scale + FAINT * np.eye(len(scale))
-    solved = cho_solve(cho_factor(scaled), right / (scale if right.ndim == 1 else scale[:, None]))
-    return np.asarray(solved / scale if right.ndim == 1 else solved / scale[:, None])

@@ -6,39 +6,59 @@ from typing import Annotated
 
 import typer
 
-from oed.cli.command import Command
+from oed.cli.command import HELP
 from oed.cli.commands.campaign import campaign
 from oed.cli.commands.design import design
 from oed.cli.commands.diagnose import diagnose
+from oed.cli.commands.doctor import doctor
+from oed.cli.commands.effects import effects
+from oed.cli.commands.example import example
 from oed.cli.commands.export import export
 from oed.cli.commands.identify import identify
 from oed.cli.commands.pareto import pareto
+from oed.cli.commands.payload import payload
 from oed.cli.commands.predict import predict
 from oed.cli.commands.retime import retime
-from oed.cli.commands.robot import robots, show
+from oed.cli.commands.robot import robot, robots
 from oed.cli.commands.simulate import simulate
 from oed.cli.commands.thermal import thermal
+from oed.cli.help.groups import Commands
+
+FUNCTIONS = (
+    design,
+    pareto,
+    retime,
+    export,
+    campaign,
+    simulate,
+    identify,
+    thermal,
+    diagnose,
+    predict,
+    payload,
+    example,
+    robot,
+    robots,
+    effects,
+    doctor,
+)
+
+
+class Program(Commands):
+    """The commands of ``oed``."""
+
+    functions = FUNCTIONS
+
 
 app = typer.Typer(
     name="oed",
+    cls=Program,
+    context_settings=HELP,
     help="Designs excitation experiments for robots, identifies their dynamics, and diagnoses model errors.",
     no_args_is_help=True,
-    add_completion=False,
     pretty_exceptions_enable=False,
     rich_markup_mode=None,
 )
-for command in (design, pareto, retime, export, campaign, simulate, identify, thermal, diagnose, predict):
-    app.command(cls=Command)(command)
-app.command()(robots)
-robot = typer.Typer(no_args_is_help=True, rich_markup_mode=None)
-robot.command()(show)
-app.add_typer(robot, name="robot")
-
-
-# Without a callback, typer makes the only command of a group the group itself.
-@robot.callback()
-def _of_robots() -> None:
-    """Shows what was read of a robot."""
 
 
 def _show_version(wanted: bool) -> None:

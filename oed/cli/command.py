@@ -1,11 +1,21 @@
-"""A command whose repeatable options also take several values, as in ``--log runs/*.csv``."""
+"""Commands with help by purpose, examples, and options that take several values, as in ``--log runs/*.csv``."""
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator, Sequence
+import re
+from collections.abc import Collection, Iterable, Iterator, Sequence
 from typing import Any
 
 from typer.core import TyperCommand
+
+from oed.cli.help.help_texts import EXAMPLES, OPTIONS, SETTINGS, group_of
+
+HELP = {"help_option_names": ["-h", "--help"]}
+"""Settings of all commands: ``-h`` is ``--help``."""
+
+
+# How typer writes the type of an option that may be given again.
+_LISTS = re.compile(r"<list\[(\w+)\]>")
 
 
 class Command(TyperCommand):
@@ -17,6 +27,39 @@ class Command(TyperCommand):
         if again and all(p.param_type_name == "option" for p in self.params):
             args = list(_repeated(args, again))
         return super().parse_args(ctx, args)
+
+    def format_options(self, ctx: Any, formatter: Any) -> None:
+        """Writes the options by purpose: robot, input, settings, output."""
+        sections: dict[str, list[tuple[str, str]]] = {
+            title: [] for title in ("Arguments", "Robot", "Input", SETTINGS, "Output")
+        }
+        for parameter in self.get_params(ctx):
+            record = parameter.get_help_record(ctx)
+            if record is not None:
+                argument = parameter.param_type_name == "argument"
+                title = "Arguments" if argument else group_of(OPTIONS, str(parameter.name), SETTINGS)
+                sections[title].append((_LISTS.sub(r"<\1> ...", record[0]), record[1]))
+        write_sections(formatter, sections.items())
+
+    def format_epilog(self, ctx: Any, formatter: Any) -> None:
+        """Writes examples to copy."""
+        write_lines(formatter, "Examples", EXAMPLES.get(str(self.name), ()))
+
+
+def write_sections(formatter: Any, sections: Iterable[tuple[str, list[tuple[str, str]]]]) -> None:
+    """Writes lists of names and what they mean, each under its title; empty ones are left out."""
+    for title, rows in sections:
+        if rows:
+            with formatter.section(title):
+                formatter.write_dl(rows)
+
+
+def write_lines(formatter: Any, title: str, lines: Sequence[str]) -> None:
+    """Writes lines as they are under a title."""
+    if lines:
+        with formatter.section(title):
+            for line in lines:
+                formatter.write(f"{'':>{formatter.current_indent}}{line}\n")
 
 
 def _repeated(words: Sequence[str], again: Collection[str]) -> Iterator[str]:

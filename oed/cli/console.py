@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import logging
 import sys
 import warnings
 from collections.abc import Iterator, Mapping
@@ -11,6 +12,9 @@ from dataclasses import dataclass
 from typing import Any
 
 from robots.common.progress import SILENT, Progress
+
+OURS = ("oed", "estimation", "robots")
+"""Packages whose warnings are notes for the reader."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -49,7 +53,10 @@ class Console:
                 raise SystemExit(130) from None
 
     def _note(self, message: Warning | str, *_: object, **__: object) -> None:
-        if not self.quiet:
+        if type(message).__module__.split(".")[0] not in OURS:
+            # A library's remark about its own numbers is of no use to a reader.
+            logging.getLogger(__name__).debug("%s: %s", type(message).__name__, message)
+        elif not self.quiet:
             print(f"note: {message}", file=sys.stderr)
 
     def result(self, summary: str, data: Mapping[str, Any]) -> None:

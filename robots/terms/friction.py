@@ -20,6 +20,8 @@ COULOMB_VISCOUS = (1, 2)
 POLYNOMIAL = (1, 2, 3, 4)
 # Where the saturating parts bend, as shares of the usual highest speed.
 BENDS = (0.1, 0.4)
+# Speed [rad/s or m/s] below which a joint stands, and share of the rows whose speed is usual: noise makes larger ones.
+SLOWEST, USUAL = 1e-3, 0.999
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -161,6 +163,12 @@ class BendingFriction(FrictionTerm):
         super().__post_init__()
         if not np.all(np.asarray(self.speed) > 0):
             raise InputError(f"highest speed {self.speed} of the friction", allowed="positive numbers")
+
+    @classmethod
+    def within(cls, speeds: NDArray[np.float64]) -> BendingFriction:
+        """Builds the friction of motions with these highest speeds (n,) [rad/s or m/s], rounded to two digits."""
+        # A joint that stands says nothing of its speed.
+        return cls(speed=tuple(float(f"{speed:.2g}") if speed > SLOWEST else 1.0 for speed in speeds))
 
     def units(self, force: str, length: str) -> dict[str, str]:
         """Returns the units of one joint's four coefficients."""

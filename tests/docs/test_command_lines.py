@@ -29,10 +29,7 @@ def test_options_exist(line):
     """A printed call names a command of the program, options that it has, and all that it requires."""
     commands: dict[str, Any] = dict(typer.main.get_command(app).commands)
     _, name, *words = shlex.split(line, comments=True)
-    command = commands[name]
-    if hasattr(command, "commands"):
-        command = command.commands[words.pop(0)]
-    parameters = command.params
+    parameters = commands[name].params
     known = {spelling for p in parameters for spelling in (*p.opts, *p.secondary_opts)}
     used = {word.split("=")[0] for word in words if re.match(r"--?[a-z]", word)}
     assert used <= known

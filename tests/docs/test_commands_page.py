@@ -12,18 +12,14 @@ import typer
 from oed.cli.app import app
 
 PAGE = (Path(__file__).parents[2] / "docs" / "commands.md").read_text(encoding="utf-8")
-SECTIONS = dict(re.findall(r"^## `oed (\w+(?: \w+)?)`\n(.*?)(?=^## |\Z)", PAGE, flags=re.MULTILINE | re.DOTALL))
+SECTIONS = dict(re.findall(r"^## `oed (\w+)`\n(.*?)(?=^## |\Z)", PAGE, flags=re.MULTILINE | re.DOTALL))
 # What every command has is described once, at the top of the page.
 COMMON = {"--force", "--json", "--quiet", "--help"}
 
 
 def commands() -> dict[str, Any]:
-    """Every command of the program, those of groups by both names."""
-    found = {}
-    for name, command in typer.main.get_command(app).commands.items():
-        inner = getattr(command, "commands", None)
-        found |= {name: command} if inner is None else {f"{name} {own}": each for own, each in inner.items()}
-    return found
+    """Every command of the program."""
+    return dict(typer.main.get_command(app).commands)
 
 
 def offered(command: Any) -> dict[str, str]:

@@ -17,6 +17,7 @@ from estimation.linear_algebra.orthonormal import orthonormal
 from robots.base_parameters import BaseParameters, find_base_parameters
 from robots.regressor import default_model
 from robots.robot import Robot
+from robots.terms import FrictionTerm
 from robots.terms.effects import Situation
 
 Array = NDArray[np.float64]
@@ -54,13 +55,13 @@ class Baseline:
 
 
 def base_parameters(
-    robot: Robot, friction: str, scales: tuple[float, ...], gravities: Iterable[Array] = ()
+    robot: Robot, friction: str | FrictionTerm, scales: tuple[float, ...], gravities: Iterable[Array] = ()
 ) -> BaseParameters:
     """Finds the base parameters of rigid body, friction, rotors and offsets, for given widths of the friction signs.
 
     Args:
         robot: the robot.
-        friction: `polynomial` or `coulomb-viscous`.
+        friction: name of a friction model, or its term.
         scales: width of each joint's friction sign [rad/s or m/s].
         gravities: further gravity vectors (3,) [m/s2] under which the parameters must describe the torque.
 
@@ -107,7 +108,7 @@ def build_baseline(
             chosen = _Signs(trial, signs, base, seen, 1.0 / left).sharpness(fast)
         model = default_model(
             base.model.robot,
-            friction="polynomial" if any(c.symbol == "f4" for c in base.model.columns) else "coulomb-viscous",
+            friction=next(term for term in base.model.terms if isinstance(term, FrictionTerm)),
             velocity_scale=chosen,
         )
         base = replace(base, model=model)

@@ -18,6 +18,8 @@ from robots.base_parameters import BaseParameters
 from robots.common.errors import NotIdentifiableError
 from robots.robot import Robot
 from robots.signals import Log
+from robots.terms import BendingFriction
+from robots.terms.friction import USUAL
 
 # Width of the friction sign [rad/s or m/s] before it is fitted to the logs.
 FIRST_VELOCITY_SCALE = 0.001
@@ -53,7 +55,7 @@ def prepare_logs(
         robot: the robot.
         logs: logs of the fit.
         held_out: logs for validation.
-        friction: friction of the base model: `polynomial` or `coulomb-viscous`.
+        friction: friction of the base model: `auto` (`BendingFriction`), `polynomial` or `coulomb-viscous`.
         check: whether each log passes the gate, which refuses unusable logs and marks what needs repair.
 
     Returns:
@@ -75,7 +77,9 @@ def prepare_logs(
         raise NotIdentifiableError("no joint moves", remedy="record a log in which the arm moves")
     # Held-out logs count too: a gravity that occurs only there needs the robot's description as a prior.
     gravities = [log.gravity for log in (*fit, *other) if log.gravity is not None]
-    base = base_parameters(robot, friction, (FIRST_VELOCITY_SCALE,) * robot.n, gravities)
+    speeds = np.quantile(np.abs(recording.dq), USUAL, axis=0)
+    chosen = BendingFriction.within(speeds) if friction == "auto" else friction
+    base = base_parameters(robot, chosen, (FIRST_VELOCITY_SCALE,) * robot.n, gravities)
     if unusable := find_unusable_logs(base, recording):
         notes += [_UNUSABLE.format(k + 1, _in_brackets(recording.names[k]), 100 * s) for k, s in unusable.items()]
         fit = [log for k, log in enumerate(fit) if k not in unusable]

@@ -8,18 +8,29 @@ experiment. Delta is twice the Kullback-Leibler divergence (Atkinson and Fedorov
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from estimation.diagnosis.experiment_plans.choices import (
+    ENOUGH,
+    LIKELY,
+    LONGEST,
+    Choice,
+    Proposal,
+    combined,
+    make_choice,
+    repeat_stages,
+    repeated,
+    with_times,
+)
 from estimation.diagnosis.experiment_plans.experiment_grams import ARM, Cause, Grams
 from estimation.diagnosis.experiment_plans.experiment_motions import (
     MADE,
     MAKERS,
     VARIED,
-    MotionRange,
     Stage,
     motion_range,
 )
@@ -33,32 +44,6 @@ Array = NDArray[np.float64]
 
 VARIANTS = 4
 """Number of motions tried for the best kind."""
-ENOUGH = 0.99
-"""Probability from which the simplest experiment is chosen. Models of causes hold to some per cent, and the probability
-includes noise only."""
-TIE = 0.01
-"""Weight of the mean probability over all pairs of causes, added to the smallest one."""
-HOPELESS = 0.2
-"""Probability below which two causes are reported as not separable."""
-TIMES, LONGEST = (2, 4, 8, 16), 300.0
-"""Numbers of repetitions tried if once is not enough, and the longest experiment then [s], with pauses."""
-
-
-@dataclass(frozen=True, kw_only=True)
-class Proposal:
-    """One kind of experiment and its evaluation.
-
-    Attributes:
-        kind: a name of `EXPERIMENTS`.
-        resolves: probability that it leaves one cause.
-        duration: with pauses [s].
-        times: how often each motion is made.
-    """
-
-    kind: str
-    resolves: float
-    duration: float
-    times: int = 1
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -75,6 +60,7 @@ class NextExperiment:
         ranking: all kinds, the best first.
         times: how often each motion is made.
         logged: which motion of the logs is repeated, in words; empty for new motions.
+        kinds: all kinds that it combines, `kind` first.
     """
 
     kind: str
@@ -85,6 +71,7 @@ class NextExperiment:
     ranking: tuple[Proposal, ...]
     times: int = 1
     logged: str = ""
+    kinds: tuple[str, ...] = ()
 
     @property
     def motions(self) -> tuple[Motion, ...]:
@@ -109,6 +96,7 @@ class NextExperiment:
         """Returns plain data, without the motions."""
         return {
             "kind": self.kind,
+            "kinds": list(self.kinds or (self.kind,)),
             "joint": self.joint,
             "why": self.why,
             "resolves": self.resolves,
@@ -119,40 +107,6 @@ class NextExperiment:
                 {"kind": p.kind, "resolves": p.resolves, "duration": p.duration, "times": p.times} for p in self.ranking
             ],
         }
-
-
-@dataclass(frozen=True, eq=False)
-class _Choice:
-    """A kind of experiment with its Gram matrices (b + k, b + k), and the probabilities to separate causes (K, K)."""
-
-    kind: str
-    stages: tuple[Stage, ...]
-    grams: tuple[Array, ...]
-    chances: Array
-    times: int = 1
-
-    @property
-    def chance(self) -> float:
-        """Probability that it leaves one cause, for the least favourable true cause."""
-        return float(self.chances.min())
-
-    @property
-    def rank(self) -> tuple[float, int]:
-        """Sort key: sufficiently certain kinds first, by their repetitions, then the others by their probability.
-
-        The mean probability decides where two causes are never separable.
-        """
-        if self.chance >= ENOUGH:
-            return -ENOUGH, self.times
-        return -(1.0 - TIE) * self.chance - TIE * float(self.chances.mean()), self.times
-
-    @property
-    def duration(self) -> float:
-        """Duration with pauses [s]."""
-        return float(sum(stage.pause + stage.motion.duration for stage in repeat_stages(self.stages, self.times)))
-
-    def proposal(self) -> Proposal:
-        return Proposal(kind=self.kind, resolves=self.chance, duration=self.duration, times=self.times)
 
 
 def plan_next(problem: Problem, causes: Sequence[Cause]) -> NextExperiment | None:
@@ -175,30 +129,21 @@ def plan_next(problem: Problem, causes: Sequence[Cause]) -> NextExperiment | Non
     index = joint - 1 if joint is not None else int(np.argmax(np.ptp(problem.recording.q, axis=0)))
     room = motion_range(robot, problem.recording)
     grams = Grams(problem, possible, find_rival_shapes(problem, possible))
-    choices = [_made(grams, room, index, kind) for kind in MAKERS]
+    choices = [make_choice(grams, room, index, kind) for kind in MAKERS]
     if max(choice.chance for choice in choices) < ENOUGH:
-        choices = [_longer(grams, choice) for choice in choices]
+        choices = [repeated(grams, choice) for choice in choices]
     ranking = sorted(choices, key=lambda choice: choice.rank)
     best = ranking[0]
     for variant in range(1, VARIANTS if best.kind in VARIED and best.chance < ENOUGH else 1):
-        other = _times(grams, _made(grams, room, index, best.kind, variant), best.times)
+        other = with_times(grams, make_choice(grams, room, index, best.kind, variant), best.times)
         best = min(best, other, key=lambda choice: choice.rank)
+    if best.chance < LIKELY:
+        best = combined(grams, best, ranking[1:])
     stages = repeat_stages(best.stages, best.times)
     # An effect that builds up or starts at one moment gives less than twice the information in twice the time.
-    chance = best.chance if best.times == 1 else grams.chance(stages)
+    chance = best.chance if best.times == 1 and not best.more else grams.chance(stages)
     names = [c.hypothesis.label.replace("_", " ") for c in possible]
-    often = f" ({best.times} times)" if best.times > 1 else ""
-    why = f"{_and(names)} explain the logs about equally well. Proposed: {EXPERIMENTS[best.kind]}{often}. "
-    if len(possible) > 2 and chance < HOPELESS:
-        alike = np.unravel_index(int(np.argmin(best.chances)), best.chances.shape)
-        close = _and([names[k] for k in sorted(alike)])
-        why += (
-            f"It distinguishes most of them, but {close} only with {100 * chance:.0f} % probability; no tested "
-            "experiment is better"
-        )
-    else:
-        why += f"It distinguishes them with {100 * chance:.0f} % probability"
-    why += _by_hand(robot, best.stages)
+    why = _why(names, best, chance) + _by_hand(robot, best.stages)
     return NextExperiment(
         kind=best.kind,
         joint=joint,
@@ -207,7 +152,27 @@ def plan_next(problem: Problem, causes: Sequence[Cause]) -> NextExperiment | Non
         stages=stages,
         ranking=tuple(choice.proposal() for choice in ranking),
         times=best.times,
-        logged="" if best.kind in MADE else room.logged,
+        logged="" if MADE.issuperset((best.kind, *best.more)) else room.logged,
+        kinds=(best.kind, *best.more),
+    )
+
+
+def _why(names: Sequence[str], best: Choice, chance: float) -> str:
+    """Says which causes are open, what is proposed, and how likely it separates them."""
+    often = f" ({best.times} times)" if best.times > 1 else ""
+    proposed = _and([EXPERIMENTS[kind] for kind in (best.kind, *best.more)]) + often
+    if chance >= LIKELY:
+        return (
+            f"{_and(names)} explain the logs about equally well. Proposed: {proposed}. It distinguishes them with "
+            f"{100 * chance:.0f} % probability"
+        )
+    pair = np.unravel_index(int(np.argmin(best.chances)), best.chances.shape)
+    close = _and([names[int(k)] for k in sorted(pair)])
+    rest = "; it may distinguish the others" if len(names) > 2 else ""
+    return (
+        f"No experiment of the known kinds is likely to distinguish {close}: with these sizes their torques differ by "
+        f"less than the noise in each of them, also in {LONGEST:.0f} s. The best is {proposed}, with "
+        f"{100 * chance:.0f} % probability{rest}"
     )
 
 
@@ -225,36 +190,4 @@ def _along(one: Array, other: Array) -> float:
 
 
 def _and(names: Sequence[str]) -> str:
-    return f"{', '.join(names[:-1])} and {names[-1]}"
-
-
-def repeat_stages(stages: Sequence[Stage], times: int) -> tuple[Stage, ...]:
-    """Repeats each stage; a manual change before it, such as a payload, is made once.
-
-    Args:
-        stages: stages of one repetition.
-        times: how often each is made.
-    """
-    again = [replace(stage, pause=Stage.pause) for stage in stages]
-    return tuple(part for stage, other in zip(stages, again, strict=True) for part in (stage, *(other,) * (times - 1)))
-
-
-def _made(grams: Grams, room: MotionRange, joint: int, kind: str, variant: int = 0) -> _Choice:
-    stages = MAKERS[kind](room, joint, variant)
-    later = grams.later(stages)
-    return _Choice(kind, stages, later, grams.chances_of(later))
-
-
-def _times(grams: Grams, choice: _Choice, times: int) -> _Choice:
-    return replace(choice, times=times, chances=grams.chances_of(choice.grams, times))
-
-
-def _longer(grams: Grams, choice: _Choice) -> _Choice:
-    """Repeats an experiment's motions until it is certain enough or too long."""
-    best = choice
-    for times in TIMES:
-        more = _times(grams, choice, times)
-        if best.chance >= ENOUGH or more.duration > LONGEST:
-            break
-        best = more
-    return best
+    return f"{', '.join(names[:-1])} and {names[-1]}" if len(names) > 1 else names[0]

@@ -33,7 +33,13 @@ def identify(
     mapping: MappingOption = None,
     payload: PayloadOption = None,
     gravity: GravityOption = None,
-    method: Annotated[str, typer.Option(help="Estimator, or `all` to compare them.")] = "wls",
+    method: Annotated[
+        str,
+        typer.Option(
+            help="Estimator: wls, ols, huber, tukey, tls, constrained, consistent, iv, ml, didim or recursive; or "
+            "`all` to compare them."
+        ),
+    ] = "wls",
     friction: Annotated[
         str,
         typer.Option(

@@ -11,8 +11,9 @@ from oed.cli.console import Console
 from oed.cli.options import ROBOT, JointsOption, JsonOption, LockOption, QuietOption, TipOption, robot_from
 
 
-def show(
-    robot: Annotated[str, typer.Argument(help=f"The robot: {ROBOT}.", show_default=False)],
+def robot(
+    action: Annotated[str, typer.Argument(help="What to do: show.", show_default=False)],
+    file: Annotated[str, typer.Argument(help=f"The robot: {ROBOT}.", show_default=False)],
     tip: TipOption = None,
     joints: JointsOption = None,
     lock: LockOption = None,
@@ -22,12 +23,15 @@ def show(
     """Shows a robot's chain, limits and masses, and what is assumed of it."""
     console = Console(json=json, quiet=quiet)
     with console.working(), warnings.catch_warnings():
-        from robots.common.errors import AssumedValueWarning
+        from robots.common.errors import AssumedValueWarning, InputError
         from robots.robot_summary import robot_data, robot_summary
+
+        if action != "show":
+            raise InputError(f"oed robot {action}", allowed="show", remedy="oed robot show FILE")
 
         # The summary has them.
         warnings.simplefilter("ignore", AssumedValueWarning)
-        described = robot_from(robot, tip, joints, lock)
+        described = robot_from(file, tip, joints, lock)
     console.result(robot_summary(described), robot_data(described))
 
 
@@ -43,14 +47,14 @@ def robots(json: JsonOption = False, quiet: QuietOption = False) -> None:
         found = [load_robot(name) for name in catalogue()]
     rows = [
         {
-            "name": robot.name,
-            "title": robot.title,
-            "joints": robot.n,
-            "payload": robot.payload,
-            "reach": round(reach(robot), 3),
-            "assumed": list(robot.assumed),
+            "name": known.name,
+            "title": known.title,
+            "joints": known.n,
+            "payload": known.payload,
+            "reach": round(reach(known), 3),
+            "assumed": list(known.assumed),
         }
-        for robot in found
+        for known in found
     ]
     lines = [f"{'name':8} {'robot':40} {'joints':>6} {'payload':>8} {'reach':>7}"]
     for row in rows:

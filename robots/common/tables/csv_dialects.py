@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import csv
 import re
 from dataclasses import dataclass
 from pathlib import Path
@@ -12,6 +13,8 @@ from robots.common.errors import InputError
 LINES, BYTES = 200, 2**17
 _DECIMAL_COMMA = re.compile(r'\s*"?[+-]?\d+,\d+([eE][+-]?\d+)?"?\s*')
 _DECIMAL_POINT = re.compile(r'\s*"?[+-]?\d*\.\d+([eE][+-]?\d+)?"?\s*')
+_SEPARATOR = re.compile(r"sep=(,|;|\t|\\t| )", re.IGNORECASE)
+_WHITESPACE = re.compile(r"[ \t]+")
 
 
 @dataclass(frozen=True)
@@ -19,7 +22,7 @@ class Dialect:
     """How cells are separated and decimals written.
 
     Attributes:
-        delimiter: between cells: a comma, a semicolon or a tab.
+        delimiter: between cells: a comma, a semicolon, a tab or blanks.
         decimal: a point or a comma.
     """
 
@@ -30,28 +33,50 @@ class Dialect:
 PLAIN = Dialect()
 
 
-def find_dialect(header: str, rows: str, path: Path, first_row: int) -> Dialect:
+def stated_delimiter(line: str) -> str | None:
+    """Gives the delimiter that a line ``sep=;`` states, as spreadsheets write it; None for another line."""
+    match = _SEPARATOR.fullmatch(line.strip(" \r\n\ufeff") if "\t" in line else line.strip("\r\n\ufeff"))
+    return None if match is None else match[1].replace("\\t", "\t")
+
+
+def split_line(line: str, dialect: Dialect = PLAIN) -> list[str]:
+    """Returns the cells of a line, quotes resolved; several blanks are one delimiter.
+
+    Raises:
+        csv.Error: a cell of more than 131,072 characters.
+    """
+    if dialect.delimiter == " ":
+        line = _WHITESPACE.sub(" ", line.strip())
+    return next(csv.reader([line], delimiter=dialect.delimiter), [])
+
+
+def find_dialect(header: str, rows: str, path: Path, first_row: int, stated: str | None = None) -> Dialect:
     """Finds the dialect of a file from its header and first rows.
 
-    A file without semicolons and tabs in its header is comma separated. Decimal commas are looked for only where cells
-    are not separated by commas.
+    A file without semicolons and tabs in its header is separated by commas, or by blanks if it has no commas either.
+    Decimal commas are looked for where cells are not separated by commas, and in quoted cells.
 
     Args:
         header: the line of column names.
         rows: the beginning of the data.
         path: the file, for messages.
         first_row: the line number of the first row.
+        stated: the delimiter that the file states.
 
     Raises:
         InputError: decimal commas and points side by side.
     """
-    delimiter = next((mark for mark in (";", "\t") if header.count(mark) > header.count(",")), ",")
-    if delimiter == ",":
+    lines = rows.splitlines()[:LINES]
+    delimiter = stated or _delimiter(header, lines)
+    if delimiter == "," and not any('"' in line for line in lines[:2]):
         return PLAIN
     comma: int | None = None
     point: int | None = None
-    for number, line in enumerate(rows.splitlines()[:LINES], start=first_row):
-        cells = line.split(delimiter)
+    for number, line in enumerate(lines, start=first_row):
+        try:
+            cells = split_line(line, Dialect(delimiter))
+        except csv.Error:
+            continue
         if comma is None and any(_DECIMAL_COMMA.fullmatch(cell) for cell in cells):
             comma = number
         if point is None and any(_DECIMAL_POINT.fullmatch(cell) for cell in cells):
@@ -65,3 +90,14 @@ def find_dialect(header: str, rows: str, path: Path, first_row: int) -> Dialect:
             remedy="export the file again",
         )
     return Dialect(delimiter, "." if comma is None else ",")
+
+
+def _delimiter(header: str, lines: list[str]) -> str:
+    for mark in (";", "\t"):
+        if header.count(mark) > header.count(","):
+            return mark
+    words = header.split()
+    first = next((line for line in lines if line.strip()), "")
+    # A single column may have a name of several words.
+    blanks = "," not in header and len(words) > 1 and len(first.split()) > 1 and "," not in first.rstrip(",")
+    return " " if blanks else ","

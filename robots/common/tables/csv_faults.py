@@ -8,7 +8,7 @@ from collections.abc import Iterable, Sequence
 from pathlib import Path
 
 from robots.common.errors import InputError
-from robots.common.tables.csv_dialects import PLAIN, Dialect
+from robots.common.tables.csv_dialects import PLAIN, Dialect, split_line
 
 NULLS = ("", "nan", "NaN", "NAN", "-nan", "-NaN", "NA", "N/A", "n/a", "#N/A", "null", "NULL", "None")
 """Spellings of an empty cell in a column of numbers."""
@@ -25,15 +25,6 @@ def is_number(text: str, dialect: Dialect = PLAIN) -> bool:
     return text in NULLS or _NUMBER.fullmatch(text) is not None
 
 
-def split_line(line: str, dialect: Dialect = PLAIN) -> list[str]:
-    """Returns the cells of a line, quotes resolved.
-
-    Raises:
-        csv.Error: a cell of more than 131,072 characters.
-    """
-    return next(csv.reader([line], delimiter=dialect.delimiter), [])
-
-
 def check_names(names: Sequence[str], line: str, path: Path, row: int) -> None:
     """Checks the header of a CSV file.
 
@@ -44,14 +35,14 @@ def check_names(names: Sequence[str], line: str, path: Path, row: int) -> None:
         row: its line number.
 
     Raises:
-        InputError: no header, another separator, an unnamed column or one named twice.
+        InputError: no header, or names and rows with other separators.
     """
     if len(names) == 1 and " " in line.strip():
         raise InputError(
-            "the columns are separated by spaces",
+            "the names are separated by spaces, the rows are not",
             file=path,
             row=row,
-            allowed="commas, semicolons or tabs",
+            allowed="the same separator in all lines: commas, semicolons, tabs or spaces",
             remedy="export the file with commas as separators",
         )
     if all(is_number(name) for name in names):
@@ -62,12 +53,6 @@ def check_names(names: Sequence[str], line: str, path: Path, row: int) -> None:
             allowed="a line of column names, then numbers",
             remedy="add the line of column names",
         )
-    for index, name in enumerate(names, start=1):
-        if not name:
-            raise InputError(
-                f"column number {index} has no name", file=path, row=row, remedy="name it, or leave the column out"
-            )
-    check_unique(names, path, row)
 
 
 def check_unique(names: Iterable[str], path: Path, row: int | None = None) -> None:
@@ -84,8 +69,13 @@ def check_unique(names: Iterable[str], path: Path, row: int | None = None) -> No
     seen: set[str] = set()
     for name in names:
         if name in seen:
-            raise InputError("the column appears twice", file=path, column=name, row=row, remedy="rename or remove one")
+            raise named_twice(name, path, row)
         seen.add(name)
+
+
+def named_twice(name: str, path: Path, row: int | None = None) -> InputError:
+    """Returns the error of a column that appears twice."""
+    return InputError("the column appears twice", file=path, column=name, row=row, remedy="rename or remove one")
 
 
 def find_fault(

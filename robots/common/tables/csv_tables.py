@@ -16,19 +16,42 @@ import pyarrow.compute as pc
 import pyarrow.csv as pa_csv
 
 from robots.common.errors import InputError
-from robots.common.tables.csv_dialects import BYTES, Dialect, find_dialect
-from robots.common.tables.csv_faults import NULLS, check_names, encoding_error, find_fault, is_number, split_line
-from robots.common.tables.ecsv import Header, format_header, parse_header
+from robots.common.tables.csv_dialects import BYTES, Dialect, split_line
+from robots.common.tables.csv_faults import NULLS, encoding_error, find_fault, is_number, named_twice
+from robots.common.tables.csv_heads import is_unnamed, read_head
+from robots.common.tables.ecsv import format_header
 from robots.common.tables.table import Column, Table
 
-_UTF8_MARK = b"\xef\xbb\xbf"
 _BLOCK = 16 * 2**20
 _GAP = re.compile(rb"\n[ \t]*\r?\n")
 _LONE_RETURN = re.compile(rb"\r(?!\n)")
+_BLANKS = re.compile(rb"[ \t]+")
+_OUTER_BLANKS = re.compile(rb"^ | (?=\r?$)", re.MULTILINE)
+_LOOSE_BLANKS = re.compile(rb"[ \t]{2}|\t|^ | (?=\r?$)", re.MULTILINE)
+
+Bytes = mmap.mmap | bytes
+
+
+def csv_names(path: Path) -> list[str]:
+    """Lists the column names of a CSV file without reading its data.
+
+    Args:
+        path: the file.
+
+    Raises:
+        InputError: whatever is wrong with the file's head.
+    """
+    with _opened(path) as data:
+        # Of a long file its beginning: a return at its end may have lost its line feed.
+        _check_bytes(data[:BYTES].rstrip(b"\r"), path)
+        return [name for name in read_head(data, path).names if not is_unnamed(name)]
 
 
 def read_csv(path: Path, wanted: Callable[[str], bool]) -> Table:
-    """Reads a file of comma, semicolon or tab separated cells with one header line below an optional ``#`` block.
+    """Reads a file of cells that commas, semicolons, tabs or blanks separate, with one line of names above.
+
+    A ``#`` block may stand above the names, or hold them in its last line. A delimiter at the end of all lines, a first
+    column of row numbers without a name and a first line such as ``sep=;`` are accepted.
 
     Args:
         path: the file, UTF-8 with or without byte order mark.
@@ -37,20 +60,24 @@ def read_csv(path: Path, wanted: Callable[[str], bool]) -> Table:
     Raises:
         InputError: whatever is wrong with the file, with its column and line.
     """
-    if path.stat().st_size == 0:
-        raise InputError("the file is empty", file=path)
-    with path.open("rb") as stream:
-        data = mmap.mmap(stream.fileno(), 0, access=mmap.ACCESS_READ)
+    data: Bytes = _opened(path)
     _check_bytes(data, path)
-    header, names, start, first_row, dialect = _read_head(data, path)
+    head = read_head(data, path)
+    names, start, first_row, dialect = head.names, head.start, head.first_row, head.dialect
+    data = _with_single_blanks(data, start, dialect)
     end = _end_of_data(data)
     if start >= end:
         raise InputError("no rows below the header", file=path, row=first_row - 1, remedy="record the data again")
-    chosen = [name for name in names if wanted(name)]
+    chosen = [name for name in names if not is_unnamed(name) and wanted(name)]
+    for name in chosen:
+        if name in head.twice:
+            raise named_twice(name, path, head.row)
     first_cells = _first_cells(data, start, names, path, first_row, dialect)
-    declared = {name for name in chosen if header.datatypes.get(name) == "string"}
+    declared = {name for name in chosen if head.header.datatypes.get(name) == "string"}
     text = declared | {
-        name for name in chosen if not is_number(first_cells.get(name, ""), dialect) and name not in header.datatypes
+        name
+        for name in chosen
+        if not is_number(first_cells.get(name, ""), dialect) and name not in head.header.datatypes
     }
     kinds = {name: pa.string() if name in text else pa.float64() for name in chosen}
 
@@ -62,7 +89,8 @@ def read_csv(path: Path, wanted: Callable[[str], bool]) -> Table:
     if gap is not None:
         raise fault(set(), max(gap.start() + 1, start))
     try:
-        arrays = _parse(data, start, end, names, kinds, dialect)
+        # Without a column to convert, the parser would convert all.
+        arrays = _parse(data, start, end, names, kinds, dialect) if kinds else {}
     except (pa.ArrowException, OSError, ValueError) as error:
         raise fault(set(chosen) - text, _first_refused(data, start, end, names, kinds, dialect)) from error
     for name in sorted(text - declared, key=names.index):
@@ -70,11 +98,11 @@ def read_csv(path: Path, wanted: Callable[[str], bool]) -> Table:
             raise fault({name})
     return Table(
         columns={name: _to_numpy(arrays[name], name in text) for name in chosen},
-        metadata=header.metadata,
+        metadata=head.header.metadata,
         path=path,
         first_row=first_row,
-        units={name: unit for name, unit in header.units.items() if name in names},
-        skipped=tuple(name for name in names if name not in kinds),
+        units={name: unit for name, unit in head.header.units.items() if name in names},
+        skipped=tuple(name for name in names if name not in kinds and not is_unnamed(name)),
     )
 
 
@@ -97,7 +125,22 @@ def write_csv(
     pa_csv.write_csv(pa.table(dict(columns)), stream, options)
 
 
-def _check_bytes(data: mmap.mmap, path: Path) -> None:
+def _opened(path: Path) -> mmap.mmap:
+    if path.stat().st_size == 0:
+        raise InputError("the file is empty", file=path)
+    with path.open("rb") as stream:
+        return mmap.mmap(stream.fileno(), 0, access=mmap.ACCESS_READ)
+
+
+def _with_single_blanks(data: Bytes, start: int, dialect: Dialect) -> Bytes:
+    """Makes each run of blanks one, and drops those at the ends of lines, where blanks separate the cells."""
+    if dialect.delimiter != " " or _LOOSE_BLANKS.search(data, start) is None:
+        return data
+    body = _BLANKS.sub(b" ", data[start:])
+    return data[:start] + _OUTER_BLANKS.sub(b"", body)
+
+
+def _check_bytes(data: Bytes, path: Path) -> None:
     if data[:2] in (b"\xff\xfe", b"\xfe\xff"):
         raise InputError("the text is UTF-16", file=path, allowed="UTF-8", remedy="save the file as UTF-8")
     zero = data.find(b"\0")
@@ -120,36 +163,7 @@ def _check_bytes(data: mmap.mmap, path: Path) -> None:
         )
 
 
-def _read_head(data: mmap.mmap, path: Path) -> tuple[Header, list[str], int, int, Dialect]:
-    """Returns the ``#`` block, the column names, the position and first line number of the data, and the dialect."""
-    block: list[str] = []
-    position, row = (len(_UTF8_MARK) if data[: len(_UTF8_MARK)] == _UTF8_MARK else 0), 0
-    while position < len(data):
-        row += 1
-        stop = data.find(b"\n", position)
-        stop = len(data) if stop < 0 else stop + 1
-        try:
-            line = data[position:stop].decode("utf-8").rstrip("\r\n")
-        except UnicodeDecodeError as error:
-            raise encoding_error(path, row) from error
-        position = stop
-        if line.startswith("#"):
-            block.append(line)
-        elif line.strip():
-            beginning = data[position : position + BYTES].decode("utf-8", errors="replace")
-            dialect = find_dialect(line, beginning, path, row + 1)
-            try:
-                names = [name.strip() for name in split_line(line, dialect)]
-            except csv.Error as error:
-                raise InputError(f"no header: {error}", file=path, row=row) from error
-            check_names(names, line, path, row)
-            return parse_header(block, path), names, position, row + 1, dialect
-    raise InputError("no header and no data", file=path, allowed="a line of column names, then rows of numbers")
-
-
-def _first_cells(
-    data: mmap.mmap, start: int, names: list[str], path: Path, row: int, dialect: Dialect
-) -> dict[str, str]:
+def _first_cells(data: Bytes, start: int, names: list[str], path: Path, row: int, dialect: Dialect) -> dict[str, str]:
     stop = data.find(b"\n", start)
     try:
         cells = split_line(data[start : stop if stop >= 0 else len(data)].decode("utf-8").rstrip("\r\n"), dialect)
@@ -160,18 +174,18 @@ def _first_cells(
     return dict(zip(names, cells, strict=False))
 
 
-def _end_of_data(data: mmap.mmap) -> int:
+def _end_of_data(data: Bytes) -> int:
     end = len(data)
     while end > 0 and data[end - 1] in b"\r\n":
         end -= 1
     return end
 
 
-def _line_at(data: mmap.mmap, position: int) -> int:
+def _line_at(data: Bytes, position: int) -> int:
     return data[:position].count(b"\n") + 1
 
 
-def _lines(data: mmap.mmap, start: int, end: int) -> Iterator[bytes]:
+def _lines(data: Bytes, start: int, end: int) -> Iterator[bytes]:
     while start < end:
         stop = data.find(b"\n", start, end)
         stop = end if stop < 0 else stop + 1
@@ -180,7 +194,7 @@ def _lines(data: mmap.mmap, start: int, end: int) -> Iterator[bytes]:
 
 
 def _first_refused(
-    data: mmap.mmap, start: int, end: int, names: list[str], kinds: dict[str, pa.DataType], dialect: Dialect
+    data: Bytes, start: int, end: int, names: list[str], kinds: dict[str, pa.DataType], dialect: Dialect
 ) -> int:
     """Returns where the first refused block starts: to look at each line of a long file would take minutes."""
     while start < end:
@@ -195,7 +209,7 @@ def _first_refused(
 
 
 def _parse(
-    data: mmap.mmap, start: int, end: int, names: list[str], kinds: dict[str, pa.DataType], dialect: Dialect
+    data: Bytes, start: int, end: int, names: list[str], kinds: dict[str, pa.DataType], dialect: Dialect
 ) -> dict[str, pa.ChunkedArray]:
     # The parser reads the mapped file: a slice of bytes would copy it.
     table = pa_csv.read_csv(

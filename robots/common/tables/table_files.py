@@ -19,6 +19,7 @@ from robots.common.tables.csv_faults import check_unique, is_number
 from robots.common.tables.csv_tables import read_csv, write_csv
 from robots.common.tables.ecsv import plain
 from robots.common.tables.table import Column, Table
+from robots.common.tables.times import seconds_since_1970
 
 __all__ = ["Table", "read_table", "write_table"]
 
@@ -28,7 +29,7 @@ _FOREIGN = ("pandas", "ARROW:schema", "table")
 
 
 def read_table(path: str | PathLike[str], *, wanted: Callable[[str], bool] | None = None) -> Table:
-    """Reads a table from ``.csv`` (commas, semicolons or tabs, a leading ``#`` block allowed) or ``.parquet``.
+    """Reads a table from ``.csv`` (commas, semicolons, tabs or blanks, a leading ``#`` block allowed) or ``.parquet``.
 
     Args:
         path: the file.
@@ -45,7 +46,7 @@ def read_table(path: str | PathLike[str], *, wanted: Callable[[str], bool] | Non
     path = existing_file(path)
     suffix = _suffix(path)
     wanted = wanted or (lambda name: True)
-    return read_csv(path, wanted) if suffix == ".csv" else _read_parquet(path, wanted)
+    return read_csv(path, wanted) if suffix == ".csv" else read_parquet(path, wanted)
 
 
 def write_table(
@@ -129,7 +130,31 @@ def _writable(array: Column, path: Path, name: str) -> Column:
     return texts
 
 
-def _read_parquet(path: Path, wanted: Callable[[str], bool]) -> Table:
+def parquet_names(path: Path) -> list[str]:
+    """Lists the column names of a Parquet file without reading its data.
+
+    Args:
+        path: the file.
+
+    Raises:
+        InputError: no Parquet file.
+    """
+    try:
+        return list(pq.read_schema(path).names)
+    except (pa.ArrowException, OSError, ValueError) as error:
+        raise _no_parquet(path, error) from error
+
+
+def read_parquet(path: Path, wanted: Callable[[str], bool]) -> Table:
+    """Reads columns of a Parquet file; a stamp of time becomes seconds.
+
+    Args:
+        path: the file.
+        wanted: selects by name which columns to read.
+
+    Raises:
+        InputError: no Parquet file, a column twice, or a column that holds neither numbers nor text.
+    """
     if path.stat().st_size == 0:
         raise InputError("the file is empty", file=path)
     try:
@@ -140,11 +165,7 @@ def _read_parquet(path: Path, wanted: Callable[[str], bool]) -> Table:
             content = file.read(columns=chosen)
         arrays = {name: _parquet_column(content.column(name), name, path) for name in chosen}
     except (pa.ArrowException, OSError, ValueError, KeyError) as error:
-        raise InputError(
-            f"not a Parquet file that can be read ({str(error).splitlines()[0] if str(error) else 'damaged'})",
-            file=path,
-            remedy="write it again",
-        ) from error
+        raise _no_parquet(path, error) from error
     if content.num_rows == 0:
         raise InputError("no rows", file=path, remedy="record the data again")
     stored, units = _stored(schema.metadata or {})
@@ -155,6 +176,14 @@ def _read_parquet(path: Path, wanted: Callable[[str], bool]) -> Table:
         first_row=1,
         units=units,
         skipped=tuple(name for name in schema.names if name not in arrays),
+    )
+
+
+def _no_parquet(path: Path, error: Exception) -> InputError:
+    return InputError(
+        f"not a Parquet file that can be read ({str(error).splitlines()[0] if str(error) else 'damaged'})",
+        file=path,
+        remedy="write it again",
     )
 
 
@@ -180,6 +209,8 @@ def _parquet_column(column: pa.ChunkedArray, name: str, path: Path) -> Column:
     elif pa.types.is_string(kind) or pa.types.is_large_string(kind):
         texts: Column = column.fill_null("").to_numpy().astype(object)
         return texts
+    elif pa.types.is_timestamp(kind):
+        return seconds_since_1970(column.to_numpy())
     elif not (pa.types.is_integer(kind) or pa.types.is_floating(kind) or pa.types.is_null(kind)):
         raise InputError(
             f"a column of type {kind}", file=path, column=name, allowed="numbers (time in seconds) or text"

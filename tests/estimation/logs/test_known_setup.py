@@ -13,7 +13,6 @@ from estimation import check_log, identify, load_model, predict
 from estimation.estimators import RegressionData, WeightedLeastSquares
 from estimation.exports import urdf_text
 from estimation.identifications.fit import sum_moments
-from estimation.identifications.payloads import identify_payload
 from estimation.regressions.joint_regressor import JointRegressor
 from estimation.regressions.preparation import Rows
 from estimation.thermal import fit_campaign
@@ -176,9 +175,8 @@ def test_the_gate_knows_how_the_robot_was_set_up(upright: Robot, build: Build) -
         lambda robot, model, log: identify(robot, log, method="iv"),
         lambda robot, model, log: identify(robot, [log], method="didim"),
         lambda robot, model, log: fit_campaign(robot, log),
-        lambda robot, model, log: identify_payload(model, log),
     ],
-    ids=["iv", "didim", "heat", "payload"],
+    ids=["iv", "didim", "heat"],
 )
 def test_what_does_not_know_a_payload_or_a_gravity_refuses_it(
     upright: Robot, build: Build, two: tuple, use: Callable, stated: str

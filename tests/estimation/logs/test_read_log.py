@@ -161,7 +161,7 @@ def test_joint_numbers_start_at_one(save, name):
     assert error.column in (name, "q3")
 
 
-@pytest.mark.parametrize("name", ["t", "q2", "tau1", "dq1", "ddq2", "i1", "qlink1"])
+@pytest.mark.parametrize("name", ["t", "q2", "tau1", "i1", "qlink1"])
 @pytest.mark.parametrize("value", [np.nan, np.inf, -np.inf])
 def test_value_that_is_not_finite_names_column_row_and_count(save, name, value):
     """NaN or infinity in a needed or optional quantity names the column, the first row, and how many there are."""
@@ -175,6 +175,21 @@ def test_value_that_is_not_finite_names_column_row_and_count(save, name, value):
     assert f"found {value} (the first of 2)" in error.problem
     assert "finite" in error.allowed
     assert error.remedy
+
+
+@pytest.mark.parametrize(("name", "what"), [("dq2", "velocity"), ("ddq1", "acceleration")])
+@pytest.mark.parametrize("value", [np.nan, np.inf])
+def test_gaps_in_derivatives_are_noted_and_the_columns_left_out(save, name, what, value):
+    """Velocities and accelerations are computed from positions: gaps, as differences have them, refuse nothing."""
+    prefix = name[:-1]
+    path, first = save(columns(**{f"{prefix}1": [1.0] * 4, f"{prefix}2": [2.0] * 4} | {name: [value, 1.0, 1.0, value]}))
+    log = read_log(path)
+    assert log.dq is None
+    assert log.ddq is None
+    (note,) = log.metadata["repairs"]
+    assert (note["name"], note["value"]) == (f"{what}_gaps", 2)
+    assert f"{name} has no number in 2 rows" in note["text"]
+    assert f"row {first}" in note["text"]
 
 
 def test_empty_cell_is_a_missing_value(tmp_path):
@@ -230,7 +245,7 @@ def test_one_row_is_too_few(save):
 @pytest.mark.parametrize(
     ("content", "word"),
     [
-        ("t q1 tau1\n0 1 2\n1 2 3\n", "spaces"),
+        ("t q1 tau1\n0,1,2\n1,2,3\n", "spaces"),
         ("t,q1,q1,tau1\n0,1,1,2\n1,2,2,3\n", "twice"),
         ("t,q1,tau1\n0,1,2\n1,2\n", "2 cells"),
         ("t,q1,tau1\n0,1,2\n1,x,3\n", "'x'"),

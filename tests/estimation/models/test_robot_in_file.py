@@ -113,3 +113,30 @@ def test_effects_of_a_file_without_limits_are_refused(base, tmp_path):
                 load_model(path)
         else:
             assert np.isinf(load_model(path).robot.limits.upper).all()
+
+
+def test_the_flange_is_in_the_file_and_a_payload_acts_there(tmp_path):
+    """A model of an arm whose flange is not its last link's frame predicts a payload alike before and after."""
+    ur10 = load_robot("ur10")
+    model = default_model(ur10, velocity_scale=1e-3)
+    made = Model(
+        torque_model=model,
+        columns=tuple(range(model.size)),
+        values=model.nominal,
+        covariance=np.zeros((model.size, model.size)),
+        determined=np.full(model.size, True),
+        formulas=model.names,
+    )
+    path = tmp_path / "model.json"
+    made.save(path)
+    state = np.random.default_rng(0).normal(size=(3, 5, 6))
+    body = [2.0, 0.1, 0.0, 0.2, 0.03, 0.0, 0.0, 0.03, 0.0, 0.01]
+    again = load_model(path)
+    np.testing.assert_allclose(again.torque(*state, payload=body), made.torque(*state, payload=body), rtol=1e-12)
+    data = json.loads(path.read_text())
+    del data["robot"]["tip"]
+    path.write_text(json.dumps(data))
+    older = load_model(path)
+    np.testing.assert_allclose(older.torque(*state), made.torque(*state), rtol=1e-12)
+    with pytest.raises(InputError, match="does not state the pose of the flange"):
+        older.torque(*state, payload=body)

@@ -107,10 +107,30 @@ def test_usage(arguments: tuple, run, tmp_path: Path, monkeypatch: pytest.Monkey
     """An unknown command or option, or a missing one, is a usage error: code 2, nothing written, no traceback."""
     monkeypatch.chdir(tmp_path)
     done = run(*arguments)
-    assert done.code == 2
-    assert "Traceback" not in done.err
-    assert "Usage: oed" in done.out + done.err
+    if arguments:
+        refused(done, tmp_path, "--help`")
+    else:
+        assert done.code == 2
+        assert "Usage: oed" in done.err
     assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize(
+    ("arguments", "answer"),
+    [
+        (("identfy", "--robot", "er3a"), "no command identfy; did you mean identify?; see `oed --help`"),
+        (("dance",), "no command dance; allowed: design, "),
+        (("identify", "--robbot", "er3a"), "no option --robbot; did you mean --robot?; see `oed identify --help`"),
+        (("identify", "--lgo", "x"), "no option --lgo; did you mean --log?"),
+        (("predict", "--model", "x", "--xyz"), "no option --xyz; see `oed predict --help`"),
+        (("design",), "missing option --robot; see `oed design --help`"),
+        (("design", "--seed", "x", "--robot", "er3a"), "invalid value for --seed: "),
+        (("simulate",), "give either --trajectory or --campaign; see `oed simulate --help`"),
+    ],
+)
+def test_usage_errors_are_answered_in_one_style(arguments: tuple, answer: str, run, tmp_path: Path) -> None:
+    """A wrong name is answered with the nearest right one, and every usage error with where to read on."""
+    refused(run(*arguments), tmp_path, answer)
 
 
 def spoilt(table: pd.DataFrame, fault: str) -> tuple[pd.DataFrame, tuple[str, ...]]:

@@ -57,8 +57,17 @@ def test_parquet_columns_of_other_types(tmp_path):
     assert list(table.columns["c"]) == ["a", "b", "a"]
     assert {column.dtype for column in table.columns.values()} == {np.dtype(float), np.dtype(object)}
     assert table.first_row == 1
-    pq.write_table(pa.table({"t": pa.array([0, 1], pa.timestamp("ms"))}), path)
+    pq.write_table(pa.table({"t": pa.array([b"a", b"b"], pa.binary())}), path)
     assert refused(path).column == "t"
+
+
+def test_parquet_stamps_of_time_are_seconds(tmp_path):
+    """A column of time stamps is read in seconds, with more digits than a float of nanoseconds would have."""
+    path = tmp_path / "table.parquet"
+    pq.write_table(pa.table({"t": pa.array([1_714_739_696_789_123_456, None], pa.timestamp("ns"))}), path)
+    times = read_table(path).columns["t"]
+    assert abs(times[0] - 1_714_739_696.789123456) < 3e-7  # the spacing of floats there
+    assert np.isnan(times[1])
 
 
 def test_parquet_without_rows_or_with_a_duplicate_is_refused(tmp_path):

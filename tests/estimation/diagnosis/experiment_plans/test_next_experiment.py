@@ -8,9 +8,18 @@ import numpy as np
 import pytest
 
 from estimation.diagnosis.base_models.payload_and_gravity import build_situation
+from estimation.diagnosis.experiment_plans.choices import (
+    ENOUGH,
+    LIKELY,
+    LONGEST,
+    Choice,
+    combined,
+    make_choice,
+    repeat_stages,
+)
 from estimation.diagnosis.experiment_plans.experiment_grams import Grams
 from estimation.diagnosis.experiment_plans.experiment_motions import MADE, MAKERS, Stage, motion_range
-from estimation.diagnosis.experiment_plans.next_experiment import ENOUGH, LONGEST, _Choice, plan_next, repeat_stages
+from estimation.diagnosis.experiment_plans.next_experiment import plan_next
 from estimation.diagnosis.experiment_plans.planned_limits import planned_problem
 from estimation.diagnosis.hypothesis_tests.hypotheses import Hypothesis
 from robots.loading import load_robot
@@ -168,7 +177,7 @@ def test_what_is_nearly_sure_goes_after_what_is(problem):
     """An experiment with a sufficient chance is ranked before one with a chance slightly below."""
     grams, stages = np.zeros((1, 1)), ()
     chances = [np.full((2, 2), enough) for enough in (ENOUGH - 1e-3, ENOUGH)]
-    nearly, enough = (_Choice("payload", stages, (grams,), each) for each in chances)
+    nearly, enough = (Choice("payload", stages, (grams,), each) for each in chances)
     assert enough.rank < nearly.rank
 
 
@@ -189,6 +198,22 @@ def test_what_once_does_not_tell_is_made_several_times(problem):
     assert plan.ranking[0].duration <= LONGEST
 
 
+@pytest.mark.slow
+def test_kinds_are_combined_where_none_is_likely_to_decide(problem):
+    """Two kinds together are more likely to separate two causes than each; their information adds up."""
+    names = (("stribeck", (0.05, 1.0)), ("presliding_hysteresis", (0.003,)))
+    causes = [_guess(problem, name, 4, shape, 7e-4) for name, shape in names]
+    grams = Grams(problem, causes)
+    room = motion_range(problem.situation.robot, problem.recording)
+    first, *others = (make_choice(grams, room, 3, kind) for kind in ("micro_reversals", "sweep", "multisine"))
+    both = combined(grams, first, others)
+    assert first.chance < LIKELY
+    assert both.more
+    assert both.chance > first.chance
+    assert both.chance == pytest.approx(grams.chance(both.stages), rel=1e-6)
+    assert both.duration > first.duration
+
+
 def test_a_payload_is_mounted_once_however_often_the_motion_is_made(problem):
     """Repeated stages are ordered by their payload, so the payload is mounted once, with one pause for it."""
     stages = MAKERS["payload"](motion_range(problem.situation.robot, problem.recording), 0, 0)
@@ -206,10 +231,9 @@ def test_where_two_causes_stay_alike_the_others_are_told_apart(problem):
     plan = plan_next(problem, [error, other, error])
     assert plan is not None
     assert plan.resolves < 1e-6
-    assert (
-        "but torque constant error of joint 2 and torque constant error of joint 2 only with 0 % probability"
-        in plan.why
-    )
+    twice = "torque constant error of joint 2 and torque constant error of joint 2"
+    assert plan.why.startswith(f"No experiment of the known kinds is likely to distinguish {twice}")
+    assert "it may distinguish the others" in plan.why
     grams = Grams(problem, [error, other])
     first, last = (
         MAKERS[choice.kind](motion_range(problem.situation.robot, problem.recording), 1, 0)

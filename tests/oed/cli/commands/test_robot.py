@@ -54,6 +54,13 @@ def test_bad_input(arguments, message, run):
     assert done.out == ""
 
 
+def test_another_action(run):
+    """An unknown action ends with exit code 2 and the known one."""
+    done = run("robot", "draw", "ur10")
+    assert done.code == 2
+    assert "allowed: show" in done.err
+
+
 def test_robots(run):
     """The catalogue is listed by name, as text and as data."""
     assert [row["name"] for row in run("robots", "--json").data["robots"]] == list(catalogue())

@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
 from robots.common.errors import InputError
+from robots.common.tables.csv_tables import csv_names
 from robots.common.tables.table_files import read_table, write_table
 
 SHARED_FOLDER = settings(suppress_health_check=[HealthCheck.function_scoped_fixture], deadline=None, max_examples=60)
@@ -116,6 +117,50 @@ def test_harmless_variants_are_read(tmp_path, content):
     assert {name: column.tolist() for name, column in table.columns.items()} == {"t": [0.0, 1.0], "q1": [1.0, 2.0]}
 
 
+@pytest.mark.parametrize(
+    ("content", "first_row"),
+    [
+        ("# t,q1\n0,1\n1,2\n", 2),
+        ("# made today\n# t, q1\n0,1\n1,2\n", 3),
+        ("# t q1\n0 1\n1 2\n", 2),
+        ("# t q1\n0,1\n1,2\n", 2),
+        ("sep=;\nt;q1\n0;1\n1;2\n", 3),
+        ("sep=,\r\nt,q1\r\n0,1\r\n1,2\r\n", 3),
+        ("t,q1,\n0,1,\n1,2,\n", 2),
+        ("t,q1,\n0,1\n1,2\n", 2),
+        ("t,q1\n0,1,\n1,2,\n", 2),
+        ("t;q1;\n0;1,0;\n1;2,0;\n", 2),
+        (",t,q1\n0,0,1\n1,1,2\n", 2),
+        ("t q1\n0 1\n1 2\n", 2),
+        ("  t    q1\n  0.0  1e0 \r\n 1.0\t2\n", 2),
+        ('t,q1\n"0,0","1,0"\n"1,0","2,0"\n', 2),
+    ],
+)
+def test_dialects_of_other_programs_are_read(tmp_path, content, first_row):
+    """Names behind #, sep=, delimiters at the ends of lines, row numbers without a name, and blanks are understood."""
+    table = read_table(csv(tmp_path, content))
+    assert table.first_row == first_row
+    assert {name: column.tolist() for name, column in table.columns.items()} == {"t": [0.0, 1.0], "q1": [1.0, 2.0]}
+    assert table.skipped == ()
+
+
+def test_numpy_savetxt_with_a_header_is_read(tmp_path):
+    """What numpy writes reads back to the last bit, the block above the names included."""
+    values = np.random.default_rng(1).normal(size=(5, 3))
+    np.savetxt(tmp_path / "table.csv", values, header="robot: arm\nt q1 tau1")
+    table = read_table(tmp_path / "table.csv")
+    assert (table.metadata, table.first_row) == ({"robot": "arm"}, 3)
+    np.testing.assert_array_equal(np.column_stack([table.columns[name] for name in ("t", "q1", "tau1")]), values)
+
+
+def test_names_that_appear_twice_matter_only_where_they_are_wanted(tmp_path):
+    """A log with commands beside states may name a column twice."""
+    path = csv(tmp_path, "t,q_d,q_d\n0,1,2\n1,2,3\n")
+    assert read_table(path, wanted=lambda name: name == "t").skipped == ("q_d", "q_d (2)")
+    assert refused(path, wanted=lambda name: name == "q_d").column == "q_d"
+    assert csv_names(path) == ["t", "q_d", "q_d (2)"]
+
+
 def test_empty_cells_and_their_spellings_are_nan(tmp_path):
     """An empty cell in a column of numbers, or one of its spellings, reads as NaN."""
     table = read_table(csv(tmp_path, "t,x\n0,\n1,nan\n2,NA\n3,null\n4,NaN\n5,-Infinity\n"))
@@ -150,7 +195,13 @@ def test_empty_cells_and_their_spellings_are_nan(tmp_path):
         (b"t;q1\n0;1\n1,2\n", {"problem": "1 cells", "row": 3}),
         (b"t,q1\n0;1\n", {"problem": "1 cells", "row": 2}),
         (b"t;q1\n0;1\n1;1.234.567,8\n", {"problem": "'1.234.567,8'", "column": "q1", "row": 3}),
-        (b"t q1\n0 1\n", {"problem": "spaces", "row": 1}),
+        (b"t q1\n0,1\n", {"problem": "spaces", "row": 1}),
+        (b"t q1\n0 1\n1\n", {"problem": "1 cells", "row": 3}),
+        (b"t q1\n0 1\n1  x\n", {"problem": "'x'", "column": "q1", "row": 3}),
+        (b"# t,q1\n0,1\n1,x\n", {"problem": "'x'", "column": "q1", "row": 3}),
+        (b"# t,q1,q2\n0,1\n", {"problem": "no header", "row": 2}),
+        (b"sep=;\nt;q1\n0;1\n1;x\n", {"problem": "'x'", "column": "q1", "row": 4}),
+        (b"t,q1,\n0,1,2\n", {"problem": "number 3 has no name", "row": 1}),
         (b"t,q1\n0,1\n1,\0\n", {"problem": "zero byte", "row": 3}),
         (b"t,q1\n" + b"\0" * 4096, {"problem": "zero byte", "row": 2}),
         ("t,q1\n0,1\n".encode("utf-16"), {"problem": "UTF-16"}),

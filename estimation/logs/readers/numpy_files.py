@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
-from estimation.logs.matlab_files import columns_of
+from estimation.logs.readers.matlab_files import columns_of
 from robots.common.errors import InputError
 from robots.common.tables.table import Table
 

@@ -1,0 +1,156 @@
+"""The mapping that would fit a table of unknown columns, as text to be saved."""
+
+from __future__ import annotations
+
+import json
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+# Words of a column's name, in the order in which quantities are recognised. A velocity's name often has a position's.
+_WORDS = {
+    "temperature": r"temp|temperature|temperatures",
+    "acceleration": r"ddq|qdd|acc|accel|acceleration|accelerations",
+    "velocity": r"dq|qd|vel|velocity|velocities|speed|speeds|omega",
+    "current": r"i|iq|cur|curr|current|currents|amps",
+    "torque": r"tau|trq|tq|torque|torques|effort|efforts|moment|moments|mt|tauj",
+    "position": r"q|pos|position|positions|angle|angles|axis|ax|theta|joint|j|mp|encoder",
+}
+_COMMANDED = re.compile(r"target|desired|des|cmd|command|commanded|ref|reference|setpoint|set|goal|soll|ext|external")
+_UNITS = {
+    "rad": ("position", "rad"),
+    "deg": ("position", "deg"),
+    "degree": ("position", "deg"),
+    "degrees": ("position", "deg"),
+    "°": ("position", "deg"),
+    "mrad": ("position", "mrad"),
+    "nm": ("torque", "N m"),
+    "ma": ("current", "mA"),
+    "a": ("current", "A"),
+}
+_TIME = re.compile(r"(?i)t([_ \[(]+[mun]?s(ec)?[\])]?)?|.*(time|stamp|zeit|clock).*")
+_TIME_UNITS = {"ms": "ms", "msec": "ms", "us": "us", "usec": "us", "ns": "ns", "nsec": "ns", "s": "s", "sec": "s"}
+_KEYS = ("position", "velocity", "torque", "current", "temperature")
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Group:
+    """Columns whose names differ by the joint only.
+
+    Attributes:
+        pattern: with ``{joint}`` or ``{index}``.
+        names: in order.
+        words: of the pattern, in small letters.
+    """
+
+    pattern: str
+    names: tuple[str, ...]
+    words: tuple[str, ...]
+
+
+def suggest_mapping(names: Sequence[str], n: int | None = None, joints: Sequence[str] | None = None) -> str | None:
+    """Writes the mapping that would fit, by the names of the columns.
+
+    Args:
+        names: of all columns.
+        n: the number of joints, where it is known.
+        joints: names of the robot's joints in its order, where they are known.
+
+    Returns:
+        YAML to be saved and checked; None if no columns look like positions.
+    """
+    chosen: dict[str, _Group] = {}
+    for group in _groups(names, joints):
+        quantity = _quantity(group.words)
+        if quantity is None or (n is not None and len(group.names) < n):
+            continue
+        known = chosen.get(quantity)
+        if known is None or _rank(group) < _rank(known):
+            chosen[quantity] = group
+    position = chosen.get("position")
+    if position is None:
+        return None
+    count = n or len(position.names)
+    lines = []
+    time = min((name for name in names if _TIME.fullmatch(name)), key=len, default=None)
+    if time is not None:
+        lines.append(f"time: {{column: {_text(time)}, unit: {_time_unit(time)}}}")
+    for key in _KEYS:
+        found = chosen.get(key)
+        if found is None or (key == "current" and "torque" in chosen) or len(found.names) < count:
+            continue
+        unit = next((unit for word in found.words if (unit := _unit(key, word))), None)
+        written = _text(found.pattern) if len(found.names) == count else _list(found.names[:count])
+        lines.append(f"{key}: {{columns: {written}{f', unit: {_text(unit)}' if unit else ''}}}")
+    if any("{joint}" in line for line in lines) and joints is not None and not _counts_joints(chosen):
+        lines.append(f"joints: {_list(joints)}")
+    return "\n".join(lines) + "\n"
+
+
+def _groups(names: Sequence[str], joints: Sequence[str] | None) -> list[_Group]:
+    """Collects columns that differ by a joint's name or by one number that counts from 0 or 1."""
+    groups = []
+    if joints and len(joints) > 1:
+        patterns = dict.fromkeys(name.replace(joints[0], "{joint}") for name in names if joints[0] in name)
+        for pattern in patterns:
+            members = tuple(pattern.replace("{joint}", joint) for joint in joints)
+            if set(members) <= set(names):
+                groups.append(_Group(pattern=pattern, names=members, words=_words(pattern.replace("{joint}", " "))))
+    numbered: dict[str, dict[int, str]] = {}
+    for name in names:
+        for match in re.finditer(r"\d+", name):
+            if match[0] == str(int(match[0])):
+                pattern = f"{name[: match.start()]}{{}}{name[match.end() :]}"
+                numbered.setdefault(pattern, {})[int(match[0])] = name
+    for pattern, counted in numbered.items():
+        first = 0 if 0 in counted else 1
+        run: list[str] = []
+        while first + len(run) in counted:
+            run.append(counted[first + len(run)])
+        if run and (len(counted) > 1 or len(names) < 8):
+            key = "index" if first == 0 else "joint"
+            groups.append(_Group(pattern=pattern.replace("{}", f"{{{key}}}"), names=tuple(run), words=_words(pattern)))
+    return groups
+
+
+def _words(pattern: str) -> tuple[str, ...]:
+    spaced = re.sub(r"([a-z])([A-Z][a-z])", r"\1 \2", pattern)
+    return tuple(word.lower() for word in re.findall(r"[A-Za-z°]+", spaced))
+
+
+def _quantity(words: Sequence[str]) -> str | None:
+    for quantity, spellings in _WORDS.items():
+        if any(re.fullmatch(spellings, word) for word in words):
+            return quantity
+    return next((_UNITS[word][0] for word in words if word in _UNITS), None)
+
+
+def _rank(group: _Group) -> tuple[bool, int, int]:
+    """Measured before commanded, then more joints, then the shorter name."""
+    commanded = any(_COMMANDED.fullmatch(word) for word in group.words)
+    return commanded, -len(group.names), len(group.pattern)
+
+
+def _unit(key: str, word: str) -> str | None:
+    quantity, unit = _UNITS.get(word, (None, ""))
+    if quantity == "position" and key == "velocity" and unit in ("rad", "deg"):
+        return f"{unit}/s"
+    return unit if quantity == key else None
+
+
+def _time_unit(name: str) -> str:
+    words = re.findall(r"[a-z]+", name.lower())
+    return next((_TIME_UNITS[word] for word in reversed(words) if word in _TIME_UNITS), "s")
+
+
+def _counts_joints(chosen: dict[str, _Group]) -> bool:
+    """Whether {joint} stands for numbers."""
+    return all(re.search(r"\d", group.names[0]) for group in chosen.values() if "{joint}" in group.pattern)
+
+
+def _text(text: str) -> str:
+    return text if re.fullmatch(r"[A-Za-z_][A-Za-z0-9_/ .]*[A-Za-z0-9_]|[A-Za-z]", text) else json.dumps(text)
+
+
+def _list(names: Sequence[str]) -> str:
+    return "[" + ", ".join(_text(name) for name in names) + "]"

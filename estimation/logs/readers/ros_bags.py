@@ -1,0 +1,238 @@
+"""ROS bags: rosbag 1, rosbag 2 (SQLite or MCAP) and MCAP files with the state of joints, as tables."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass
+from functools import lru_cache
+from itertools import islice
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from estimation.logs.readers.joint_names import places
+from estimation.logs.ros_messages import MESSAGES, JointMessage, JointValues
+from estimation.logs.torque_source import TorqueSource
+from robots.common.errors import InputError
+from robots.common.tables.table import Column, Table
+
+_LOOKED_AT = 20
+"""Messages of each topic that are looked at: a topic may have several publishers, with joints of their own."""
+
+_TYPES = {message.kind: message for message in MESSAGES}
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Topic:
+    """A topic with joint states.
+
+    Attributes:
+        name: of the topic.
+        message: its type.
+        first: what its first message says, or one of the first that has the robot's joints.
+    """
+
+    name: str
+    message: JointMessage
+    first: JointValues
+
+
+def read_bag(path: Path, *, topic: str | None = None, joints: Sequence[str] | None = None) -> Table:
+    """Reads the joint states of a bag: the topic that has the robot's joints and their efforts.
+
+    Time is that of the messages, or that of the recording where they carry none. Joints are found by the messages'
+    names, not by their place.
+
+    Args:
+        path: a ``.bag``, ``.db3`` or ``.mcap`` file, or the folder of a rosbag 2.
+        topic: of the messages; needed where several topics carry states of these joints.
+        joints: names in the robot's order; without them the first message's names count in their own order, and
+            messages without names by place.
+
+    Returns:
+        Columns ``t, q1.., dq1.., tau1..`` as far as the messages carry them.
+
+    Raises:
+        InputError: rosbags is not installed, no bag, no joint states, or joints that the messages do not have.
+    """
+    try:
+        from rosbags.highlevel import AnyReader
+    except ImportError as error:
+        raise InputError(
+            "reading ROS bags needs the package rosbags, which is not installed",
+            file=path,
+            remedy="pip install 'robot-oed[ros]'",
+        ) from error
+    messages: list[tuple[float, JointValues]] = []
+    try:
+        with AnyReader([path], default_typestore=_typestore()) as reader:
+            chosen = _choose(path, reader, topic, joints)
+            for received, raw in _raw(reader, chosen.name, chosen.message):
+                values = chosen.message.values(_unpacked(reader, raw, chosen.message.kind))
+                messages.append((values.stamp if values.stamp else 1e-9 * received, values))
+    except InputError:
+        raise
+    # A damaged bag fails anywhere in the reader, which raises whatever comes up.
+    except Exception as error:
+        text = str(error).splitlines()
+        raise InputError(
+            f"the ROS bag cannot be read ({text[0] if text else type(error).__name__})",
+            file=path,
+            remedy="check it with `ros2 bag info`, or record it again",
+        ) from error
+    return _table(path, chosen, messages, joints)
+
+
+@lru_cache(maxsize=1)
+def _typestore() -> Any:
+    """The types of bags that hold no definitions: those of ROS 2, and the beginnings of messages known here."""
+    from rosbags.typesys import Stores, get_types_from_msg, get_typestore
+
+    store = get_typestore(Stores.ROS2_HUMBLE)
+    for message in MESSAGES:
+        if message.definition:
+            store.register(get_types_from_msg(message.definition, message.kind))
+    return store
+
+
+def _raw(reader: Any, topic: str, message: JointMessage) -> Iterator[tuple[int, bytes]]:
+    """Gives the messages of a topic, which may have several publishers."""
+    same = [c for c in reader.connections if (c.topic, c.msgtype) == (topic, message.kind)]
+    for _, received, raw in reader.messages(connections=same):
+        yield received, raw
+
+
+def _unpacked(reader: Any, raw: bytes, kind: str) -> Any:
+    """Reads a message; of one whose beginning only is known, that."""
+    if not reader.is2 or len(raw) < 4:
+        return reader.deserialize(raw, kind)
+    definition = reader.typestore.get_msgdef(kind)
+    unpack = definition.deserialize_cdr_le if raw[1] else definition.deserialize_cdr_be
+    return unpack(raw[4:], 0, definition.cls, reader.typestore)[0]
+
+
+def _choose(path: Path, reader: Any, topic: str | None, joints: Sequence[str] | None) -> _Topic:
+    """Finds the topic: with the robot's joints before others, with efforts before others, by type."""
+    candidates, unknown = [], []
+    for name, kind in sorted({(connection.topic, connection.msgtype) for connection in reader.connections}):
+        message = _TYPES.get(kind)
+        if message is None or topic not in (None, name):
+            continue
+        if kind not in reader.typestore.fielddefs:
+            unknown.append(kind)
+            continue
+        seen = [
+            message.values(_unpacked(reader, raw, kind)) for _, raw in islice(_raw(reader, name, message), _LOOKED_AT)
+        ]
+        if seen:
+            first = next((values for values in seen if _order_of(values, joints) is not None), seen[0])
+            candidates.append(_Topic(name=name, message=message, first=first))
+    if not candidates:
+        others = sorted({f"{c.topic} ({c.msgtype})" for c in reader.connections})
+        if unknown:
+            raise InputError(
+                f"the bag holds no definition of {unknown[0]}",
+                file=path,
+                remedy="record as MCAP (`ros2 bag record -s mcap`), or convert the bag where the type is installed",
+            )
+        raise InputError(
+            "no topics with joint states" if topic is None else f"no joint states in the topic {topic}",
+            file=path,
+            allowed=f"one of {', '.join(_TYPES)}; the bag has {', '.join(others) or 'no topics'}",
+        )
+    fitting = [c for c in candidates if _order_of(c.first, joints) is not None] or candidates
+    best = [c for c in fitting if len(c.first.effort)] or fitting
+    best = [c for c in best if c.message is best[0].message] if topic else _preferred(best)
+    names = sorted({candidate.name for candidate in best})
+    if len(names) > 1:
+        raise InputError(
+            f"{len(names)} topics with joint states: {', '.join(names)}",
+            file=path,
+            allowed=f"one {best[0].message.kind}",
+            remedy="choose one with `topic` in a mapping (--mapping)",
+        )
+    return best[0]
+
+
+def _preferred(candidates: Sequence[_Topic]) -> list[_Topic]:
+    for message in MESSAGES:
+        same = [candidate for candidate in candidates if candidate.message is message]
+        if same:
+            return same
+    return []
+
+
+def _order_of(values: JointValues, joints: Sequence[str] | None) -> list[int] | None:
+    """Where each wanted joint stands; None if the message is of other joints."""
+    if joints is None or not len(values.names):
+        count = len(values.position)
+        return list(range(count)) if joints is None or len(joints) == count else None
+    return _places(tuple(values.names), tuple(joints))
+
+
+@lru_cache(maxsize=16)
+def _places(found: tuple[str, ...], wanted: tuple[str, ...]) -> list[int] | None:
+    return places(found, wanted)
+
+
+def _table(
+    path: Path, topic: _Topic, messages: Iterable[tuple[float, JointValues]], joints: Sequence[str] | None
+) -> Table:
+    first = list(topic.first.names)
+    names = list(joints) if joints is not None else (first or None)
+    rows: dict[str, list[list[float]]] = {"q": [], "dq": [], "tau": []}
+    times: list[float] = []
+    for row, (time, values) in enumerate(messages, start=1):
+        _check(path, row, values, names)
+        order = _order_of(values, names)
+        if order is None:
+            continue  # a message of other joints, such as a gripper's
+        times.append(time)
+        for prefix, signal in (("q", values.position), ("dq", values.velocity), ("tau", values.effort)):
+            if len(signal) not in (0, len(values.position)):
+                raise InputError(
+                    f"{len(signal)} values for {len(values.position)} joints", file=path, column=prefix, row=row
+                )
+            rows[prefix].append([float(signal[place]) for place in order] if len(signal) else [])
+    if not times:
+        raise InputError(
+            f"no message has the joints {', '.join(names or ())}",
+            file=path,
+            allowed=f"names in the messages: {', '.join(first) or 'none'}",
+            remedy="list `joints` in a mapping (--mapping), in the robot's order"
+            + (f":\njoints: [{', '.join(first)}]" if first else ""),
+        )
+    columns: dict[str, Column] = {"t": np.array(times)}
+    for prefix, signals in rows.items():
+        lengths = {len(signal) for signal in signals}
+        if lengths == {0}:
+            continue
+        if len(lengths) > 1:
+            raise InputError("only some messages carry values", file=path, column=f"{prefix}1")
+        matrix = np.array(signals)
+        columns.update({f"{prefix}{joint + 1}": matrix[:, joint].copy() for joint in range(matrix.shape[1])})
+    source = TorqueSource(
+        format=f"{topic.message.kind} of {topic.name}",
+        columns=topic.message.field,
+        quantity=topic.message.quantity,
+        measured=topic.message.measured,
+        meaning=topic.message.meaning,
+    )
+    metadata: dict[str, Any] = {"joints": names or []}
+    if "tau1" in columns:
+        metadata["torque_source"] = source.to_dict()
+    else:
+        metadata["no_torque"] = f"the messages of {topic.name} carry no effort; record a topic that does"
+    return Table(columns=columns, metadata=metadata, path=path, first_row=1)
+
+
+def _check(path: Path, row: int, values: JointValues, wanted: Sequence[str] | None) -> None:
+    found, count = list(values.names), len(values.position)
+    if not found:
+        if wanted and len(wanted) != count:
+            raise InputError(f"{count} joints without names", file=path, row=row, allowed=f"{len(wanted)}")
+    elif len(found) != count:
+        raise InputError(f"{len(found)} names for {count} positions", file=path, row=row)
+    elif len(set(found)) < len(found):
+        raise InputError(f"a joint name appears twice: {', '.join(found)}", file=path, row=row)

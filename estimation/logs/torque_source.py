@@ -1,0 +1,51 @@
+"""Which columns of a recording became its torque, and what they mean to the program that wrote them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+
+@dataclass(frozen=True, kw_only=True)
+class TorqueSource:
+    """Where a log's torques or currents are from.
+
+    Attributes:
+        format: what was recognised, such as ``UR RTDE recording``.
+        columns: the columns or the message field, as a person writes them.
+        quantity: ``torque`` [N m], ``current`` [A], or ``effort`` where the format leaves it open.
+        measured: whether it was measured, and not commanded.
+        meaning: one clause for the report.
+        instead: what to do without the torque constants of the joints; for currents.
+    """
+
+    format: str
+    columns: str
+    quantity: Literal["torque", "current", "effort"]
+    measured: bool
+    meaning: str
+    instead: str | None = None
+
+    def to_dict(self) -> dict[str, object]:
+        """Gives plain values, for the metadata of a log."""
+        return {
+            "format": self.format,
+            "columns": self.columns,
+            "quantity": self.quantity,
+            "measured": self.measured,
+            "meaning": self.meaning,
+            "instead": self.instead,
+        }
+
+    def note(self, rows: int) -> dict[str, object]:
+        """Gives a note of the reader, which the check of the log reports.
+
+        Args:
+            rows: of the log.
+        """
+        return {
+            "name": "torque_source",
+            "text": f"read as {self.format}; its {self.quantity} is {self.columns}: {self.meaning}",
+            "action": "to use other columns, name them in a mapping (--mapping)",
+            "value": rows,
+        }

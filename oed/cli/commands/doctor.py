@@ -1,0 +1,21 @@
+"""``oed doctor``: what is installed, and what is missing."""
+
+from __future__ import annotations
+
+import typer
+
+from oed.cli.console import Console
+from oed.cli.options import JsonOption, QuietOption
+
+
+def doctor(json: JsonOption = False, quiet: QuietOption = False) -> None:
+    """Checks the installation: libraries, extras and what they bring, compiler.
+
+    Exit code 1 if a required library is missing or too old.
+    """
+    from oed.cli.first_steps.installation import installation, installation_text
+
+    found = installation()
+    Console(json=json, quiet=quiet).result(installation_text(found), found)
+    if found["problems"]:
+        raise typer.Exit(1)

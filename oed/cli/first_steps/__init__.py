@@ -1,0 +1,1 @@
+"""What the commands for a first look write: examples, the effects, the installation."""

@@ -1,0 +1,90 @@
+"""What the help of the commands says beyond the options: groups, and examples to copy."""
+
+from __future__ import annotations
+
+COMMANDS = {
+    "First steps": ("example", "robots", "robot", "effects", "doctor"),
+    "Experiments": ("design", "pareto", "retime", "campaign", "export"),
+    "Robot and virtual robot": ("stream", "record", "controller", "simulate"),
+    "Models": ("check", "identify", "thermal", "predict", "payload"),
+    "Diagnosis": ("diagnose", "monitor"),
+}
+"""Commands by purpose; those that are not listed come last."""
+
+OTHER = "Other commands"
+
+OPTIONS = {
+    "Robot": ("robot", "tip", "joints", "lock", "unlimited", "home"),
+    "Input": (
+        *(
+            "trajectory",
+            "log",
+            "without",
+            "held_out",
+            "before",
+            "own_clocks",
+            "mapping",
+            "torque_is",
+            "model",
+            "campaign_folder",
+        ),
+        *("payload", "gravity", "ambient", "plant", "after", "task", "design", "extension"),
+    ),
+    "Output": (
+        *("out", "force", "png", "json", "quiet", "urdf", "mjcf", "c_code", "to", "degrees", "positions_only", "bare"),
+        *("install_completion", "show_completion", "help", "version"),
+    ),
+}
+"""Options by purpose, by the names of the parameters; all others are settings of the method."""
+
+SETTINGS = "Settings"
+
+EXAMPLES = {
+    "design": (
+        "oed design --robot er3a --out experiment",
+        "oed design --robot arm.urdf --tip tool0 --criterion d --velocity-fraction 0.7 --out experiment",
+    ),
+    "pareto": ("oed pareto --robot er3a --criteria cond,d --points 5 --out pareto",),
+    "retime": ("oed retime experiment/trajectory.csv --method toppra --out retimed",),
+    "export": ("oed export experiment/trajectory.csv --degrees --positions-only --bare --out for_controller.csv",),
+    "campaign": ("oed campaign --robot er3a --design experiment --out campaign",),
+    "simulate": (
+        "oed simulate --trajectory experiment/trajectory.csv --out log.csv",
+        "oed simulate --trajectory experiment/trajectory.csv --plant plant.yaml --seed 1 --out log.csv",
+    ),
+    "identify": (
+        "oed identify --robot er3a --log log.csv --out model",
+        "oed identify --robot ur10 --log rtde_recording.csv bag_folder --method all --out model",
+    ),
+    "thermal": ("oed thermal --robot er3a --log logs --order auto --out thermal",),
+    "diagnose": ("oed diagnose --robot er3a --log log.csv --held-out held_out.csv --out diagnosed",),
+    "predict": ("oed predict --model model --log other.csv --out predicted.csv",),
+    "payload": (
+        "oed payload --robot ur10 --log with.csv --without without.csv --to urscript --out payload",
+        "oed payload --model model --log with.csv --to franka kuka --out payload",
+    ),
+    "example": ("oed example --out example",),
+    "robots": ("oed robots",),
+    "robot": ("oed robot show ur10", "oed robot show arm.urdf --tip tool0 --json"),
+    "effects": ("oed effects", "oed effects --json"),
+    "doctor": ("oed doctor",),
+}
+"""Command lines to copy, by command."""
+
+FIRST = (
+    "oed example                writes files to try the commands on, and the next three commands",
+    "oed COMMAND --help         options and examples of a command",
+    "oed --install-completion   completes commands and options in your shell",
+)
+"""Lines at the end of the help of ``oed``."""
+
+
+def group_of(groups: dict[str, tuple[str, ...]], name: str, other: str) -> str:
+    """Finds the group of a name.
+
+    Args:
+        groups: by title.
+        name: of a command or a parameter.
+        other: the title of those without a group.
+    """
+    return next((title for title, names in groups.items() if name in names), other)

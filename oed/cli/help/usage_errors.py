@@ -1,0 +1,52 @@
+"""What a wrong command line is answered with: one line in the form of all other errors."""
+
+from __future__ import annotations
+
+import re
+import sys
+from difflib import get_close_matches
+from typing import Any
+
+import typer
+
+# The parser's classes are not public in all versions of typer; those above its error of a bad value are the same.
+UsageError: type[Exception] = typer.BadParameter.__mro__[1]
+CommandLineError: type[Exception] = typer.BadParameter.__mro__[2]
+
+_COMMAND = re.compile(r"No such command '([^']*)'")
+_OPTION = re.compile(r"'(--?[\w-]+(?: / -\w)?)'")
+
+
+def usage_message(error: Any) -> str:
+    """Writes an error of the command line as one line, with the nearest right name and where to read on.
+
+    Args:
+        error: of the parser; it may have a context and the names that it knows.
+    """
+    context = getattr(error, "ctx", None)
+    first = sys.argv[1] if len(sys.argv) > 1 and not sys.argv[1].startswith("-") else ""
+    path = context.command_path if context is not None else f"oed {first}".strip()
+    text = " ".join(str(_problem(error, context)).split()).rstrip(".")
+    text = _OPTION.sub(r"\1", text[:1].lower() + text[1:])
+    text = re.sub(r", unable to parse.*", "", text.replace(": Input should be ", ": it must be "))
+    return f"{text}; see `{path} --help`"
+
+
+def _problem(error: Any, context: Any) -> str:
+    wrong = getattr(error, "option_name", None)
+    if wrong is not None and "such option" in str(error.message):
+        known = [] if context is None else [name for p in context.command.get_params(context) for name in p.opts]
+        return f"no option {wrong}" + _nearest(wrong, known)
+    command = _COMMAND.match(str(error.message))
+    if command is not None:
+        known = [] if context is None else list(context.command.commands)
+        return f"no command {command[1]}" + (_nearest(command[1], known) or f"; allowed: {', '.join(known)}")
+    return str(error.format_message())
+
+
+def _nearest(wrong: str, known: list[str]) -> str:
+    """Says which known name was probably meant; nothing where none is near."""
+    close = get_close_matches(wrong.lower(), known, n=1, cutoff=0.66)
+    if not close:
+        close = [name for name in known if name.lstrip("-").startswith(wrong.lstrip("-").lower())][:1]
+    return f"; did you mean {close[0]}?" if close else ""

@@ -1,0 +1,283 @@
+"""Each type of ROS message with joint states is read from bags, with and without its definition in the bag."""
+
+import numpy as np
+import pytest
+
+from estimation.logs import LogMapping, read_log
+from estimation.logs.ros_messages import MESSAGES
+from robots.common.errors import InputError
+from tests.estimation.logs.recordings import T, motion
+
+pytest.importorskip("rosbags", reason="rosbags is not installed")
+
+pytestmark = pytest.mark.slow
+
+NAMES = [f"panda_joint{joint}" for joint in range(1, 8)]
+ORDER = [4, 2, 0, 6, 1, 5, 3]
+Q, DQ, TAU = motion(7)
+
+JOINT_STATE = "sensor_msgs/msg/JointState"
+DEFINITIONS = {
+    "control_msgs/msg/JointTrajectoryControllerState": [
+        "std_msgs/Header header\nstring[] joint_names\n"
+        "trajectory_msgs/JointTrajectoryPoint desired\ntrajectory_msgs/JointTrajectoryPoint actual\n"
+        "trajectory_msgs/JointTrajectoryPoint error\n",
+        "std_msgs/Header header\nstring[] joint_names\n"
+        "trajectory_msgs/JointTrajectoryPoint reference\ntrajectory_msgs/JointTrajectoryPoint feedback\n"
+        "trajectory_msgs/JointTrajectoryPoint error\ntrajectory_msgs/JointTrajectoryPoint output\n",
+    ],
+    # The fields up to the torques, and some of those behind them.
+    "franka_msgs/msg/FrankaRobotState": [
+        "std_msgs/Header header\nfranka_msgs/CollisionIndicators collision_indicators\n"
+        "sensor_msgs/JointState measured_joint_state\nsensor_msgs/JointState desired_joint_state\n"
+        "float64[7] dtau_j\nfloat64 time\n"
+        + "=" * 80
+        + "\nMSG: franka_msgs/CollisionIndicators\n"
+        + "".join(
+            f"geometry_msgs/Vector3 is_cartesian_{name}\n"
+            for name in ("linear_collision", "angular_collision", "linear_contact", "angular_contact")
+        )
+        + "float64[7] is_joint_collision\nfloat64[7] is_joint_contact\n"
+    ],
+    "franka_msgs/msg/FrankaState": [
+        "std_msgs/Header header\nfloat64[7] q\nfloat64[7] dq\nfloat64[7] tau_J\nfloat64[7] tau_ext_hat_filtered\n"
+    ],
+    "lbr_fri_idl/msg/LBRState": [
+        "float64 sample_time\nuint32 time_stamp_sec\nuint32 time_stamp_nano_sec\nfloat64[7] measured_joint_position\n"
+        "float64[7] commanded_joint_position\nfloat64[7] measured_torque\nfloat64[7] external_torque\n"
+    ],
+}
+
+
+class Bag:
+    """A bag of ROS 2 (SQLite, MCAP) or ROS 1, to which messages are added."""
+
+    def __init__(self, path, kind, definitions=(), *, names=NAMES):
+        from rosbags.rosbag1 import Writer as Writer1
+        from rosbags.rosbag2 import StoragePlugin
+        from rosbags.rosbag2 import Writer as Writer2
+        from rosbags.typesys import Stores, get_types_from_msg, get_typestore
+
+        self.path, self.kind, self.names = path, kind, list(names)
+        self.store = get_typestore(Stores.ROS1_NOETIC if kind == "bag" else Stores.ROS2_HUMBLE)
+        for name, text in definitions:
+            self.store.register(get_types_from_msg(text, name))
+        plugin = StoragePlugin.MCAP if kind == "mcap" else StoragePlugin.SQLITE3
+        self.writer = Writer1(path) if kind == "bag" else Writer2(path, version=9, storage_plugin=plugin)
+        self.writer.open()
+        self.connections = {}
+
+    def close(self, *, definitions=True):
+        """Ends the bag; ``definitions=False`` removes those of the types, as older versions of ROS 2 wrote it."""
+        self.writer.close()
+        if not definitions:
+            import sqlite3
+
+            with sqlite3.connect(next(self.path.glob("*.db3"))) as database:
+                database.execute("DELETE FROM message_definitions")
+        return self.path
+
+    def make(self, name, /, **fields):
+        return self.store.types[name](**fields)
+
+    def header(self, row):
+        stamp = self.make("builtin_interfaces/msg/Time", sec=1, nanosec=round(T[row] * 1e9))
+        return self.make(
+            "std_msgs/msg/Header", **({"seq": row} if self.kind == "bag" else {}), stamp=stamp, frame_id=""
+        )
+
+    def state(self, row, *, tau=TAU, names=None):
+        return self.make(
+            JOINT_STATE,
+            header=self.header(row),
+            name=[(names or self.names)[joint] for joint in ORDER],
+            position=Q[row, ORDER],
+            velocity=DQ[row, ORDER],
+            effort=TAU[row, ORDER] if tau is not None else np.array([]),
+        )
+
+    def point(self, row, *, right):
+        sign = 1.0 if right else -1.0
+        return self.make(
+            "trajectory_msgs/msg/JointTrajectoryPoint",
+            positions=sign * Q[row, ORDER],
+            velocities=sign * DQ[row, ORDER],
+            accelerations=np.array([]),
+            effort=sign * TAU[row, ORDER],
+            time_from_start=self.make("builtin_interfaces/msg/Duration", sec=0, nanosec=0),
+        )
+
+    def add(self, topic, name, row, message):
+        if topic not in self.connections:
+            self.connections[topic] = self.writer.add_connection(topic, name, typestore=self.store)
+        pack = self.store.serialize_ros1 if self.kind == "bag" else self.store.serialize_cdr
+        self.writer.write(self.connections[topic], 10**9 + round(T[row] * 1e9), pack(message, name))
+
+    def message(self, name, row):
+        """A message of any type of the family."""
+        if name == JOINT_STATE:
+            return self.state(row)
+        if name.startswith("control_msgs"):
+            fields = list(self.store.types[name].__dataclass_fields__)
+            points = {key: self.point(row, right=key in ("feedback", "actual")) for key in fields[2:6] if key[0] != "_"}
+            return self.make(
+                name, header=self.header(row), joint_names=[self.names[joint] for joint in ORDER], **points
+            )
+        if name.endswith("FrankaRobotState"):
+            zero = self.make("geometry_msgs/msg/Vector3", x=0.0, y=0.0, z=0.0)
+            flags = self.make("franka_msgs/msg/CollisionIndicators", **_indicators(zero))
+            return self.make(
+                name,
+                header=self.header(row),
+                collision_indicators=flags,
+                measured_joint_state=self.state(row),
+                desired_joint_state=self.state(row, tau=None),
+                dtau_j=np.zeros(7),
+                time=0.0,
+            )
+        if name.endswith("FrankaState"):
+            return self.make(
+                name, header=self.header(row), q=Q[row], dq=DQ[row], tau_J=TAU[row], tau_ext_hat_filtered=np.zeros(7)
+            )
+        return self.make(
+            name,
+            sample_time=0.004,
+            time_stamp_sec=1,
+            time_stamp_nano_sec=round(T[row] * 1e9),
+            measured_joint_position=Q[row],
+            commanded_joint_position=-Q[row],
+            measured_torque=TAU[row],
+            external_torque=np.zeros(7),
+        )
+
+
+def _indicators(zero):
+    vectors = ("linear_collision", "angular_collision", "linear_contact", "angular_contact")
+    return {f"is_cartesian_{name}": zero for name in vectors} | {
+        "is_joint_collision": np.zeros(7),
+        "is_joint_contact": np.zeros(7),
+    }
+
+
+def recorded(path, kind, name, definition=None, *, definitions=True):
+    bag = Bag(path, kind, [] if definition is None else [(name, definition)])
+    for row in range(len(T)):
+        bag.add("/state", name, row, bag.message(name, row))
+    return bag.close(definitions=definitions)
+
+
+CASES = [(JOINT_STATE, None), *((name, text) for name, texts in DEFINITIONS.items() for text in texts)]
+
+
+def is_the_motion(log, *, velocity=True):
+    np.testing.assert_allclose(log.t - 1.0, T, atol=1e-9)  # nanoseconds
+    np.testing.assert_array_equal(log.q, Q)
+    np.testing.assert_array_equal(log.tau, TAU)
+    if velocity:
+        np.testing.assert_array_equal(log.dq, DQ)
+
+
+@pytest.mark.parametrize(
+    ("kind", "name", "definition"),
+    [("mcap", *case) for case in CASES] + [("db3", *CASES[1]), ("bag", *CASES[1]), ("bag", *CASES[-2])],
+)
+def test_state_is_read_in_the_robots_order(tmp_path, kind, name, definition):
+    """Each type gives measured positions and torques of a bag's folder and of its file, by joint names."""
+    path = recorded(tmp_path / ("log.bag" if kind == "bag" else "log"), kind, name, definition)
+    for place in (path,) if kind == "bag" else (path, path / f"log.{kind}"):
+        log = read_log(place, 7, joints=NAMES)
+        is_the_motion(log, velocity="LBR" not in name)
+        assert log.metadata["torque_source"]["format"] == f"{name} of /state"
+        assert log.metadata["repairs"][0]["name"] == "torque_source"
+
+
+@pytest.mark.parametrize(("name", "definition"), CASES)
+def test_bag_without_definitions_is_read_where_versions_agree(tmp_path, name, definition):
+    """Older SQLite bags hold no definitions: known types are read, and for others the message says what to do."""
+    path = recorded(tmp_path / "log", "db3", name, definition, definitions=False)
+    if name in (JOINT_STATE, *(message.kind for message in MESSAGES if message.definition)):
+        is_the_motion(read_log(path, 7, joints=NAMES))
+        return
+    with pytest.raises(InputError, match=f"no definition of {name}") as caught:
+        read_log(path, 7, joints=NAMES)
+    assert "mcap" in caught.value.remedy
+
+
+def test_every_type_has_a_case():
+    """The family's contract covers all of its members."""
+    assert {name for name, _ in CASES} == {message.kind for message in MESSAGES}
+
+
+def test_topic_with_efforts_of_the_robots_joints_is_chosen(tmp_path):
+    """Of several topics, the one with the robot's joints and with efforts is read, without a mapping."""
+    bag = Bag(tmp_path / "log", "mcap", [(name, texts[0]) for name, texts in DEFINITIONS.items()])
+    for row in range(len(T)):
+        bag.add("/gripper/joint_states", JOINT_STATE, row, bag.state(row, names=[f"finger{j}" for j in range(7)]))
+        bag.add("/joint_states", JOINT_STATE, row, bag.state(row, tau=None))
+        name = "franka_msgs/msg/FrankaRobotState"
+        bag.add("/franka/state", name, row, bag.message(name, row))
+        name = "control_msgs/msg/JointTrajectoryControllerState"
+        bag.add("/controller/state", name, row, bag.message(name, row))
+    path = bag.close()
+    log = read_log(path, 7, joints=NAMES)
+    is_the_motion(log)
+    assert "/franka/state" in log.metadata["torque_source"]["format"]
+    log = read_log(path, 7, joints=NAMES, mapping=LogMapping(topic="/controller/state"))
+    is_the_motion(log)
+    assert "/controller/state" in log.metadata["torque_source"]["format"]
+    with pytest.raises(InputError, match="no joint states in the topic /other"):
+        read_log(path, 7, joints=NAMES, mapping=LogMapping(topic="/other"))
+
+
+def test_topics_that_cannot_be_told_apart_are_listed(tmp_path):
+    """Two topics with all joints and efforts need a choice."""
+    bag = Bag(tmp_path / "log", "db3")
+    for row in range(3):
+        for topic in ("/left/joint_states", "/right/joint_states"):
+            bag.add(topic, JOINT_STATE, row, bag.state(row))
+    path = bag.close()
+    with pytest.raises(InputError, match="/left/joint_states, /right/joint_states") as caught:
+        read_log(path, 7, joints=NAMES)
+    assert "topic" in caught.value.remedy
+
+
+def test_bag_without_joint_states_lists_its_topics(tmp_path):
+    """A bag of other messages is refused with what it has."""
+    bag = Bag(tmp_path / "log", "db3")
+    for row in range(3):
+        bag.add("/tick", "std_msgs/msg/Header", row, bag.header(row))
+    with pytest.raises(InputError, match="no topics with joint states") as caught:
+        read_log(bag.close(), 7, joints=NAMES)
+    assert "/tick (std_msgs/msg/Header)" in caught.value.allowed
+
+
+def test_message_with_other_lengths_is_named(tmp_path):
+    """A message whose names and positions do not match is refused with its number."""
+    bag = Bag(tmp_path / "log", "db3")
+    for row in range(4):
+        state = bag.state(row)
+        if row == 2:
+            state = bag.make(JOINT_STATE, **{**vars(state), "position": state.position[:-1]})
+        bag.add("/joint_states", JOINT_STATE, row, state)
+    with pytest.raises(InputError, match="7 names for 6 positions") as caught:
+        read_log(bag.close(), 7, joints=NAMES)
+    assert caught.value.row == 3
+
+
+def test_prefixes_of_joint_names_are_understood(tmp_path):
+    """A bag of fr3_joint1 to fr3_joint7 is one of panda_joint1 to panda_joint7."""
+    bag = Bag(tmp_path / "log", "db3", names=[f"fr3_joint{joint}" for joint in range(1, 8)])
+    for row in range(len(T)):
+        bag.add("/joint_states", JOINT_STATE, row, bag.state(row))
+    is_the_motion(read_log(bag.close(), 7, joints=NAMES))
+
+
+def test_torque_without_effort_says_so(tmp_path):
+    """Joint states without effort are refused with the topic's name."""
+    bag = Bag(tmp_path / "log", "db3")
+    for row in range(3):
+        bag.add("/joint_states", JOINT_STATE, row, bag.state(row, tau=None))
+    path = bag.close()
+    with pytest.raises(InputError, match="neither tau1") as caught:
+        read_log(path, 7, joints=NAMES)
+    assert "/joint_states" in caught.value.remedy
