@@ -39,8 +39,8 @@ def load_robot(
     """Load a robot.
 
     Args:
-        spec: a catalogue name, the path of a ``.urdf``, of a ``.xacro`` (arguments may follow: ``FILE NAME:=VALUE``), of
-            an MJCF (``.xml``), or of a robot's ``.yaml``, or a robot, which is returned.
+        spec: a catalogue name, the path of a ``.urdf``, of a ``.xacro`` (arguments may follow: ``FILE NAME:=VALUE``),
+            of an MJCF (``.xml``), or of a robot's ``.yaml``, or a robot, which is returned.
         tip: of a URDF or MJCF, the link, body or site at which the chain ends.
         joints: of a URDF or MJCF, the moving joints in the chain's order.
         locked: of a URDF or MJCF, positions of locked joints [rad or m].
@@ -94,7 +94,9 @@ def _robot_file(spec: str | Path) -> Path:
         return path
     if text and path.exists():
         raise InputError(
-            "the file name does not end like that of a robot file", file=text, allowed=".urdf, .xacro, .xml (MJCF), .yaml or .yml"
+            "the file name does not end like that of a robot file",
+            file=text,
+            allowed=".urdf, .xacro, .xml (MJCF), .yaml or .yml",
         )
     close = get_close_matches(text.lower(), catalogue(), n=1, cutoff=0.4)
     raise InputError(

@@ -137,8 +137,8 @@ class UrdfTree:
         Args:
             tip: the link at which the chain ends; also the flange.
             joints: the moving joints, in the chain's order; those between that are not named are locked.
-            locked: positions of locked joints [rad or m]; its `rest` where not stated. A joint that mimics another one follows
-                that one's locked position.
+            locked: positions of locked joints [rad or m]; its `rest` where not stated. A joint that mimics another one
+                follows that one's locked position.
 
         Returns:
             The chain, its limits (infinite where the file states none), and the inertial parameters of its n bodies

@@ -110,16 +110,12 @@ def _notes(taken: UrdfChain, unused: Sequence[str], friction: Array) -> list[str
         parts.append("no friction" if len(still) == len(taken.names) else f"no friction at {', '.join(still)}")
     free = [name for name, torque in zip(taken.names, taken.limits.torque, strict=True) if not np.isfinite(torque)]
     if free:
-        parts.append(
-            "no torque limits" if len(free) == len(taken.names) else f"no torque limits at {', '.join(free)}"
-        )
+        parts.append("no torque limits" if len(free) == len(taken.names) else f"no torque limits at {', '.join(free)}")
     notes.append(f"assumed, because the MJCF does not state it: {', '.join(parts)}")
     return notes
 
 
-def _digest(
-    digest: str, tip: str | None, joints: Sequence[str] | None, locked: Mapping[str, float] | None
-) -> str:
+def _digest(digest: str, tip: str | None, joints: Sequence[str] | None, locked: Mapping[str, float] | None) -> str:
     """A choice of joints makes another robot of the same file."""
     choice = [tip, list(joints or []), {name: float(value) for name, value in (locked or {}).items()}]
     return hashlib.sha256((digest + json.dumps(choice, sort_keys=True)).encode()).hexdigest()

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import tempfile
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -20,8 +20,10 @@ from robots.common.files import write_atomic
 from robots.mujoco_models.elements import MujocoNames
 from robots.mujoco_models.files import compile_mjcf, is_mjcf, mujoco_library
 from robots.robot import Robot
+from robots.signals import Log
 from robots.version import VERSION
 
+USUAL = 0.999  # share of the speeds; differences of noisy positions make larger ones
 ROUNDING = 1e-9  # relative; MuJoCo keeps what it reads in double precision
 
 
@@ -31,15 +33,17 @@ class Mjcf:
 
     Attributes:
         text: the file.
-        remarks: what it cannot state of the model, or states nearly.
+        stated: what it states of the model.
+        remarks: what it cannot state, or states nearly.
     """
 
     text: str
+    stated: tuple[str, ...]
     remarks: tuple[str, ...]
 
-    def summary(self) -> str:
-        """Writes the remarks, one a line; empty without any."""
-        return "\n".join(f"MJCF: {remark}" for remark in self.remarks)
+    def lines(self) -> list[str]:
+        """Writes what is stated and the remarks, one a line."""
+        return [f"the MJCF states {', '.join(self.stated)}", *(f"  {remark}" for remark in self.remarks)]
 
 
 def export_mjcf(
@@ -71,6 +75,21 @@ def export_mjcf(
     result = build_mjcf(model, robot, folder=path.parent, recorded=recorded)
     write_atomic(path, result.text, force=force)
     return result
+
+
+def recorded_ranges(logs: Sequence[Log]) -> dict[str, list[list[float]]]:
+    """Gives each joint's lowest and highest position and its usual largest speed, for `build_mjcf`.
+
+    Args:
+        logs: of one robot.
+    """
+    q = np.concatenate([log.q for log in logs])
+    dq = [np.gradient(log.q, log.t, axis=0) if log.dq is None else log.dq for log in logs]
+    fastest = np.nanquantile(np.abs(np.concatenate(dq)), USUAL, axis=0)
+    return {
+        "position": [np.nanmin(q, axis=0).tolist(), np.nanmax(q, axis=0).tolist()],
+        "velocity": [fastest.tolist()],
+    }
 
 
 def build_mjcf(
@@ -106,7 +125,7 @@ def build_mjcf(
     text = ElementTree.tostring(root, encoding="unicode") + "\n"
     if from_file:
         _confirm(text, contents, known, place)
-    return Mjcf(text=text, remarks=tuple(contents.remarks))
+    return Mjcf(text=text, stated=tuple(contents.stated), remarks=tuple(contents.remarks))
 
 
 def _comment(contents: Contents) -> str:
