@@ -84,7 +84,10 @@ def _include(parent: Element, folder: Path, sha: Any, opened: tuple[Path, ...]) 
         path = folder / child.get("file", "")
         if path.resolve() in opened:
             raise InputError("the file includes itself, directly or through other files", file=path)
-        part = _parsed(existing_file(path), sha)
+        if not path.is_file():
+            problem = f"it includes {child.get('file', '')!r}, which does not exist"
+            raise InputError(problem, file=opened[0], remedy=f"put it at {path}")
+        part = _parsed(path, sha)
         _include(part, folder, sha, (*opened, path.resolve()))
         parent.remove(child)
         for offset, element in enumerate(part):
