@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import hashlib
+import warnings
 from importlib import import_module
 from pathlib import Path
 from typing import Any, NamedTuple
 from xml.etree import ElementTree
 
-from robots.common.errors import InputError
+from robots.common.errors import AssumedValueWarning, InputError
 from robots.common.files import existing_file
 
 Element = ElementTree.Element
@@ -111,21 +112,29 @@ def mujoco_library(file: str | Path) -> Any:
         ) from error
 
 
-def compile_mjcf(path: Path) -> Any:
+def compile_mjcf(path: Path, *, warn: bool = True) -> Any:
     """Compiles an MJCF file.
 
     Args:
         path: the file.
+        warn: whether to pass on what MuJoCo warns of.
 
     Returns:
         The `mujoco.MjModel`.
 
     Raises:
         InputError: with MuJoCo's own words, when it refuses the file or is not installed.
+
+    Warns:
+        AssumedValueWarning: what MuJoCo warns of.
     """
     mujoco = mujoco_library(path)
+    heard: list[str] = []
+    before = mujoco.get_mju_user_warning()
+    # MuJoCo would write to the terminal and to a file in the working folder.
+    mujoco.set_mju_user_warning(heard.append)
     try:
-        return mujoco.MjModel.from_xml_path(str(path))
+        model = mujoco.MjModel.from_xml_path(str(path))
     except (ValueError, RuntimeError, mujoco.FatalError) as error:
         text = " ".join(str(error).split())
         missing = "opening" in text or "not found" in text
@@ -134,3 +143,8 @@ def compile_mjcf(path: Path) -> Any:
             file=path,
             remedy="put the meshes and textures that it names beside it" if missing else None,
         ) from error
+    finally:
+        mujoco.set_mju_user_warning(before)
+    for text in dict.fromkeys(heard if warn else ()):
+        warnings.warn(f"{path}: MuJoCo: {' '.join(text.split())}", AssumedValueWarning, stacklevel=2)
+    return model

@@ -78,7 +78,7 @@ def edited(contents: Contents, robot: Robot, folder: Path) -> Element:
 def _read(robot: Robot) -> _Source:
     path = Path(robot.origin)
     xml = read_xml(path)
-    model = compile_mjcf(path)
+    model = compile_mjcf(path, warn=False)
     names = MujocoNames(mujoco_library(path), model)
     elements = [element for world in xml.root.findall("worldbody") for element in _bodies(world)]
     hinges = [joint for body in elements for joint in _own(body, ("joint", "freejoint"))]
@@ -135,6 +135,8 @@ def _write_bodies(source: _Source, contents: Contents, robot: Robot, numbers: li
     if any(compiler.get("inertiafromgeom") == "true" for compiler in source.root.findall("compiler")):
         for body in source.bodies.values():
             _remove_inertial(body)
+    # Without it, bodies that stay as they are need the masses that it gave them.
+    scaled = any("settotalmass" in compiler.attrib for compiler in source.root.findall("compiler"))
     for compiler in source.root.findall("compiler"):
         for key in ("inertiafromgeom", "settotalmass", "balanceinertia"):
             compiler.attrib.pop(key, None)
@@ -148,6 +150,9 @@ def _write_bodies(source: _Source, contents: Contents, robot: Robot, numbers: li
         to_body = homogeneous(np.eye(3), np.array(model.jnt_pos[j]))
         element = _element(source.bodies, names.bodies[carrier], source.path, "body")
         _set_inertial(element, inertial(moved_body(to_body) @ own))
+        for b in {b for b, _ in others if scaled} - emptied:
+            stated = body_inertia(model, b, np.eye(4))
+            _set_inertial(_element(source.bodies, names.bodies[b], source.path, "body"), inertial(stated))
         for b in emptied:
             _set_inertial(_element(source.bodies, names.bodies[b], source.path, "body"), no_inertial())
         if i == robot.n - 1 and contents.payload is not None:

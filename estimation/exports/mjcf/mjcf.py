@@ -144,7 +144,7 @@ def _confirm(text: str, contents: Contents, robot: Robot, folder: Path) -> None:
     with tempfile.NamedTemporaryFile("w", dir=folder, prefix=".oed-", suffix=".xml", encoding="utf-8") as file:
         file.write(text)
         file.flush()
-        compiled = compile_mjcf(Path(file.name))
+        compiled = compile_mjcf(Path(file.name), warn=False)
         names = MujocoNames(mujoco_library(file.name), compiled)
     found = np.zeros_like(contents.inertia)
     index = {name: b for b, name in enumerate(names.bodies)}

@@ -1,9 +1,11 @@
 import sys
+from types import SimpleNamespace
 
 import pytest
 
 from robots import load_robot
-from robots.common.errors import InputError
+from robots.common.errors import AssumedValueWarning, InputError
+from robots.mujoco_models.files import compile_mjcf, mujoco_library
 from tests.robots.mujoco_models.arms import ARM, GANTRY
 
 
@@ -71,3 +73,29 @@ def test_without_the_package_the_extra_is_named(tmp_path, monkeypatch):
     """Who has no MuJoCo reads how to get it."""
     monkeypatch.setitem(sys.modules, "mujoco", None)
     assert "robot-oed[mujoco]" in message(tmp_path, GANTRY)
+
+
+def test_mujocos_warnings_are_ours(tmp_path, capfd):
+    """What MuJoCo warns of comes as a warning that names the file, and not on the terminal."""
+    path = tmp_path / "model.xml"
+    path.write_text(GANTRY)
+    library = mujoco_library(path)
+
+    class Loud:
+        @staticmethod
+        def from_xml_path(name):
+            model = library.MjModel.from_xml_path(name)
+            library.get_mju_user_warning()("a doubtful\nmodel")
+            return model
+
+    monkey = pytest.MonkeyPatch()
+    with monkey.context() as patch:
+        patch.setattr("robots.mujoco_models.files.mujoco_library", lambda file: _with(library, Loud))
+        with pytest.warns(AssumedValueWarning, match="MuJoCo: a doubtful model"):
+            compile_mjcf(path)
+    assert capfd.readouterr() == ("", "")
+
+
+def _with(library, loader):
+    names = ("get_mju_user_warning", "set_mju_user_warning", "FatalError")
+    return SimpleNamespace(MjModel=loader, **{name: getattr(library, name) for name in names})

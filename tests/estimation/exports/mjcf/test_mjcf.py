@@ -21,10 +21,13 @@ PARITY = 1e-9
 
 
 def made(robot, *, spread=0.1, offset=0.0, extensions=(), seed=1):
-    """A model of the robot whose parameters are off its description."""
+    """A model of the robot whose parameters are off its description; links are its first columns."""
     model = default_model(robot, friction="coulomb-viscous")
     rng = np.random.default_rng(seed)
-    standard = np.asarray(model.nominal) * (1.0 + spread * rng.uniform(-1.0, 1.0, model.size))
+    # One factor for each link, so that its body stays one that can exist.
+    links = np.repeat(rng.uniform(-1.0, 1.0, robot.n), 10)
+    factors = np.concatenate([links, rng.uniform(-1.0, 1.0, model.size - len(links))])
+    standard = np.asarray(model.nominal) * (1.0 + spread * factors)
     standard[[i for i, column in enumerate(model.columns) if column.term == "torque_offset"]] = offset
     base = find_base_parameters(model)
     values = base.from_standard(standard)
@@ -100,7 +103,7 @@ def test_everything_else_of_the_file_stays(tmp_path):
         assert {k: v for k, v in old.attrib.items() if k not in changed} == {
             k: v for k, v in new.attrib.items() if k not in changed
         }
-    finger = [joint for joint in after.iter("joint") if joint.get("name") == "grip"][0]
+    finger = next(joint for joint in after.iter("joint") if joint.get("name") == "grip")
     assert not changed & set(finger.attrib)
 
 
@@ -125,7 +128,7 @@ def test_a_curved_spring_is_stated_nearly(tmp_path):
     model = made(robot, extensions=[effect("spring", 2, (0.0, 0.0), [25.0, 0.0, 6.0, 0.0])])
     recorded = {"position": [[-0.5, -1.0], [0.5, 1.0]], "velocity": [[1.0, 2.0]]}
     written = build_mjcf(model, robot, recorded=recorded)
-    swing = [j for j in ElementTree.fromstring(written.text).iter("joint") if j.get("name") == "swing"][0]
+    swing = next(j for j in ElementTree.fromstring(written.text).iter("joint") if j.get("name") == "swing")
     q = np.linspace(-1.0, 1.0, 50)
     slope = np.polyfit(q, 25 * q + 6 * q**3, 1)[0]
     assert float(swing.get("stiffness")) == pytest.approx(slope)
