@@ -45,7 +45,7 @@ def standard_parameters(model: Model, inertia: Array | None = None) -> Array:
     if chosen is not None:
         return chosen[0]
     # Parameters grouped with a rotor's inertia stay with the link, because a URDF has no rotors.
-    grouping, values, _ = _grouping(model, known)
+    grouping, values, _ = rigid_grouping(model, known)
     return _nearest(grouping, values, known)
 
 
@@ -71,7 +71,7 @@ def standard_and_rotors(model: Model, inertia: Array, rotor_inertia: Array) -> t
     chosen = _chosen(model)
     if chosen is not None:
         return chosen
-    grouping, values, grouped = _grouping(model, inertia)
+    grouping, values, grouped = rigid_grouping(model, inertia)
     n = model.robot.n
     joints = [int(column.joint or 1) - 1 for column in model.torque_model.columns if column.term == "rotor_inertia"]
     found = np.zeros(n)
@@ -101,8 +101,19 @@ def _chosen(model: Model) -> tuple[Array, Array] | None:
     return values[[i for i, column in enumerate(columns) if column.term == "rigid_body"]].reshape(n, SIZE), rotors
 
 
-def _grouping(model: Model, described: Array) -> tuple[Array, Array, Array]:
-    """How links make up the rigid base parameters, their values, and how dependent rotor inertias enter."""
+def rigid_grouping(model: Model, described: Array) -> tuple[Array, Array, Array]:
+    """Gives how links make up the rigid base parameters, their values, and how rotor inertias enter.
+
+    Args:
+        model: an identified model.
+        described: the description (n, 10), which must be there.
+
+    Returns:
+        (b, 10 n), (b,) and (b, r) for the r rotors of the model.
+
+    Raises:
+        InputError: no description, or parameters that are not the robot's base parameters.
+    """
     torque_model = model.torque_model
     if not np.isfinite(described).all():
         raise InputError(
@@ -130,13 +141,7 @@ def _nearest(grouping: Array, values: Array, described: Array) -> Array:
     unit = np.maximum(np.abs(scaled).max(axis=1), np.finfo(float).tiny)
     program = ConicProgram(SIZE * n)
     program.equal(scaled / unit[:, None], -values / unit)
-    for link in range(n):
-        basis = np.zeros((SIZE * n, 4, 4))
-        place = slice(SIZE * link, SIZE * (link + 1))
-        # A congruence by mass and reach makes the units of the matrix one, and keeps its signs.
-        scale = np.array([1.0, 1.0, 1.0, spread[link, 1] / spread[link, 0]]) / np.sqrt(spread[link, 4])
-        basis[place] = BASIS * spread[link][:, None, None] * scale[:, None] * scale
-        program.semidefinite(basis, -MARGIN * np.eye(4))
+    semidefinite_bodies(program, spread, SIZE * n, MARGIN)
     try:
         found = program.solve(np.eye(SIZE * n), -start.reshape(-1), "standard parameters")
     except InfeasibleError as error:
@@ -149,3 +154,21 @@ def _nearest(grouping: Array, values: Array, described: Array) -> Array:
     if not (normalised_eigenvalues(standard) > 0).all():
         raise InfeasibleError("no physically possible bodies have the identified base parameters", remedy=REMEDY)
     return standard
+
+
+def semidefinite_bodies(program: ConicProgram, spread: Array, size: int, margin: float) -> None:
+    """Demands that the pseudo-inertias of all links are positive definite.
+
+    Args:
+        program: its first 10 n variables are the inertial parameters in units of `spread`.
+        spread: (n, 10) units, see `link_spreads`.
+        size: number of the program's variables.
+        margin: smallest eigenvalue, in units of the link's mass and reach.
+    """
+    for link in range(len(spread)):
+        basis = np.zeros((size, 4, 4))
+        place = slice(SIZE * link, SIZE * (link + 1))
+        # A congruence by mass and reach makes the units of the matrix one, and keeps its signs.
+        scale = np.array([1.0, 1.0, 1.0, spread[link, 1] / spread[link, 0]]) / np.sqrt(spread[link, 4])
+        basis[place] = BASIS * spread[link][:, None, None] * scale[:, None] * scale
+        program.semidefinite(basis, -margin * np.eye(4))

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
+from estimation.exports.feasible import nearest_feasible
 from estimation.exports.friction import LinearFriction, linear_friction
 from estimation.exports.mjcf.couplings import Coupling, coupling_of
 from estimation.exports.standard import REMEDY, standard_and_rotors
@@ -63,9 +64,16 @@ def contents_of(model: Model, robot: Robot) -> Contents:
 
     Raises:
         InputError: no description to complete the base parameters with.
-        InfeasibleError: no body that can exist has the identified base parameters.
+        InfeasibleError: no body that can exist is near to the identified base parameters.
     """
-    inertia, rotors = standard_and_rotors(model, np.asarray(robot.inertia), np.asarray(robot.rotor_inertia))
+    described = np.asarray(robot.inertia), np.asarray(robot.rotor_inertia)
+    moved = 0.0
+    try:
+        inertia, rotors = standard_and_rotors(model, *described)
+    except InfeasibleError:
+        # Noise makes the small inertias of a wrist negative; a simulator needs bodies all the same.
+        model, moved = nearest_feasible(model, *described)
+        inertia, rotors = standard_and_rotors(model, *described)
     if not (inertia[:, 0] > 0).all():
         raise InfeasibleError("a link's identified mass is not positive", remedy=REMEDY)
     friction, n = linear_friction(model), robot.n
@@ -78,6 +86,11 @@ def contents_of(model: Model, robot: Robot) -> Contents:
         springref=np.zeros(n),
         stated=["inertials", "armature"],
     )
+    if moved:
+        contents.remarks.append(
+            "no bodies that can exist have exactly the identified inertial parameters; those of the nearest ones "
+            f"differ by up to {moved:.2g} standard errors"
+        )
     contents.remarks += [
         f"armature of joint {name} is 0 instead of the identified {value:.2g}"
         for name, value in zip(robot.joint_names, rotors, strict=True)

@@ -214,9 +214,36 @@ def test_an_existing_file_and_impossible_bodies_are_refused(tmp_path):
     model = made(robot)
     with pytest.raises(InputError, match="exists"):
         export_mjcf(model, tmp_path / "original.xml", robot=robot)
-    negative = replace(model, values=-np.abs(model.values))
-    with pytest.raises(InfeasibleError):
-        build_mjcf(negative, robot)
+    # The hand and its finger together get half the finger's mass.
+    arm = file_of(tmp_path, ARM.replace('size="0.01 0.01 0.03"', 'size="0.1 0.1 0.1"'), tip="tool")
+    light = made(arm, spread=0.0)
+    standard = np.asarray(light.torque_model.nominal).copy()
+    standard[20:30] *= 0.5
+    light = replace(light, values=find_base_parameters(light.torque_model).from_standard(standard))
+    with pytest.raises(InfeasibleError, match="lighter than the bodies"):
+        build_mjcf(light, arm)
+
+
+def test_parameters_that_no_body_has_become_the_nearest_ones(tmp_path):
+    """Noise that makes a wrist's inertia negative moves parameters by some standard errors, and the file says so."""
+    robot = file_of(tmp_path, ARM, tip="tool")
+    model = made(robot)
+    base = find_base_parameters(model.torque_model)
+    name = next(i for i, formula in enumerate(model.formulas) if formula.startswith("Ixx_3"))
+    errors = np.full(len(model.values), 1e-3)
+    errors[name] = 0.02
+    values = model.values.copy()
+    values[name] = -0.02
+    noisy = replace(model, values=values, covariance=np.diag(errors**2))
+    written = export_mjcf(noisy, tmp_path / "corrected.xml", robot=robot)
+    said = next(remark for remark in written.remarks if "standard errors" in remark)
+    again = load_robot(tmp_path / "corrected.xml", tip="tool")
+    nominal = default_model(again, friction="coulomb-viscous")
+    found = base.from_standard(nominal.nominal)
+    moved = np.abs(found - values) / errors
+    assert moved[name] > 1.0
+    assert moved.max() < 3.0
+    assert f"{moved.max():.2g} standard errors" in said
 
 
 def test_the_models_torque_model_stays_what_it_is(tmp_path):
