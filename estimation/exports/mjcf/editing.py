@@ -28,6 +28,7 @@ Array = NDArray[np.float64]
 Element = ElementTree.Element
 
 STEPS = 2.0  # time constant of dry friction in time steps, the smallest that MuJoCo accepts
+SHARES = (1.0, 0.1, 1e-2, 1e-3, 1e-4, 1e-5, 1e-6)  # of bodies on locked joints, which cannot be without mass
 DEFAULT_SOLREF = (0.02, 1.0)
 
 
@@ -146,13 +147,16 @@ def _write_bodies(source: _Source, contents: Contents, robot: Robot, numbers: li
         others = [(index[p.name], p.pose) for p in robot.links if p.body == i + 1 and p.name in index]
         others = [(b, at) for b, at in others if b != carrier and model.body_mass[b] > 0.0]
         fixed = {b for b, _ in others if model.body_weldid[b] == model.body_weldid[carrier]}
-        own, emptied = _remainder(contents.inertia[i], model, others, fixed, robot.joint_names[i])
+        own, emptied, share = _remainder(contents.inertia[i], model, others, fixed, robot.joint_names[i])
         to_body = homogeneous(np.eye(3), np.array(model.jnt_pos[j]))
         element = _element(source.bodies, names.bodies[carrier], source.path, "body")
         _set_inertial(element, inertial(moved_body(to_body) @ own))
-        for b in {b for b, _ in others if scaled} - emptied:
-            stated = body_inertia(model, b, np.eye(4))
+        for b in {b for b, _ in others if scaled or share < 1.0} - emptied:
+            stated = share * body_inertia(model, b, np.eye(4))
             _set_inertial(_element(source.bodies, names.bodies[b], source.path, "body"), inertial(stated))
+        if share < 1.0:
+            listed = ", ".join(names.bodies[b] for b, _ in others if b not in emptied)
+            contents.remarks.append(f"{listed}: mass times {share:g}, because the identified link is too light for it")
         for b in emptied:
             _set_inertial(_element(source.bodies, names.bodies[b], source.path, "body"), no_inertial())
         if i == robot.n - 1 and contents.payload is not None:
@@ -161,17 +165,14 @@ def _write_bodies(source: _Source, contents: Contents, robot: Robot, numbers: li
 
 def _remainder(
     whole: Array, model: Any, others: list[tuple[int, Array]], fixed: set[int], joint: str
-) -> tuple[Array, set[int]]:
-    """What is left for a joint's own body, and which fixed bodies on it must give theirs to it."""
-    for emptied in (set[int](), fixed):
-        kept = [body_inertia(model, b, at) for b, at in others if b not in emptied]
+) -> tuple[Array, set[int], float]:
+    """What is left for a joint's own body, which fixed bodies must give it theirs, and what share locked ones keep."""
+    for emptied, share in ((set[int](), 1.0), *((fixed, share) for share in SHARES)):
+        kept = [share * body_inertia(model, b, at) for b, at in others if b not in emptied]
         own = whole - np.sum(kept, axis=0) if kept else whole
         if own[0] > 0.0 and (normalised_eigenvalues(own[None]) > 0).all():
-            return own, emptied
-    raise InfeasibleError(
-        "the identified link is lighter than the bodies that move on it",
-        remedy=f"reduce the masses of the bodies on locked joints of the link that {joint} moves, or {REMEDY}",
-    )
+            return own, emptied, share if kept else 1.0
+    raise InfeasibleError("the identified link is no body that can exist", remedy=f"{REMEDY} (joint {joint})")
 
 
 def body_inertia(model: Any, body: int, at: Array) -> Array:

@@ -10,7 +10,7 @@ from estimation.models.extension import Extension
 from estimation.models.model import Model
 from robots import load_robot
 from robots.base_parameters import find_base_parameters
-from robots.common.errors import InfeasibleError, InputError
+from robots.common.errors import InputError
 from robots.regressor import TorqueModel, default_model
 from tests.robots.mujoco_models.arms import ARM, GANTRY, inverse_dynamics, states
 
@@ -208,20 +208,25 @@ def test_meshes_are_found_from_another_folder(tmp_path):
     assert [path.name for path in other.iterdir()] == ["corrected.xml"]
 
 
-def test_an_existing_file_and_impossible_bodies_are_refused(tmp_path):
-    """An existing file is kept without force; a link lighter than what is locked on it is refused."""
+def test_an_existing_file_is_refused(tmp_path):
+    """An existing file is kept without force."""
     robot = file_of(tmp_path, GANTRY)
     model = made(robot)
     with pytest.raises(InputError, match="exists"):
         export_mjcf(model, tmp_path / "original.xml", robot=robot)
-    # The hand and its finger together get half the finger's mass.
+
+
+def test_a_link_lighter_than_what_is_locked_on_it(tmp_path):
+    """Bodies on locked joints lose mass where the identified link is too light for them, and the file says so."""
+    # The hand and its finger together get half their mass, less than the finger has.
     arm = file_of(tmp_path, ARM.replace('size="0.01 0.01 0.03"', 'size="0.1 0.1 0.1"'), tip="tool")
     light = made(arm, spread=0.0)
     standard = np.asarray(light.torque_model.nominal).copy()
     standard[20:30] *= 0.5
     light = replace(light, values=find_base_parameters(light.torque_model).from_standard(standard))
-    with pytest.raises(InfeasibleError, match="lighter than the bodies"):
-        build_mjcf(light, arm)
+    written = export_mjcf(light, tmp_path / "light.xml", robot=arm)
+    assert any(remark.startswith("finger: mass times 0.1") for remark in written.remarks)
+    agrees(tmp_path / "light.xml", light, arm)
 
 
 def test_parameters_that_no_body_has_become_the_nearest_ones(tmp_path):
