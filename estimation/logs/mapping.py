@@ -97,6 +97,8 @@ class LogMapping(Config):
         torque_constant: torque per current [N m/A]: of the motor where the currents' side is ``motor``, else at the
             joint.
         topic: of a ROS bag, where it holds several with joint states.
+        torque_is: what the torque columns hold, if not joint torques: ``current``, ``motor`` or ``without-gravity``; of
+            some joints only as ``motor:2,5``. It is converted by the robot's description.
     """
 
     time: Single | None = None
@@ -114,6 +116,7 @@ class LogMapping(Config):
     gear_ratio: list[float] | None = None
     torque_constant: list[float] | None = None
     topic: str | None = None
+    torque_is: str | None = None
 
 
 def read_mapping(path: str | PathLike[str]) -> LogMapping:

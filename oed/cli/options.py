@@ -57,6 +57,14 @@ WorkersOption = Annotated[
 ]
 OutOption = Annotated[Path, typer.Option("--out", help="Folder for the results.")]
 FrictionOption = Annotated[str, typer.Option("--friction", help="Friction model: polynomial or coulomb-viscous.")]
+FittedFrictionOption = Annotated[
+    str,
+    typer.Option(
+        "--friction",
+        help="Friction model: auto (bends within the recorded speeds, grows linearly beyond), polynomial or "
+        "coulomb-viscous.",
+    ),
+]
 FamilyOption = Annotated[
     str, typer.Option("--family", help="Family of the optimised part: fourier, bspline or fourier-polynomial.")
 ]

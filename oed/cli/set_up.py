@@ -12,6 +12,7 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
+    from robots.robot import Robot
     from robots.signals import Log
 
 PayloadOption = Annotated[
@@ -46,6 +47,37 @@ GravityOption = Annotated[
         show_default=False,
     ),
 ]
+
+TorqueIsOption = Annotated[
+    str | None,
+    typer.Option(
+        "--torque-is",
+        help=(
+            "What the torque columns hold, if not joint torques: current, motor, or without-gravity. With joints if it "
+            "concerns some only: motor:2,5."
+        ),
+        show_default=False,
+    ),
+]
+
+
+def with_torque_meaning(robot: Robot, logs: Sequence[Log], torque_is: str | None) -> list[Log]:
+    """Converts torque columns of another meaning to joint torques, by the robot's description.
+
+    Args:
+        robot: of the logs.
+        logs: with their payloads and gravity vectors; a log without torque stays as it is.
+        torque_is: see `estimation.logs.torque_source.parse_meaning`; None for what the mapping states.
+
+    Raises:
+        InputError: an unknown meaning, or a description that lacks what is needed.
+    """
+    from estimation.logs.torque_source import parse_meaning
+    from estimation.regressions.torque_meanings import as_joint_torque
+
+    if torque_is is not None:
+        parse_meaning(torque_is, robot.n)
+    return [log if log.tau is None and log.current is None else as_joint_torque(robot, log, torque_is) for log in logs]
 
 
 def with_known_setup(logs: Sequence[Log], payloads: list[str] | None, gravities: list[str] | None) -> list[Log]:

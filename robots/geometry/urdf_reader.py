@@ -33,13 +33,13 @@ class UrdfReader:
         return InputError(prefix + problem, file=self.file, joint=self.joint, allowed=allowed, remedy=remedy)
 
     def child(self, parent: ElementTree.Element, tag: str) -> ElementTree.Element | None:
-        """Finds the child of a name, None if there is none.
+        """Finds the first child of a name, as other readers do; None if there is none.
 
         Raises:
-            InputError: two of them; which one counts is not defined.
+            InputError: two of them, except of a placement; which one counts is not defined.
         """
         found = parent.findall(tag)
-        if len(found) > 1:
+        if len(found) > 1 and tag != "origin":
             raise self.error(f"{len(found)} <{tag}> elements", allowed="one", remedy="remove the others")
         return found[0] if found else None
 

@@ -10,10 +10,12 @@ import typer
 
 from oed.cli.console import Console
 from oed.cli.options import (
+    FittedFrictionOption,
     ForceOption,
     JointsOption,
     JsonOption,
     LockOption,
+    MappingOption,
     MjcfOption,
     OutOption,
     PngOption,
@@ -23,7 +25,7 @@ from oed.cli.options import (
     TipOption,
     robot_from,
 )
-from oed.cli.set_up import GravityOption, PayloadOption, with_known_setup
+from oed.cli.set_up import GravityOption, PayloadOption, TorqueIsOption, with_known_setup, with_torque_meaning
 from robots.common.progress import Progress
 
 if TYPE_CHECKING:
@@ -48,8 +50,10 @@ def diagnose(
             show_default=False,
         ),
     ] = None,
+    mapping: MappingOption = None,
     payload: PayloadOption = None,
     gravity: GravityOption = None,
+    torque_is: TorqueIsOption = None,
     own_clocks: Annotated[
         bool,
         typer.Option(
@@ -57,9 +61,7 @@ def diagnose(
             help="Each log's time starts at its own zero. Logs are put one after the other, one minute apart.",
         ),
     ] = False,
-    friction: Annotated[
-        str, typer.Option(help="Friction of the base model: polynomial or coulomb-viscous.")
-    ] = "polynomial",
+    friction: FittedFrictionOption = "auto",
     limits: Annotated[
         bool,
         typer.Option(
@@ -110,10 +112,10 @@ def diagnose(
     with console.working() as progress:
         described = robot_from(robot, tip, joints, lock)
         if limits:
-            if log or held_out or payload or gravity or urdf or mjcf or not trajectory:
+            if log or held_out or mapping or payload or gravity or torque_is or urdf or mjcf or not trajectory:
                 raise typer.BadParameter(
-                    "--limits needs --trajectory; --log, --held-out, --payload, --gravity, --urdf and --mjcf do not "
-                    "apply",
+                    "--limits needs --trajectory; --log, --held-out, --mapping, --payload, --gravity, --torque-is, "
+                    "--urdf and --mjcf do not apply",
                     ctx=context,
                 )
             summary, data = _limits(described, trajectory, model, noise, out, force, progress)
@@ -123,7 +125,20 @@ def diagnose(
             known = (payload, gravity)
             models = (urdf, mjcf)
             summary, data = _diagnosis(
-                described, log, held_out or [], known, own_clocks, friction, seed, out, models, png, force, progress
+                described,
+                log,
+                held_out or [],
+                mapping,
+                known,
+                torque_is,
+                own_clocks,
+                friction,
+                seed,
+                out,
+                models,
+                png,
+                force,
+                progress,
             )
     console.result(f"{summary}\nwritten to {out.resolve()}", data)
 
@@ -218,7 +233,9 @@ def _diagnosis(
     robot: Robot,
     logs: list[Path],
     held_out: list[Path],
+    mapping: Path | None,
     known: tuple[list[str] | None, list[str] | None],
+    torque_is: str | None,
     own_clocks: bool,
     friction: str,
     seed: int,
@@ -242,10 +259,11 @@ def _diagnosis(
         # Opened before the work: an existing file ends the command early.
         streams = {path: files.enter_context(open_atomic(path, force=force)) for path in models if path}
         with ResultFolder(out, force, names=["diagnosis.json", "model.json", "report.html"]) as folder:
-            read = list(read_logs(logs, n=robot.n, kinds=robot.chain.kinds))
-            other = list(read_logs(held_out, n=robot.n, kinds=robot.chain.kinds)) if held_out else []
+            given = {"n": robot.n, "mapping": mapping, "joints": robot.joint_names, "kinds": robot.chain.kinds}
+            read = list(read_logs(logs, **given))
+            other = list(read_logs(held_out, **given)) if held_out else []
             # Held-out logs are numbered after the others.
-            both = with_known_setup([*read, *other], *known)
+            both = with_torque_meaning(robot, with_known_setup([*read, *other], *known), torque_is)
             if own_clocks:
                 both = on_one_clock(both)
             read, other = both[: len(read)], both[len(read) :]

@@ -24,7 +24,7 @@ from oed.cli.options import (
     numbers,
     robot_from,
 )
-from oed.cli.set_up import GravityOption, PayloadOption, with_known_setup
+from oed.cli.set_up import GravityOption, PayloadOption, TorqueIsOption, with_known_setup, with_torque_meaning
 
 if TYPE_CHECKING:
     import numpy as np
@@ -56,6 +56,7 @@ def payload(
     mapping: MappingOption = None,
     payload: PayloadOption = None,
     gravity: GravityOption = None,
+    torque_is: TorqueIsOption = None,
     frame: Annotated[
         str | None,
         typer.Option(
@@ -120,8 +121,9 @@ def payload(
                     f"a model of {known.robot.n} joints", allowed=f"{described.n}, as {described.name} has"
                 )
             options: dict[str, Any] = {"n": described.n, "mapping": mapping, "joints": described.joint_names}
+            options["kinds"] = described.chain.kinds
             loaded, free = read_logs(log, **options), read_logs(without, **options) if without else ()
-            logs = with_known_setup([*loaded, *free], payload, gravity)
+            logs = with_torque_meaning(described, with_known_setup([*loaded, *free], payload, gravity), torque_is)
             result = identify_payload(
                 logs[: len(loaded)],
                 robot=None if known is not None else described,

@@ -10,6 +10,7 @@ import typer
 
 from oed.cli.console import Console
 from oed.cli.options import (
+    FittedFrictionOption,
     ForceOption,
     JointsOption,
     JsonOption,
@@ -56,7 +57,7 @@ def thermal(
         float | None,
         typer.Option(help="Ambient temperature of logs that do not state it [degC].", show_default=False),
     ] = None,
-    friction: Annotated[str, typer.Option(help="Friction model: polynomial or coulomb-viscous.")] = "polynomial",
+    friction: FittedFrictionOption = "auto",
     seed: SeedOption = 0,
     out: OutOption = Path("thermal"),
     tip: TipOption = None,

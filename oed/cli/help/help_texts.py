@@ -46,11 +46,28 @@ EXAMPLES = {
     ),
     "pareto": ("oed pareto --robot er3a --criteria cond,d --points 5 --out pareto",),
     "retime": ("oed retime experiment/trajectory.csv --method toppra --out retimed",),
-    "export": ("oed export experiment/trajectory.csv --degrees --positions-only --bare --out for_controller.csv",),
+    "export": (
+        "oed export experiment/trajectory.csv --degrees --positions-only --bare --out for_controller.csv",
+        "oed export experiment/trajectory.csv --to ros-goal --out goal.yaml",
+        "oed export experiment/trajectory.csv --to urscript --period 0.008 --out excitation.script",
+    ),
+    "stream": (
+        "oed stream experiment/trajectory.csv --host 192.168.0.10 --dry-run",
+        "oed stream experiment/trajectory.csv --host 192.168.0.10 --log log.csv",
+    ),
+    "record": ("oed record --robot er3a --host 192.168.0.10 --log log.csv --duration 60",),
+    "controller": (
+        "oed controller --robot er3a --plant plant.yaml",
+        "oed controller --robot er3a --replies echo --lose 0.05 --double 0.05 --late 0.05",
+    ),
     "campaign": ("oed campaign --robot er3a --design experiment --out campaign",),
     "simulate": (
         "oed simulate --trajectory experiment/trajectory.csv --out log.csv",
         "oed simulate --trajectory experiment/trajectory.csv --plant plant.yaml --seed 1 --out log.csv",
+    ),
+    "check": (
+        "oed check log.csv --robot er3a",
+        "oed check logs --robot arm.urdf --torque-is current --json",
     ),
     "identify": (
         "oed identify --robot er3a --log log.csv --out model",

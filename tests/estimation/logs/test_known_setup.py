@@ -122,9 +122,10 @@ def test_identify_counts_gravity_and_payload_of_logs(upright: Robot, build: Buil
     assert all(joint.residual_rms < 0.05 for joint in estimate.joints)
     alone = identify(upright, build(0), friction="coulomb-viscous", offset=False)
     assert len(alone.model.values) == len(model.values) - 2
-    blind = identify(
-        upright, [build(0), replace(build(1, TILTED, MASS), gravity=None, payload=None)], friction="coulomb-viscous"
-    )
+    unstated = replace(build(1, TILTED, MASS), gravity=None, payload=None)
+    with pytest.raises(InputError, match=r"mounted otherwise .*--gravity 1="):
+        identify(upright, unstated, friction="coulomb-viscous")
+    blind = identify(upright, [build(0), unstated], friction="coulomb-viscous", check=False)
     assert max(joint.residual_rms for joint in blind.joints) > 1.0
 
 
