@@ -19,6 +19,7 @@ _EXPORTS = {
     "compare_methods": "estimation.predictions.method_table",
     "diagnose": "estimation.diagnosis",
     "export_c": "estimation.exports",
+    "export_mjcf": "estimation.exports",
     "export_urdf": "estimation.exports",
     "fit_campaign": "estimation.thermal",
     "fit_thermal": "estimation.thermal",

@@ -1,4 +1,4 @@
-"""Robots by catalogue name, from a URDF, or from a robot YAML file."""
+"""Robots by catalogue name, from a URDF, from an MJCF, or from a robot YAML file."""
 
 from __future__ import annotations
 
@@ -11,6 +11,8 @@ from robots.assembly import robot_from_urdf, robot_from_yaml
 from robots.common.errors import AssumedValueWarning, InputError
 from robots.common.files import existing_file
 from robots.geometry.xacro_ import is_description, split_arguments
+from robots.mujoco_models import is_mjcf, robot_from_mjcf
+from robots.mujoco_models.files import SUFFIXES as MJCF
 from robots.robot import Robot
 
 CATALOG = Path(__file__).parent / "catalog"
@@ -37,11 +39,11 @@ def load_robot(
     """Load a robot.
 
     Args:
-        spec: a catalogue name, the path of a ``.urdf``, of a ``.xacro`` (arguments may follow: ``FILE NAME:=VALUE``) or
-            of a robot's ``.yaml``, or a robot, which is returned.
-        tip: of a URDF, the link at which the chain ends.
-        joints: of a URDF, the moving joints in the chain's order.
-        locked: of a URDF, positions of locked joints [rad or m].
+        spec: a catalogue name, the path of a ``.urdf``, of a ``.xacro`` (arguments may follow: ``FILE NAME:=VALUE``),
+            of an MJCF (``.xml``), or of a robot's ``.yaml``, or a robot, which is returned.
+        tip: of a URDF or MJCF, the link, body or site at which the chain ends.
+        joints: of a URDF or MJCF, the moving joints in the chain's order.
+        locked: of a URDF or MJCF, positions of locked joints [rad or m].
         unlimited: of a URDF, whether revolute and prismatic joints may lack position limits. They are 0 by default in
             a URDF, which no experiment can be designed for.
 
@@ -66,6 +68,8 @@ def load_robot(
         path = _robot_file(spec)
         if is_description(path):
             robot = robot_from_urdf(path, tip, joints, locked, unlimited)
+        elif is_mjcf(path):
+            robot = robot_from_mjcf(path, tip, joints, locked, unlimited)
         else:
             robot = robot_from_yaml(path, str(path), tip, joints, locked, unlimited)
     if robot.origin not in _warned:
@@ -84,15 +88,19 @@ def _robot_file(spec: str | Path) -> Path:
     if is_description(text):
         existing_file(split_arguments(text)[0])
         return path
-    if path.suffix.lower() in (".yaml", ".yml"):
+    if path.suffix.lower() in (".yaml", ".yml", *MJCF):
         return existing_file(path)
+    if path.is_file() and is_mjcf(path):
+        return path
     if text and path.exists():
         raise InputError(
-            "the file name does not end like that of a robot file", file=text, allowed=".urdf, .xacro, .yaml or .yml"
+            "the file name does not end like that of a robot file",
+            file=text,
+            allowed=".urdf, .xacro, .xml (MJCF), .yaml or .yml",
         )
     close = get_close_matches(text.lower(), catalogue(), n=1, cutoff=0.4)
     raise InputError(
         f"unknown robot {text!r}",
-        allowed=f"{', '.join(catalogue())}, or the path of a .urdf, .xacro or .yaml file",
+        allowed=f"{', '.join(catalogue())}, or the path of a .urdf, .xacro, .xml (MJCF) or .yaml file",
         remedy=f"did you mean {close[0]!r}?" if close else None,
     )

@@ -1,7 +1,17 @@
-"""Exports of an identified model: an updated URDF, and C code for a controller."""
+"""Exports of an identified model: an updated URDF or MJCF, and C code for a controller."""
 
 from estimation.exports.c_code import c_code, export_c
+from estimation.exports.mjcf import build_mjcf, export_mjcf, recorded_ranges
 from estimation.exports.standard import standard_parameters
 from estimation.exports.urdf import export_urdf, urdf_text
 
-__all__ = ["c_code", "export_c", "export_urdf", "standard_parameters", "urdf_text"]
+__all__ = [
+    "build_mjcf",
+    "c_code",
+    "export_c",
+    "export_mjcf",
+    "export_urdf",
+    "recorded_ranges",
+    "standard_parameters",
+    "urdf_text",
+]

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -38,13 +40,81 @@ def standard_parameters(model: Model, inertia: Array | None = None) -> Array:
         InputError: no description to stay near to.
         InfeasibleError: no body that can exist has these base parameters.
     """
-    torque_model = model.torque_model
-    n = model.robot.n
-    rigid = [i for i, column in enumerate(torque_model.columns) if column.term == "rigid_body"]
-    chosen = model.provenance.get("standard_parameters")
+    known = np.asarray(model.robot.inertia if inertia is None else inertia, dtype=float)
+    chosen = _chosen(model)
     if chosen is not None:
-        return np.asarray(chosen, dtype=float)[rigid].reshape(n, SIZE)
-    described = np.asarray(model.robot.inertia if inertia is None else inertia, dtype=float)
+        return chosen[0]
+    # Parameters grouped with a rotor's inertia stay with the link, because a URDF has no rotors.
+    grouping, values, _ = rigid_grouping(model, known)
+    return _nearest(grouping, values, known)
+
+
+def standard_and_rotors(model: Model, inertia: Array, rotor_inertia: Array) -> tuple[Array, Array]:
+    """Gives inertial parameters of all links and rotor inertias that make the model's torque together.
+
+    A rotor's inertia that only occurs in sums with a link's stays as described, if bodies that can exist make up the
+    rest; otherwise the link gets it. See `standard_parameters` for the other choices.
+
+    Args:
+        model: an identified model.
+        inertia: the description to stay near to (n, 10).
+        rotor_inertia: the described rotor inertias at the joints (n,).
+
+    Returns:
+        (n, 10) parameters about the link frames, and (n,) rotor inertias at the joints; those are 0 in a model without
+        rotors, and may be negative where the data made them so.
+
+    Raises:
+        InputError: no description to stay near to.
+        InfeasibleError: no body that can exist has these base parameters.
+    """
+    chosen = _chosen(model)
+    if chosen is not None:
+        return chosen
+    grouping, values, grouped = rigid_grouping(model, inertia)
+    n = model.robot.n
+    joints = [int(column.joint or 1) - 1 for column in model.torque_model.columns if column.term == "rotor_inertia"]
+    found = np.zeros(n)
+    for column, value in zip(model.parameters, model.values, strict=True):
+        if column.term == "rotor_inertia" and column.joint is not None:
+            found[column.joint - 1] = value
+    open_ = [k for k, joint in enumerate(joints) if grouped[:, k].any() and rotor_inertia[joint] > 0.0]
+    if open_:
+        described = np.asarray([rotor_inertia[joints[k]] for k in open_], dtype=float)
+        with suppress(InfeasibleError):
+            links = _nearest(grouping, values - grouped[:, open_] @ described, inertia)
+            found[[joints[k] for k in open_]] = described
+            return links, found
+    return _nearest(grouping, values, inertia), found
+
+
+def _chosen(model: Model) -> tuple[Array, Array] | None:
+    """The standard parameters that the fit itself chose: links (n, 10), rotors (n,)."""
+    chosen = model.provenance.get("standard_parameters")
+    if chosen is None:
+        return None
+    values, n = np.asarray(chosen, dtype=float), model.robot.n
+    columns, rotors = model.torque_model.columns, np.zeros(n)
+    for column, value in zip(columns, values, strict=True):
+        if column.term == "rotor_inertia" and column.joint is not None:
+            rotors[column.joint - 1] = value
+    return values[[i for i, column in enumerate(columns) if column.term == "rigid_body"]].reshape(n, SIZE), rotors
+
+
+def rigid_grouping(model: Model, described: Array) -> tuple[Array, Array, Array]:
+    """Gives how links make up the rigid base parameters, their values, and how rotor inertias enter.
+
+    Args:
+        model: an identified model.
+        described: the description (n, 10), which must be there.
+
+    Returns:
+        (b, 10 n), (b,) and (b, r) for the r rotors of the model.
+
+    Raises:
+        InputError: no description, or parameters that are not the robot's base parameters.
+    """
+    torque_model = model.torque_model
     if not np.isfinite(described).all():
         raise InputError(
             (
@@ -57,9 +127,9 @@ def standard_parameters(model: Model, inertia: Array | None = None) -> Array:
     if base.independent != model.columns:
         raise InputError("the model's parameters are not the robot's base parameters", remedy="identify it again")
     own = [i for i, column in enumerate(base.columns) if column.term == "rigid_body"]
-    grouping = base.grouping[np.ix_(own, rigid)]
-    # Parameters grouped with a rotor's inertia stay with the link, because a URDF has no rotors.
-    return _nearest(grouping, model.values[own], described)
+    rigid = [i for i, column in enumerate(torque_model.columns) if column.term == "rigid_body"]
+    rotors = [i for i, column in enumerate(torque_model.columns) if column.term == "rotor_inertia"]
+    return base.grouping[np.ix_(own, rigid)], model.values[own], base.grouping[np.ix_(own, rotors)]
 
 
 def _nearest(grouping: Array, values: Array, described: Array) -> Array:
@@ -71,13 +141,7 @@ def _nearest(grouping: Array, values: Array, described: Array) -> Array:
     unit = np.maximum(np.abs(scaled).max(axis=1), np.finfo(float).tiny)
     program = ConicProgram(SIZE * n)
     program.equal(scaled / unit[:, None], -values / unit)
-    for link in range(n):
-        basis = np.zeros((SIZE * n, 4, 4))
-        place = slice(SIZE * link, SIZE * (link + 1))
-        # A congruence by mass and reach makes the units of the matrix one, and keeps its signs.
-        scale = np.array([1.0, 1.0, 1.0, spread[link, 1] / spread[link, 0]]) / np.sqrt(spread[link, 4])
-        basis[place] = BASIS * spread[link][:, None, None] * scale[:, None] * scale
-        program.semidefinite(basis, -MARGIN * np.eye(4))
+    semidefinite_bodies(program, spread, SIZE * n, MARGIN)
     try:
         found = program.solve(np.eye(SIZE * n), -start.reshape(-1), "standard parameters")
     except InfeasibleError as error:
@@ -90,3 +154,21 @@ def _nearest(grouping: Array, values: Array, described: Array) -> Array:
     if not (normalised_eigenvalues(standard) > 0).all():
         raise InfeasibleError("no physically possible bodies have the identified base parameters", remedy=REMEDY)
     return standard
+
+
+def semidefinite_bodies(program: ConicProgram, spread: Array, size: int, margin: float) -> None:
+    """Demands that the pseudo-inertias of all links are positive definite.
+
+    Args:
+        program: its first 10 n variables are the inertial parameters in units of `spread`.
+        spread: (n, 10) units, see `link_spreads`.
+        size: number of the program's variables.
+        margin: smallest eigenvalue, in units of the link's mass and reach.
+    """
+    for link in range(len(spread)):
+        basis = np.zeros((size, 4, 4))
+        place = slice(SIZE * link, SIZE * (link + 1))
+        # A congruence by mass and reach makes the units of the matrix one, and keeps its signs.
+        scale = np.array([1.0, 1.0, 1.0, spread[link, 1] / spread[link, 0]]) / np.sqrt(spread[link, 4])
+        basis[place] = BASIS * spread[link][:, None, None] * scale[:, None] * scale
+        program.semidefinite(basis, -margin * np.eye(4))

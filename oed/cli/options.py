@@ -12,15 +12,22 @@ from robots.common.errors import InputError
 if TYPE_CHECKING:
     from robots.robot import Robot
 
-ROBOT = "a catalogue name (er3a, ur10, panda), a URDF or xacro, or a robot YAML"
+ROBOT = "a catalogue name (er3a, ur10, panda), a URDF or xacro, an MJCF (MuJoCo), or a robot YAML"
 
 RobotOption = Annotated[str, typer.Option("--robot", help=f"The robot: {ROBOT}.", show_default=False)]
+MjcfOption = Annotated[
+    Path | None,
+    typer.Option("--mjcf", help="Also write a MuJoCo model (MJCF) with what was identified.", show_default=False),
+]
 TipOption = Annotated[
-    str | None, typer.Option("--tip", help="URDF with branches: the link at which the chain ends.", show_default=False)
+    str | None,
+    typer.Option("--tip", help="URDF or MJCF with branches: the link at which the chain ends.", show_default=False),
 ]
 JointsOption = Annotated[
     str | None,
-    typer.Option("--joints", help="URDF with branches: the joints of the chain, comma-separated.", show_default=False),
+    typer.Option(
+        "--joints", help="URDF or MJCF with branches: the joints of the chain, comma-separated.", show_default=False
+    ),
 ]
 LockOption = Annotated[
     list[str] | None,

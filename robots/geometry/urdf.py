@@ -42,20 +42,22 @@ class UrdfTree:
 
     Args:
         elements: what the file states.
+        kind: of the file, for messages.
 
     Raises:
         InputError: naming the link or joint, when they do not form one tree.
     """
 
-    def __init__(self, elements: UrdfElements) -> None:
+    def __init__(self, elements: UrdfElements, kind: str = "URDF") -> None:
         self.file = elements.file
+        self.kind = kind
         self.name = elements.name
         self.digest = elements.digest
         self.unused = elements.unused
         self.links: dict[str, UrdfLink] = {link.name: link for link in elements.links}
         self.joints: dict[str, UrdfJoint] = {joint.name: joint for joint in elements.joints}
         if not self.joints:
-            raise InputError("the URDF has no joint", file=self.file)
+            raise InputError(f"the {self.kind} has no joint", file=self.file)
         self._declare_world()
         self.parent_joint: dict[str, UrdfJoint] = {}
         self.child_joints: dict[str, list[UrdfJoint]] = {name: [] for name in self.links}
@@ -135,8 +137,8 @@ class UrdfTree:
         Args:
             tip: the link at which the chain ends; also the flange.
             joints: the moving joints, in the chain's order; those between that are not named are locked.
-            locked: positions of locked joints [rad or m]; 0 where not stated. A joint that mimics another one follows
-                that one's locked position.
+            locked: positions of locked joints [rad or m]; its `rest` where not stated. A joint that mimics another one
+                follows that one's locked position.
 
         Returns:
             The chain, its limits (infinite where the file states none), and the inertial parameters of its n bodies
@@ -206,7 +208,7 @@ class UrdfTree:
         if joint.name in selection.locked:
             return selection.locked[joint.name]
         if joint.mimic is None:
-            return 0.0
+            return joint.rest
         leader, multiplier, offset = joint.mimic
         if leader in seen or leader == joint.name:
             raise InputError("it mimics itself, directly or through other joints", file=self.file, joint=joint.name)

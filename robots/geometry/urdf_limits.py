@@ -181,7 +181,7 @@ def _wrong_units(limit: UrdfLimit, kind: Kind) -> list[str]:
     ends = max(abs(value) for value in limit.range(kind) or (0.0,))
     if ends > far:
         notes.append(f"position limits up to {ends:g} {unit} look like {meant}")
-    if limit.velocity is not None and fast < limit.velocity:
+    if limit.velocity is not None and fast < limit.velocity < np.inf:
         notes.append(f"a velocity limit of {limit.velocity:g} {unit}/s looks like {meant} per second")
     return notes
 

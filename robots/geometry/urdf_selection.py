@@ -16,6 +16,7 @@ _LISTED = 12  # a humanoid has dozens of tips; a longer list does not help
 
 class _Tree(Protocol):
     file: str
+    kind: str
     links: dict[str, UrdfLink]
     joints: dict[str, UrdfJoint]
 
@@ -160,7 +161,7 @@ def _only_one(tree: _Tree, locked: Mapping[str, float]) -> tuple[UrdfJoint, ...]
     lines = [f"{tip}: {', '.join(names)}" for names, tip in choices.items()]
     more = f" and {len(lines) - _LISTED} more" if len(lines) > _LISTED else ""
     raise InputError(
-        f"the URDF branches into {len(whole)} chains",
+        f"the {tree.kind} branches into {len(whole)} chains",
         file=tree.file,
         allowed="a tip link of these (tip: joints): " + "; ".join(lines[:_LISTED]) + more,
         remedy="choose by tip, by joints, or lock joints (locked)",

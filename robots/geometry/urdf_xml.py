@@ -53,6 +53,7 @@ class UrdfJoint:
     damping: float
     friction: float
     mimic: tuple[str, float, float] | None  # (joint, multiplier, offset)
+    rest: float = 0.0  # position of a locked joint for which none is stated [rad or m]
 
     @property
     def moves(self) -> bool:

@@ -33,7 +33,7 @@ def test_a_file_of_another_kind_is_refused(tmp_path):
     with pytest.raises(
         InputError,
         match=r"robot\.txt: the file name does not end like that of a robot file; "
-        r"allowed: \.urdf, \.xacro, \.yaml or \.yml",
+        r"allowed: \.urdf, \.xacro, \.xml \(MJCF\), \.yaml or \.yml",
     ):
         load_robot(path)
     with pytest.raises(InputError, match="the file name does not end like that of a robot file"):

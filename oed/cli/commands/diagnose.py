@@ -16,6 +16,7 @@ from oed.cli.options import (
     JsonOption,
     LockOption,
     MappingOption,
+    MjcfOption,
     OutOption,
     PngOption,
     QuietOption,
@@ -94,6 +95,7 @@ def diagnose(
             "--urdf", help="Also write a URDF with the extended model's bodies and friction.", show_default=False
         ),
     ] = None,
+    mjcf: MjcfOption = None,
     tip: TipOption = None,
     joints: JointsOption = None,
     lock: LockOption = None,
@@ -110,10 +112,10 @@ def diagnose(
     with console.working() as progress:
         described = robot_from(robot, tip, joints, lock)
         if limits:
-            if log or held_out or mapping or payload or gravity or torque_is or urdf or not trajectory:
+            if log or held_out or mapping or payload or gravity or torque_is or urdf or mjcf or not trajectory:
                 raise typer.BadParameter(
-                    "--limits needs --trajectory; --log, --held-out, --mapping, --payload, --gravity, --torque-is and "
-                    "--urdf do not apply",
+                    "--limits needs --trajectory; --log, --held-out, --mapping, --payload, --gravity, --torque-is, "
+                    "--urdf and --mjcf do not apply",
                     ctx=context,
                 )
             summary, data = _limits(described, trajectory, model, noise, out, force, progress)
@@ -121,6 +123,7 @@ def diagnose(
             if not log or trajectory or model:
                 raise typer.BadParameter("give --log, or --limits with --trajectory", ctx=context)
             known = (payload, gravity)
+            models = (urdf, mjcf)
             summary, data = _diagnosis(
                 described,
                 log,
@@ -132,7 +135,7 @@ def diagnose(
                 friction,
                 seed,
                 out,
-                urdf,
+                models,
                 png,
                 force,
                 progress,
@@ -237,41 +240,51 @@ def _diagnosis(
     friction: str,
     seed: int,
     out: Path,
-    urdf: Path | None,
+    models: tuple[Path | None, Path | None],
     png: bool,
     force: bool,
     progress: Progress,
 ) -> tuple[str, dict[str, Any]]:
-    """Diagnoses logs: diagnosis.json, model.json, report.html and the motions of the next experiment."""
+    """Diagnoses logs: diagnosis.json, model.json, report.html and the motions of the next experiment; URDF and MJCF."""
     from estimation import on_one_clock, read_logs
     from estimation.diagnosis.experiment_plans.experiment_motions import at_rate
     from estimation.diagnosis.pipeline import diagnose as run
-    from estimation.exports import urdf_text
+    from estimation.exports import build_mjcf, recorded_ranges, urdf_text
     from oed.exports import write_trajectory
     from oed.reports import save_diagnosis_report
     from robots.common.files import ResultFolder, open_atomic
 
+    urdf, mjcf = models
     with ExitStack() as files:
-        folder = files.enter_context(ResultFolder(out, force, names=["diagnosis.json", "model.json", "report.html"]))
-        stream = None if urdf is None else files.enter_context(open_atomic(urdf, force=force))
-        given = {"n": robot.n, "mapping": mapping, "joints": robot.joint_names, "kinds": robot.chain.kinds}
-        read = list(read_logs(logs, **given))
-        other = list(read_logs(held_out, **given)) if held_out else []
-        # Held-out logs are numbered after the others.
-        both = with_torque_meaning(robot, with_known_setup([*read, *other], *known), torque_is)
-        if own_clocks:
-            both = on_one_clock(both)
-        read, other = both[: len(read)], both[len(read) :]
-        result = run(robot, read, held_out=other or None, friction=friction, seed=seed, progress=progress)
-        result.save(folder.path("diagnosis.json").parent)
-        if stream is not None:
-            stream.write(urdf_text(result.model, robot).encode())
-        following = result.next_experiment
-        if following is not None:
-            for number, made in enumerate(following.motions, start=1):
-                path = folder.path(f"next_experiment_{number}.csv")
-                motion = at_rate(made, robot.period)
-                stated = {"robot": robot.name, "experiment": following.kind}
-                write_trajectory(path, motion, stated, kinds=robot.chain.kinds)
-        save_diagnosis_report(result, folder, png=png)
-    return result.summary(), result.to_dict()
+        # Opened before the work: an existing file ends the command early.
+        streams = {path: files.enter_context(open_atomic(path, force=force)) for path in models if path}
+        with ResultFolder(out, force, names=["diagnosis.json", "model.json", "report.html"]) as folder:
+            given = {"n": robot.n, "mapping": mapping, "joints": robot.joint_names, "kinds": robot.chain.kinds}
+            read = list(read_logs(logs, **given))
+            other = list(read_logs(held_out, **given)) if held_out else []
+            # Held-out logs are numbered after the others.
+            both = with_torque_meaning(robot, with_known_setup([*read, *other], *known), torque_is)
+            if own_clocks:
+                both = on_one_clock(both)
+            read, other = both[: len(read)], both[len(read) :]
+            result = run(robot, read, held_out=other or None, friction=friction, seed=seed, progress=progress)
+            result.save(folder.path("diagnosis.json").parent)
+            following = result.next_experiment
+            if following is not None:
+                for number, made in enumerate(following.motions, start=1):
+                    path = folder.path(f"next_experiment_{number}.csv")
+                    motion = at_rate(made, robot.period)
+                    stated = {"robot": robot.name, "experiment": following.kind}
+                    write_trajectory(path, motion, stated, kinds=robot.chain.kinds)
+            save_diagnosis_report(result, folder, png=png)
+        # The diagnosis is kept, even if no file can state its model.
+        lines, data = [result.summary()], result.to_dict()
+        if urdf is not None:
+            streams[urdf].write(urdf_text(result.model, robot).encode())
+        if mjcf is not None:
+            made_of = build_mjcf(result.model, robot, folder=mjcf.parent, recorded=recorded_ranges(both))
+            streams[mjcf].write(made_of.text.encode())
+            lines += made_of.lines()
+            data["mjcf"] = {"stated": list(made_of.stated), "remarks": list(made_of.remarks)}
+        lines += [f"written to {path.resolve()}" for path in models if path is not None]
+    return "\n".join(lines), data

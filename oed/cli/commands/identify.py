@@ -17,6 +17,7 @@ from oed.cli.options import (
     LockOption,
     LogOption,
     MappingOption,
+    MjcfOption,
     OutOption,
     PngOption,
     QuietOption,
@@ -62,6 +63,7 @@ def identify(
         Path | None,
         typer.Option("--urdf", help="Also write a URDF with identified bodies and friction.", show_default=False),
     ] = None,
+    mjcf: MjcfOption = None,
     c_code: Annotated[
         Path | None, typer.Option("--c-code", help="Also write C code for torque and gravity.", show_default=False)
     ] = None,
@@ -81,8 +83,8 @@ def identify(
     with console.working() as progress:
         from estimation import identify as run
         from estimation import read_logs
+        from estimation.exports import build_mjcf, urdf_text
         from estimation.exports import c_code as c_text
-        from estimation.exports import urdf_text
         from estimation.predictions.method_table import compare_methods
         from oed.reports import save_estimate_report
         from robots.common.files import ResultFolder, open_atomic
@@ -90,7 +92,9 @@ def identify(
         with ExitStack() as files:
             folder = files.enter_context(ResultFolder(out, force, names=["model.json", "report.html"]))
             # Opened before the work: an existing file ends the command early, and an error leaves no file behind.
-            streams = {path: files.enter_context(open_atomic(path, force=force)) for path in (urdf, c_code) if path}
+            streams = {
+                path: files.enter_context(open_atomic(path, force=force)) for path in (urdf, mjcf, c_code) if path
+            }
             described = robot_from(robot, tip, joints, lock)
             read = read_logs(
                 log, n=described.n, mapping=mapping, joints=described.joint_names, kinds=described.chain.kinds
@@ -111,6 +115,9 @@ def identify(
             save_estimate_report(result, folder, png=png, methods=table)
             if urdf is not None:
                 streams[urdf].write(urdf_text(result.model, described).encode())
+            written = None if mjcf is None else build_mjcf(result.model, described, folder=mjcf.parent)
+            if mjcf is not None and written is not None:
+                streams[mjcf].write(written.text.encode())
             if c_code is not None:
                 streams[c_code].write(c_text(result.model).encode())
     found = "\n".join(gate.summary() for gate in result.gates if gate.findings)
@@ -122,7 +129,8 @@ def identify(
                 *([table.summary()] if table else []),
                 result.summary(),
                 *([f"  below 3 standard errors: {', '.join(weak)}"] if weak else []),
-                *(f"written to {path.resolve()}" for path in (out, urdf, c_code) if path is not None),
+                *(written.lines() if written else ()),
+                *(f"written to {path.resolve()}" for path in (out, urdf, mjcf, c_code) if path is not None),
             ]
         ),
         {
@@ -130,6 +138,7 @@ def identify(
             "gate": [gate.to_dict() for gate in result.gates],
             "below_3_standard_errors": weak,
             "methods": table.to_dict() if table else None,
+            "mjcf": None if written is None else {"stated": list(written.stated), "remarks": list(written.remarks)},
         },
     )
 

@@ -1,0 +1,121 @@
+"""A robot from a MuJoCo model file."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from robots.common.errors import InputError
+from robots.geometry.chain import Chain
+from robots.geometry.urdf import UrdfChain, UrdfTree
+from robots.mujoco_models.actuators import added_by_actuators
+from robots.mujoco_models.elements import MujocoNames, read_model
+from robots.mujoco_models.files import compile_mjcf, mujoco_library, read_xml
+from robots.mujoco_models.unused import unused_parts
+from robots.robot import Robot
+
+Array = NDArray[np.float64]
+
+
+def robot_from_mjcf(
+    path: Path,
+    tip: str | None = None,
+    joints: Sequence[str] | None = None,
+    locked: Mapping[str, float] | None = None,
+    unlimited: bool = False,
+) -> Robot:
+    """Makes a robot of an MJCF file.
+
+    MuJoCo compiles it, so that defaults, inertias from geoms, and angles in degrees are as in a simulation. Friction
+    is ``frictionloss sign(dq) + damping dq``, and the rotor inertia is ``armature``.
+
+    Args:
+        path: the file.
+        tip: the body or site at which the chain ends.
+        joints: the moving joints, in the chain's order.
+        locked: positions of locked joints [rad or m]; ``ref`` where not stated.
+        unlimited: whether slide joints may lack a range.
+
+    Returns:
+        The robot; what the file does not state is unlimited or unknown, and its `notes` name it.
+
+    Raises:
+        InputError: naming the file and the body or joint; MuJoCo is not installed or refuses the file.
+    """
+    xml = read_xml(path)
+    library, model = mujoco_library(path), compile_mjcf(path)
+    names = MujocoNames(library, model)
+    unused = unused_parts(library, model, names)
+    name = xml.root.get("model") or path.stem
+    tree = UrdfTree(
+        read_model(library, model, file=str(path), name=name, digest=xml.digest, unused=unused), kind="MJCF"
+    )
+    taken = tree.chain(tip, joints, locked)
+    if taken.unlimited and not unlimited:
+        raise InputError(
+            "the slide joint has no range",
+            file=path,
+            joint=taken.unlimited[0],
+            remedy="state its range, or accept unlimited positions (--unlimited; in Python unlimited=True)",
+        )
+    number = {joint: j for j, joint in enumerate(names.joints)}
+    friction, armature = _drives(model, [number[joint] for joint in taken.names], str(path), taken.names)
+    disabled = int(library.mjtDisableBit.mjDSBL_GRAVITY) & int(model.opt.disableflags)
+    gravity = np.zeros(3) if disabled else np.array(model.opt.gravity)
+    chosen = tip is not None or joints is not None or bool(locked)
+    return Robot(
+        name=name,
+        chain=Chain(taken.chain.joints, gravity, taken.chain.tip),
+        limits=taken.limits,
+        inertia=taken.inertia,
+        rotor_inertia=armature,
+        friction=friction,
+        notes=tuple(_notes(taken, unused, friction)),
+        origin=str(path),
+        links=taken.links,
+        digest=_digest(xml.digest, tip, joints, locked) if chosen else xml.digest,
+    )
+
+
+def _drives(model: Any, numbers: Sequence[int], file: str, names: Sequence[str]) -> tuple[Array, Array]:
+    """Friction (n, 4) and rotor inertia (n,) at the joints."""
+    friction, armature = np.zeros((len(numbers), 4)), np.zeros(len(numbers))
+    for i, j in enumerate(numbers):
+        dof = int(model.jnt_dofadr[j])
+        inertia, damping = added_by_actuators(model, j)
+        friction[i, :2] = model.dof_frictionloss[dof], model.dof_damping[dof] + damping
+        if hasattr(model, "dof_dampingpoly"):
+            friction[i, 2:] = model.dof_dampingpoly[dof, :2]
+        armature[i] = model.dof_armature[dof] + inertia
+        if armature[i] < 0.0 or (friction[i, :2] < 0.0).any():
+            raise InputError(
+                "a negative armature, damping or frictionloss", file=file, joint=names[i], allowed="zero or more"
+            )
+    return friction, armature
+
+
+def _notes(taken: UrdfChain, unused: Sequence[str], friction: Array) -> list[str]:
+    notes = list(taken.notes)
+    if unused:
+        notes.append(f"not used from the MJCF: {'; '.join(unused)}")
+    parts = ["no velocity, acceleration and jerk limits", "a controller period of 4 ms"]
+    still = [name for name, row in zip(taken.names, friction, strict=True) if not row.any()]
+    if still:
+        parts.append("no friction" if len(still) == len(taken.names) else f"no friction at {', '.join(still)}")
+    free = [name for name, torque in zip(taken.names, taken.limits.torque, strict=True) if not np.isfinite(torque)]
+    if free:
+        parts.append("no torque limits" if len(free) == len(taken.names) else f"no torque limits at {', '.join(free)}")
+    notes.append(f"assumed, because the MJCF does not state it: {', '.join(parts)}")
+    return notes
+
+
+def _digest(digest: str, tip: str | None, joints: Sequence[str] | None, locked: Mapping[str, float] | None) -> str:
+    """A choice of joints makes another robot of the same file."""
+    choice = [tip, list(joints or []), {name: float(value) for name, value in (locked or {}).items()}]
+    return hashlib.sha256((digest + json.dumps(choice, sort_keys=True)).encode()).hexdigest()
