@@ -8,6 +8,7 @@ import typer
 
 from oed.cli.command import HELP
 from oed.cli.commands.campaign import campaign
+from oed.cli.commands.compare import compare
 from oed.cli.commands.design import design
 from oed.cli.commands.diagnose import diagnose
 from oed.cli.commands.doctor import doctor
@@ -33,6 +34,7 @@ FUNCTIONS = (
     thermal,
     diagnose,
     predict,
+    compare,
     example,
     effects,
     doctor,
