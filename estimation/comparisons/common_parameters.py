@@ -18,6 +18,12 @@ Array = NDArray[np.float64]
 
 # Places and directions of joints that differ by more than this [m, rad] make another robot.
 SAME_PLACE = 1e-3
+# What a model lacks biases the parameters alike where the motion is the same, and otherwise where it is not. Standard
+# errors do not hold that bias. Between other motions they are this many times larger (`benchmarks/comparison.py`).
+OTHER_MOTION = 3.0
+# Ranges of positions and speeds that agree within this share are of one motion; below the floor [rad, m, rad/s, m/s]
+# all do. Filtered speeds of one motion differ by a few per cent with the noise and the control loop.
+SAME_MOTION, SAME_MOTION_FLOOR = 0.05, 0.1
 # Speeds at which friction curves are fitted to each other, as shares of the largest.
 SHARES = np.linspace(0.02, 1.0, 60)
 
@@ -31,6 +37,7 @@ class CommonParameters:
         values: (k, b).
         covariances: (k, b, b).
         determined: (b,), where all runs determine the parameter.
+        same_motion: whether all runs recorded one motion.
         misfit: largest difference of a friction curve that was converted to the first model's basis, as a share of the
             friction level; 0 where all have the same basis.
     """
@@ -39,6 +46,7 @@ class CommonParameters:
     values: Array
     covariances: Array
     determined: NDArray[np.bool_]
+    same_motion: bool
     misfit: float
 
 
@@ -68,13 +76,25 @@ def common_parameters(runs: Sequence[Run], speeds: Array) -> CommonParameters:
     determined = np.array([all(run[name] for run in known) for name in first.names])
     # A parameter without variance was not estimated.
     determined &= (np.einsum("kii->ki", np.array(covariances)) > 0).all(axis=0)
+    same = is_same_motion(runs)
     return CommonParameters(
         columns=first.parameters,
         values=np.array(values),
-        covariances=np.array(covariances),
+        covariances=np.array(covariances) * (1.0 if same else OTHER_MOTION**2),
+        same_motion=same,
         determined=determined,
         misfit=misfit,
     )
+
+
+def is_same_motion(runs: Sequence[Run]) -> bool:
+    """Whether all runs recorded one motion, by the ranges of positions and speeds."""
+    recorded = [run.model.provenance.get("recorded") for run in runs]
+    if not all(recorded):
+        return False
+    ranges = [np.concatenate([np.ravel(known[key]) for key in ("position", "velocity")]) for known in recorded if known]
+    scale = np.maximum(np.abs(ranges[0]), SAME_MOTION_FLOOR)
+    return all(bool((np.abs(other - ranges[0]) <= SAME_MOTION * scale).all()) for other in ranges[1:])
 
 
 def require_comparable(runs: Sequence[Run]) -> None:
@@ -174,8 +194,17 @@ def friction_table(model: Model, names: Sequence[str], speeds: Array, shares: Ar
         speeds: of each joint (n,) [rad/s or m/s].
         shares: of the speeds (m,).
     """
-    index = [model.torque_model.names.index(name) for name in names]
-    return np.array([model.torque_model.friction_at(share * speeds)[index] for share in shares])
+    terms, n, m = model.torque_model, model.robot.n, len(shares)
+    index = [terms.names.index(name) for name in names]
+    friction = [place for place, i in enumerate(index) if terms.columns[i].friction]
+    found = np.zeros((m, len(names)))
+    if friction:
+        chosen = [index[place] for place in friction]
+        rest = np.zeros((n, m))
+        Y = terms.symbolic(chosen).map(m)(rest, np.outer(speeds, shares), rest).full().reshape(n, m, len(chosen))
+        joints = [terms.columns[i].joint - 1 for i in chosen]
+        found[:, friction] = Y[joints, :, range(len(chosen))].T
+    return found
 
 
 def _conversion(model: Model, first: Model, speeds: Array, pi: Array) -> tuple[Array, float]:

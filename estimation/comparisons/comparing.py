@@ -4,7 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from estimation.comparisons.common_parameters import common_parameters, require_comparable
+from estimation.comparisons.common_parameters import (
+    OTHER_MOTION,
+    CommonParameters,
+    common_parameters,
+    require_comparable,
+)
 from estimation.comparisons.differences import find_differences
 from estimation.comparisons.drift import find_drifts
 from estimation.comparisons.friction_changes import friction_changes
@@ -61,12 +66,17 @@ def compare(models: Sequence[Model | Run], *, alpha: float = FALSE_ALARMS) -> Mo
         friction=friction_changes(common, curves, alpha),
         drifts=find_drifts(common, curves, hours, alpha),
         merged=merged,
-        warnings=(*_warnings(runs, common.misfit), *merged.notes),
+        warnings=(*_warnings(runs, common), *merged.notes),
     )
 
 
-def _warnings(runs: Sequence[Run], misfit: float) -> list[str]:
-    found = []
+def _warnings(runs: Sequence[Run], common: CommonParameters) -> list[str]:
+    found, misfit = [], common.misfit
+    if not common.same_motion:
+        found.append(
+            f"The runs recorded different motions, which model errors bias differently. All standard errors are "
+            f"multiplied by {OTHER_MOTION:g}. Record the same motion in every run to find smaller differences."
+        )
     if misfit > MISFIT:
         found.append(
             f"The friction curves have different shapes; converted to that of {runs[0].label} they miss by up to "

@@ -63,7 +63,7 @@ class FrictionChange:
         if self.kind == "own":
             return f"{head}: {common}, {own}, significant: inspect this joint."
         if self.kind == "unequal":
-            return f"{head}: {common}, {own}, which unequal heating explains."
+            return f"{head}: {common}, {own}, which unequal heating may explain: compare runs of one temperature."
         return f"{head}: {common}, {own}, not significant."
 
     def to_dict(self, labels: Sequence[str]) -> dict[str, Any]:
@@ -113,7 +113,7 @@ def friction_changes(
             continue
         covariance = slope[used] @ common.covariances[0] @ slope[used].T
         covariance = covariance + other[used] @ common.covariances[run] @ other[used].T
-        joints = [curves[i].joint for i in used]
+        joints = [curves[i].joint for i in used.tolist()]
         found += _split((last - first)[used], covariance, joints, run, limit)
     return tuple(found)
 
@@ -132,10 +132,11 @@ def _split(change: Array, S: Array, joints: Sequence[int], run: int, limit: floa
         rest = [j for j in range(n) if not aside[j]]
         z = np.zeros(n)
         for j in rest:
-            own, _, scatter, _ = _against(change, S, j, [i for i in rest if i != j])
-            z[j] = abs(own) / scatter
+            own, noise, scatter, _ = _against(change, S, j, [i for i in rest if i != j])
+            # A joint that departs pulls the common change of the others along: they depart by less than it does.
+            z[j] = abs(own) / noise if abs(own) > limit * scatter else 0.0
         worst = int(np.argmax(z))
-        if z[worst] <= limit:
+        if z[worst] == 0:
             break
         aside[worst] = True
     found = []

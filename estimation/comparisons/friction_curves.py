@@ -18,8 +18,8 @@ SHARES = np.linspace(0.05, 1.0, 40)
 # Share of the largest speed at which the thesis follows friction over time (its Figs. 39 and 40).
 LEVEL_SHARE = 0.6
 POINTWISE_95 = 1.959964
-# Draws of the largest standardised deviation of a curve: they give its 95 % point to 1 %.
-DRAWS, BAND_SEED = 20_000, 0
+# Draws of the largest standardised deviation of a curve: they give its 95 % point to 2 %.
+DRAWS, BAND_SEED = 4000, 0
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -92,7 +92,7 @@ def between_run_variance(values: Array, variances: Array) -> Array:
 
 
 def _inverse(matrix: Array) -> Array:
-    return np.linalg.pinv((matrix + matrix.T) / 2, rcond=1e-12, hermitian=True)
+    return np.asarray(np.linalg.pinv((matrix + matrix.T) / 2, rcond=1e-12, hermitian=True), dtype=float)
 
 
 def _with_shared_prior(

@@ -178,8 +178,8 @@ class ModelComparison:
         for item in moving[:LISTED]:
             settled = "not settled" if item.settled is None else f"settled from {self.labels[item.settled]}"
             yield (
-                f"    {item.name:32} {item.slope:+.3g} ± {item.slope_error:.2g} {item.unit} per {per}; {settled}; first "
-                f"{item.percent:+.1f} % off the last"
+                f"    {item.name:32} {item.slope:+.3g} ± {item.slope_error:.2g} {item.unit} per {per}; {settled}; "
+                f"first {item.percent:+.1f} % off the last"
             )
 
     def to_frame(self) -> pd.DataFrame:

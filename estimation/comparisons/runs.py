@@ -118,11 +118,10 @@ def distinct_labels(files: Sequence[Path]) -> list[str]:
     parts = [list(stem.resolve().parts) for stem in stems]
     labels: list[str] = []
     for own in parts:
-        for length in range(1, len(own) + 1):
-            label = "/".join(own[-length:])
-            if sum("/".join(other[-length:]) == label for other in parts) == 1 or length == len(own):
-                break
-        labels.append(label)
+        candidates = ["/".join(own[-length:]) for length in range(1, len(own))]
+        alone = [c for i, c in enumerate(candidates, start=1) if sum("/".join(o[-i:]) == c for o in parts) == 1]
+        # A file that is given twice has no label of its own.
+        labels.append(alone[0] if alone else own[-1])
     return unique_labels(labels)
 
 

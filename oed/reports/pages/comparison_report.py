@@ -291,7 +291,7 @@ def _drift(comparison: ModelComparison) -> Table:
     return Table(
         headings=("quantity", f"trend per {per}", "standard error", "unit", "adjusted p", "settled from", "first [%]"),
         rows=tuple(rows),
-        caption="Settled: from this run on all stay within the noise of the last third. First: its distance from there.",
+        caption="Settled: from this run on all stay within the noise of the last third. First: distance from its mean.",
     )
 
 
