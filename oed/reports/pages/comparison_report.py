@@ -6,6 +6,14 @@ import numpy as np
 
 from estimation.comparisons import ModelComparison
 from estimation.comparisons.friction_changes import interval_of, percent_of
+from oed.reports.pages.comparison_tables import (
+    drift_table,
+    merged_table,
+    parameters_table,
+    parts_table,
+    runs_table,
+    whole_table,
+)
 from oed.reports.pictures.comparison_pictures import (
     course_picture,
     friction_difference_picture,
@@ -14,7 +22,7 @@ from oed.reports.pictures.comparison_pictures import (
 from oed.reports.rendering.page import Cell, Fact, Page, Section, Status, Table
 from oed.reports.rendering.picture import Picture
 from oed.reports.rendering.saving import footer, save_page
-from oed.reports.rendering.significant import NORMAL_95, significant, significant_error
+from oed.reports.rendering.significant import NORMAL_95
 from robots.common.files import ResultFolder
 
 # Curves in one panel, and panels of parameters over the runs.
@@ -52,7 +60,7 @@ def comparison_page(comparison: ModelComparison) -> Page:
         ),
         warnings=comparison.warnings,
         sections=(
-            Section(title="Runs", tables=(_runs(comparison),)),
+            Section(title="Runs", tables=(runs_table(comparison),)),
             Section(
                 title="Differences",
                 paragraphs=(
@@ -61,7 +69,7 @@ def comparison_page(comparison: ModelComparison) -> Page:
                     "family, p-values are adjusted by Holm's method, which needs no independence of the tests. The "
                     "prior that the models share makes differences rather too small: tests are conservative.",
                 ),
-                tables=(_whole(comparison), _parts(comparison), _parameters(comparison)),
+                tables=(whole_table(comparison), parts_table(comparison), parameters_table(comparison)),
             ),
             *_friction(comparison, last),
             *_courses(comparison),
@@ -72,97 +80,11 @@ def comparison_page(comparison: ModelComparison) -> Page:
                     "standard errors where runs differ by more than their errors. The pull of the prior, which all "
                     "runs share, is not averaged out. model.json holds this estimate for oed predict.",
                 ),
-                tables=(_merged(comparison),),
+                tables=(merged_table(comparison),),
                 folded=True,
             ),
         ),
         footer=footer(),
-    )
-
-
-def _runs(comparison: ModelComparison) -> Table:
-    rows: list[tuple[Cell, ...]] = []
-    for k, run in enumerate(comparison.runs):
-        warm = None if run.temperature is None else float(np.nanmean(run.temperature))
-        hours = None if comparison.hours is None else float(comparison.hours[k])
-        rows.append((run.label, run.date_text or "–", hours, warm, run.file or "–"))
-    return Table(headings=("run", "date (UTC)", "time [h]", "joints [degC]", "file"), rows=tuple(rows))
-
-
-def _whole(comparison: ModelComparison) -> Table:
-    rows = tuple(
-        (
-            "all together" if item.run is None else comparison.labels[item.run],
-            item.statistic,
-            item.dof,
-            f"{item.adjusted:.2g}",
-            item.adjusted < comparison.alpha,
-        )
-        for item in comparison.differences
-        if item.level == "whole"
-    )
-    return Table(
-        headings=("run", "chi-square", "degrees of freedom", "adjusted p", "significant"),
-        rows=rows,
-        caption=f"Whole model against {comparison.labels[0]}.",
-    )
-
-
-def _parts(comparison: ModelComparison) -> Table:
-    names = dict.fromkeys(item.name for item in comparison.differences if item.level == "part")
-    runs = range(1, len(comparison.runs))
-    found = {(i.name, i.run): i for i in comparison.differences if i.level == "part"}
-    rows: list[tuple[Cell, ...]] = []
-    for name in names:
-        cells = [found[name, run] for run in runs]
-        rows.append((name, *(f"{i.adjusted:.2g}{' *' if i.adjusted < comparison.alpha else ''}" for i in cells)))
-    return Table(
-        headings=("part", *comparison.labels[1:]),
-        rows=tuple(rows),
-        caption=f"Adjusted p-values of each part against {comparison.labels[0]}. * is significant.",
-    )
-
-
-def _parameters(comparison: ModelComparison) -> Table:
-    last = len(comparison.runs) - 1
-    rows: list[tuple[Cell, ...]] = []
-    index = {column.name: i for i, column in enumerate(comparison.common.columns)}
-    for item in comparison.of_run(last, "parameter"):
-        i = index[item.name]
-        values = [
-            significant(float(comparison.common.values[k, i]), float(np.sqrt(comparison.common.covariances[k, i, i])))
-            for k in (0, last)
-        ]
-        percent = "–" if not np.isfinite(item.percent) else f"{item.percent:+.2f}"
-        verdict = "yes" if item.adjusted < comparison.alpha else "no"
-        change = significant(item.change, item.error)
-        rows.append(
-            (
-                item.name,
-                *values,
-                change,
-                significant_error(item.error),
-                percent,
-                item.unit,
-                f"{item.adjusted:.2g}",
-                verdict,
-            )
-        )
-    return Table(
-        headings=(
-            "parameter",
-            comparison.labels[0],
-            comparison.labels[last],
-            "difference",
-            "standard error",
-            "difference [%]",
-            "unit",
-            "adjusted p",
-            "significant",
-        ),
-        rows=tuple(rows),
-        caption="Parameters that all runs determine.",
-        align=("left", *["right"] * 5, "left", "right", "left"),
     )
 
 
@@ -270,43 +192,5 @@ def _courses(comparison: ModelComparison) -> tuple[Section, ...]:
                 caption="Those that differ most, with 95 % intervals.",
             )
         )
-    tables = (_drift(comparison),) if comparison.drifts else ()
+    tables = (drift_table(comparison),) if comparison.drifts else ()
     return (Section(title="Course over the runs", pictures=tuple(pictures), tables=tables),) if pictures else ()
-
-
-def _drift(comparison: ModelComparison) -> Table:
-    rows: list[tuple[Cell, ...]] = [
-        (
-            item.name,
-            significant(item.slope, item.slope_error),
-            significant_error(item.slope_error),
-            item.unit,
-            f"{item.adjusted:.2g}",
-            "not settled" if item.settled is None else comparison.labels[item.settled],
-            f"{item.percent:+.2f}",
-        )
-        for item in comparison.drifts
-    ]
-    per = "hour" if comparison.hours is not None else "run"
-    return Table(
-        headings=("quantity", f"trend per {per}", "standard error", "unit", "adjusted p", "settled from", "first [%]"),
-        rows=tuple(rows),
-        caption="Settled: from this run on all stay within the noise of the last third. First: distance from its mean.",
-    )
-
-
-def _merged(comparison: ModelComparison) -> Table:
-    model = comparison.merged.model
-    rows: list[tuple[Cell, ...]] = [
-        (c.name, significant(float(v), float(e)), significant_error(float(e)), significant_error(float(s)), c.unit)
-        for c, v, e, s, known in zip(
-            model.parameters,
-            model.values,
-            model.standard_errors,
-            comparison.merged.scatter,
-            model.determined,
-            strict=True,
-        )
-        if known
-    ]
-    return Table(headings=("parameter", "value", "standard error", "scatter between runs", "unit"), rows=tuple(rows))

@@ -112,7 +112,7 @@ def test_other_motions_allow_for_model_errors(draw):
 
 
 def test_prior_makes_no_false_alarm(draw):
-    """A prior's pull that both runs share leaves differences smaller than stated: p-values are larger, never smaller."""
+    """A pull that both runs share leaves differences smaller than stated: p-values are larger, never smaller."""
     one, two = draw(60), draw(61)
     wide = [replace(model, covariance=4 * model.covariance) for model in (one, two)]
     narrow, conservative = compare([one, two]), compare(wide)

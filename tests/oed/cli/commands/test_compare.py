@@ -11,7 +11,6 @@ from estimation import identify, load_model
 from robots import load_robot
 from robots.plants import Sensors, nominal_plant, simulate
 from robots.signals import Motion
-from tests.oed import flat
 
 pytestmark = pytest.mark.slow
 
@@ -60,7 +59,7 @@ def test_merged_model_predicts(run, folder, tmp_path):
     log = folder / "2026-03-02" / "log.csv"
     done = run("predict", "--model", tmp_path / "out", "--log", log, "--out", tmp_path / "p.csv")
     assert done.code == 0
-    assert "tau1_lower" in (tmp_path / "p.csv").read_text().splitlines()[0]
+    assert "tau1_lower" in (tmp_path / "p.csv").read_text()
 
 
 def test_logs_are_identified_and_compared(run, folder, tmp_path):
@@ -85,6 +84,6 @@ def test_bad_input_is_refused_in_one_message(run, folder, tmp_path):
     ):
         done = run("compare", *arguments, *out)
         assert done.code == 2
-        assert message in flat(done.err)
+        assert message in " ".join(done.err.split())
         assert "Traceback" not in done.err
     assert not (tmp_path / "out").exists()
