@@ -55,7 +55,7 @@ def single_pendulum(folder: Path, _: Path) -> Given:
     """Four runs of a pendulum, one moved by hand and one that rings (DFKI)."""
     at = folder / "simple_pendulum_dfki"
     runs = [read_log(path) for path in sorted(at.glob("*.parquet"))]
-    return Given(load_robot(at / "simple_pendulum.urdf"), on_one_clock(runs))
+    return Given(load_robot(at / "simple_pendulum.urdf", unlimited=True), on_one_clock(runs))
 
 
 def double_pendulum(folder: Path, _: Path) -> Given:

@@ -5,20 +5,22 @@ from __future__ import annotations
 import hashlib
 import json
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from robots.common.config import read_config
 from robots.common.errors import InputError
-from robots.description import MOTOR_UNITS, UNITS, Bounds, Geometry, Pose, Range, RobotDescription, Values
-from robots.geometry.chain import Chain, homogeneous, rotation_from_rpy
+from robots.description import MOTOR_UNITS, Bounds, Geometry, Pose, Range, RobotDescription, Values
+from robots.description_notes import assumed_in_urdf, require_stops, urdf_notes
+from robots.geometry.chain import Chain, LinkPlace, homogeneous, rotation_from_rpy
 from robots.geometry.dh import DhRow, chain_from_dh, dh_frames
 from robots.geometry.inertia import SIZE, check_body, inertial_parameters, symmetric
 from robots.geometry.urdf import read_urdf
 from robots.limits import Limits
+from robots.per_joint import PerJoint
 from robots.robot import Robot
 
 Array = NDArray[np.float64]
@@ -26,7 +28,11 @@ Choice = tuple[str | None, Sequence[str] | None, Mapping[str, float] | None]  # 
 
 
 def robot_from_urdf(
-    path: Path, tip: str | None, joints: Sequence[str] | None, locked: Mapping[str, float] | None
+    path: Path,
+    tip: str | None,
+    joints: Sequence[str] | None,
+    locked: Mapping[str, float] | None,
+    unlimited: bool = False,
 ) -> Robot:
     """Make a robot of a URDF.
 
@@ -35,30 +41,41 @@ def robot_from_urdf(
         tip: the link at which the chain ends.
         joints: the moving joints, in the chain's order.
         locked: positions of locked joints [rad or m].
+        unlimited: whether joints may lack position limits.
 
     Returns:
-        The robot; what a URDF cannot state (acceleration, jerk, drives) is unlimited or unknown.
+        The robot; what the file does not state is unlimited or unknown, and its `notes` name it.
 
     Raises:
         InputError: naming the file and the link or joint.
     """
     tree = read_urdf(path)
-    chain, limits, inertia, names = tree.chain(tip, joints, locked)
+    taken = tree.chain(tip, joints, locked)
+    require_stops(taken.unlimited, unlimited, path)
+    friction = tree.friction(taken.names)
     chosen = tip is not None or joints is not None or bool(locked)
     return Robot(
         name=tree.name or path.stem,
-        chain=chain,
-        limits=limits,
-        inertia=inertia,
-        friction=tree.friction(names),
+        chain=taken.chain,
+        limits=taken.limits,
+        inertia=taken.inertia,
+        friction=friction,
+        notes=(*urdf_notes(taken, tree.unused), *assumed_in_urdf(taken, friction, tree.root)),
         origin=str(path),
+        urdf=str(path),
+        links=taken.links,
         # A choice of joints makes another robot of the same file; without one the digest is the file's own.
         digest=_digest(tree.digest, (tip, joints, locked)) if chosen else tree.digest,
     )
 
 
 def robot_from_yaml(
-    path: Path, origin: str, tip: str | None, joints: Sequence[str] | None, locked: Mapping[str, float] | None
+    path: Path,
+    origin: str,
+    tip: str | None,
+    joints: Sequence[str] | None,
+    locked: Mapping[str, float] | None,
+    unlimited: bool = False,
 ) -> Robot:
     """Make a robot of a robot YAML file.
 
@@ -68,6 +85,7 @@ def robot_from_yaml(
         tip: in place of the file's own choice, the link at which the chain ends; for a file that names a URDF.
         joints: likewise, the moving joints in the chain's order.
         locked: likewise, positions of locked joints [rad or m], added to the file's.
+        unlimited: whether joints of a URDF may lack position limits.
 
     Returns:
         The robot.
@@ -83,19 +101,27 @@ def robot_from_yaml(
             problem = "the robot is a Denavit-Hartenberg table, so tip, joints and locked do not apply"
             raise InputError(problem, file=path, remedy="remove tip, joints and locked")
         chain = _chain(text, text.geometry)
-        entries = _PerJoint(str(path), chain, chain.names)
+        entries = PerJoint(str(path), chain, chain.names)
         inertia, friction, limits = _inertia(text, text.geometry, str(path)), None, None
+        notes: tuple[str, ...] = ()
+        links: tuple[LinkPlace, ...] = ()
+        urdf = ""
         digest = _digest(content)
     else:
         tree = read_urdf(path.parent / (text.urdf or ""))
         own: Choice = (text.tip, text.joints, text.locked)
         choice = _override(text, tip, joints, locked) if chosen else own
-        chain, limits, inertia, names = tree.chain(*choice)
+        taken = tree.chain(*choice)
+        chain, limits, inertia, names = taken.chain, taken.limits, taken.inertia, taken.names
         if text.gravity is not None:
             chain = Chain(chain.joints, np.array(text.gravity), chain.tip)
-        entries = _PerJoint(str(path), chain, tree.chain(*own).names if chosen else names)
+        entries = PerJoint(str(path), chain, tree.chain(*own).names if chosen else names)
         friction = tree.friction(names)
         digest = _digest(content, tree.digest, *([choice] if chosen else []))
+        known = entries.names if text.limits.position is not None else ()
+        taken = taken._replace(unlimited=tuple(name for name in taken.unlimited if name not in known))
+        require_stops(taken.unlimited, unlimited, tree.file)
+        notes, links, urdf = urdf_notes(taken, tree.unused), taken.links, tree.file
     ratio, rotor, constant, speed = _drives(text, entries)
     return Robot(
         name=text.name,
@@ -110,7 +136,10 @@ def robot_from_yaml(
         motor_speed=speed,
         period=text.period,
         assumed=tuple(text.assumed()),
+        notes=notes,
         origin=origin,
+        urdf=urdf,
+        links=links,
         digest=digest,
         payload=None if text.payload is None else text.payload.value,
         ambient=None if text.ambient is None else (text.ambient.lowest, text.ambient.highest),
@@ -140,39 +169,6 @@ def _override(
     # Locking a joint that the file lists as moving takes it off that list.
     kept = None if text.joints is None else [name for name in text.joints if name not in (locked or {})]
     return text.tip, kept, both
-
-
-@dataclass(frozen=True)
-class _PerJoint:
-    """Places a file's lists, one entry a joint of its own choice, on the joints of the chain in use."""
-
-    file: str
-    chain: Chain
-    names: tuple[str, ...]
-
-    def place(self, values: Sequence[float], key: str, default: ArrayLike, scale: Array | float = 1.0) -> Array:
-        n = len(self.names)
-        if len(values) != n:
-            raise InputError(f"{len(values)} values", file=self.file, column=key, allowed=f"{n}, one per joint")
-        stated = dict(zip(self.names, np.asarray(values, dtype=np.float64) * scale, strict=True))
-        fallback = np.broadcast_to(np.asarray(default, dtype=np.float64), (self.chain.n,))
-        return np.array([stated.get(name, fallback[i]) for i, name in enumerate(self.chain.names)])
-
-    def scale(self, unit: str | list[str], key: str, quantity: str) -> Array:
-        n = len(self.names)
-        units = [unit] * n if isinstance(unit, str) else unit
-        if len(units) != n:
-            raise InputError(f"{len(units)} units", file=self.file, column=key, allowed=f"one, or {n}")
-        kinds = dict(zip(self.chain.names, self.chain.kinds, strict=True))
-        factors = []
-        for i, (name, text) in enumerate(zip(self.names, units, strict=True)):
-            kind = kinds.get(name)
-            suitable = [u for u, (_, k, q) in UNITS.items() if q == quantity and kind in (k, None)]
-            if text not in suitable:
-                problem, allowed = f"the unit {text!r} of a {quantity}", ", ".join(suitable)
-                raise InputError(problem, file=self.file, column=key, joint=i + 1, allowed=allowed)
-            factors.append(UNITS[text][0])
-        return np.array(factors)
 
 
 def _pose(pose: Pose | None) -> Array | None:
@@ -212,13 +208,13 @@ def _inertia(text: RobotDescription, geometry: Geometry, file: str) -> Array:
     return inertia
 
 
-def _limits(text: RobotDescription, entries: _PerJoint, known: Limits | None) -> Limits:
+def _limits(text: RobotDescription, entries: PerJoint, known: Limits | None) -> Limits:
     def default(quantity: str) -> ArrayLike:
         if known is not None:
             return getattr(known, quantity)
         return -np.inf if quantity == "lower" else np.inf
 
-    bounds: dict[str, Array] = {}
+    bounds: dict[str, Any] = {}
     position: Range | None = text.limits.position
     for quantity in ("lower", "upper"):
         if position is None:
@@ -247,13 +243,13 @@ def _limits(text: RobotDescription, entries: _PerJoint, known: Limits | None) ->
         ) from error
 
 
-def _values(stated: Values | None, entries: _PerJoint, key: str, default: ArrayLike) -> Array:
+def _values(stated: Values | None, entries: PerJoint, key: str, default: ArrayLike) -> Array:
     if stated is None:
         return np.array(np.broadcast_to(np.asarray(default, dtype=np.float64), (entries.chain.n,)))
     return entries.place(stated.values, f"{key}.values", default)
 
 
-def _drives(text: RobotDescription, entries: _PerJoint) -> tuple[Array, Array, Array, Array]:
+def _drives(text: RobotDescription, entries: PerJoint) -> tuple[Array, Array, Array, Array]:
     """Gear ratio, then rotor inertia and torque constant as felt at the joint, then the motor's highest speed."""
     drives = text.dynamics.drives
     at_motor = [name for name in ("rotor_inertia", "torque_constant", "motor_speed") if getattr(drives, name)]
@@ -271,7 +267,7 @@ def _drives(text: RobotDescription, entries: _PerJoint) -> tuple[Array, Array, A
     return ratio, ratio**2 * rotor, ratio * constant, speed
 
 
-def _friction(text: RobotDescription, entries: _PerJoint, known: Array | None) -> Array:
+def _friction(text: RobotDescription, entries: PerJoint, known: Array | None) -> Array:
     stated = text.dynamics.friction
     columns = []
     for i, name in enumerate(("coulomb", "viscous", "quadratic", "cubic")):

@@ -128,6 +128,7 @@ def find_base_parameters(
     model: TorqueModel,
     *,
     gravities: Iterable[ArrayLike] = (),
+    columns: Sequence[int] | None = None,
     samples: int = 400,
     seed: int = 0,
     tolerance: float = 1e-4,
@@ -143,6 +144,7 @@ def find_base_parameters(
         model: the torque model.
         gravities: (3,) each [m/s2], in the base frame: bases that stand otherwise than the description says. A joint on
             a vertical axis gets parameters by a base that is tilted.
+        columns: indices of the columns that are asked for, the other parameters being known; None for all.
         samples: how many random states.
         seed: of the random states.
         tolerance: the part of a column, of the largest norm of its kind, below which it counts as spanned (the thesis
@@ -157,6 +159,8 @@ def find_base_parameters(
     others = tuple(dict.fromkeys(tuple(np.asarray(gravity, dtype=float).tolist()) for gravity in gravities))
     others = tuple(gravity for gravity in others if not np.array_equal(gravity, model.robot.chain.gravity))
     Y = np.concatenate([_random_regressor(model.under(gravity), samples, seed) for gravity in (None, *others)])
+    if columns is not None:
+        Y[:, np.setdiff1d(np.arange(model.size), list(columns))] = 0.0
     scale = _scales(model, np.linalg.norm(Y, axis=0))
     scaled = Y / scale
     independent = _walk(scaled, tolerance)

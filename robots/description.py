@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
-from pydantic import Field, model_validator
+from pydantic import Field, ValidatorFunctionWrapHandler, WrapValidator, model_validator
 
 from robots.common.config import Config
 
@@ -15,6 +15,20 @@ Positive = Annotated[float, Field(gt=0.0, allow_inf_nan=False)]
 Number = Annotated[float, Field(allow_inf_nan=True)]
 Three = Annotated[list[Finite], Field(min_length=3, max_length=3)]
 Six = Annotated[list[Finite], Field(min_length=6, max_length=6)]
+
+
+class Same(list[float]):
+    """One value, written without brackets, that holds for every joint."""
+
+
+def _one_or_all(value: Any, validate: ValidatorFunctionWrapHandler) -> Any:
+    if isinstance(value, int | float) and not isinstance(value, bool):
+        return Same(validate([value]))
+    return validate(value)
+
+
+Finites = Annotated[list[Finite], WrapValidator(_one_or_all)]
+Numbers = Annotated[list[Number], WrapValidator(_one_or_all)]
 
 # unit -> (factor to SI, the joint kinds it suits, the quantity it measures)
 UNITS: dict[str, tuple[float, str, str]] = {
@@ -40,30 +54,30 @@ class Sourced(Config):
 
 
 class Values(Sourced):
-    """One number a joint, without a unit."""
+    """One number a joint, or one for all, without a unit."""
 
-    values: list[Finite]
+    values: Finites
 
 
 class Bounds(Sourced):
-    """One bound a joint, in a unit for all joints or one for each; .inf where there is none."""
+    """One bound a joint or one for all, in a unit for all joints or one for each; .inf where there is none."""
 
-    values: list[Number]
+    values: Numbers
     unit: str | list[str]
 
 
 class MotorSpeed(Sourced):
-    """One highest speed a motor, before its gear; .inf where there is none."""
+    """One highest speed a motor or one for all, before the gear; .inf where there is none."""
 
-    values: list[Number]
+    values: Numbers
     unit: Literal["rad/s", "deg/s", "rpm"] = "rad/s"
 
 
 class Range(Sourced):
     """A lowest and a highest position a joint."""
 
-    lower: list[Number]
-    upper: list[Number]
+    lower: Numbers
+    upper: Numbers
     unit: str | list[str]
 
 

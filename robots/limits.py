@@ -2,13 +2,35 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, fields, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from robots.common.errors import InputError
 from robots.signals import FloatArray, Motion
+
+ACCELERATION_PER_VELOCITY = 4.0
+"""Default acceleration limit over the velocity limit [1/s]: full speed in a quarter of a second, as small arms do."""
+
+JERK_PER_ACCELERATION = 20.0
+"""Default jerk limit over the acceleration limit [1/s]: full acceleration within 50 ms."""
+
+
+UNITS = {
+    "position": ("rad", "m"),
+    "lower": ("rad", "m"),
+    "upper": ("rad", "m"),
+    "velocity": ("rad/s", "m/s"),
+    "acceleration": ("rad/s2", "m/s2"),
+    "jerk": ("rad/s3", "m/s3"),
+    "torque": ("N m", "N"),
+    "torque RMS": ("N m", "N"),
+}
+"""Units of quantities of a revolute and of a prismatic joint."""
+
+BOUNDS = ("lower", "upper", "velocity", "acceleration", "jerk", "torque", "torque_rms")
+"""Names of the bounds of `Limits`."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -59,6 +81,8 @@ class Limits:
         jerk: highest jerks [rad/s^3], (n,).
         torque: highest joint torques [N m], (n,).
         torque_rms: highest root mean square of the joint torques over a motion [N m], (n,); infinite by default.
+        kinds: "revolute" or "prismatic" of each joint, for messages; all revolute by default. The bounds of a prismatic
+            joint are in m and N.
 
     Raises:
         InputError: arrays of different lengths, NaN, ``lower`` not below ``upper``, or a negative bound.
@@ -71,18 +95,22 @@ class Limits:
     jerk: FloatArray
     torque: FloatArray
     torque_rms: FloatArray = field(default_factory=lambda: np.array(np.inf))
+    kinds: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         if np.ndim(self.torque_rms) == 0:
             object.__setattr__(self, "torque_rms", np.full(len(np.atleast_1d(self.lower)), float(self.torque_rms)))
-        for item in fields(self):
-            array = _bound(item.name, getattr(self, item.name))
+        object.__setattr__(self, "kinds", tuple(self.kinds) or ("revolute",) * len(np.atleast_1d(self.lower)))
+        for name in BOUNDS:
+            array = _bound(name, getattr(self, name))
             if len(array) != len(np.atleast_1d(self.lower)):
-                raise InputError(f"{len(array)} values, but lower has {len(self.lower)}", column=item.name)
-            if item.name not in ("lower", "upper"):
-                _reject(array < 0.0, array, item.name, "zero or more")
+                raise InputError(f"{len(array)} values, but lower has {len(self.lower)}", column=name)
+            if name not in ("lower", "upper"):
+                _reject(array < 0.0, array, name, "zero or more")
             array.setflags(write=False)
-            object.__setattr__(self, item.name, array)
+            object.__setattr__(self, name, array)
+        if len(self.kinds) != self.n or not set(self.kinds) <= {"revolute", "prismatic"}:
+            raise InputError(f"found the kinds {self.kinds}", allowed=f"{self.n} of revolute and prismatic")
         wrong = np.flatnonzero(self.lower >= self.upper)
         if len(wrong):
             joint = int(wrong[0])
@@ -98,13 +126,34 @@ class Limits:
         """The number of joints."""
         return len(self.lower)
 
+    def unit(self, joint: int, quantity: str = "position") -> str:
+        """Gives the unit of a joint's quantity, such as ``rad/s``, or ``m/s`` of a prismatic joint.
+
+        Args:
+            joint: counted from 0.
+            quantity: "position", "lower", "upper", "velocity", "acceleration", "jerk", "torque" or "torque RMS"; of
+                another one the unit is empty.
+        """
+        angular, linear = UNITS.get(quantity, ("", ""))
+        return linear if self.kinds[joint] == "prismatic" else angular
+
     @property
     def home(self) -> FloatArray:
         """A pose within the limits (n,): zero, or the middle of a range without zero, or its one end."""
+        zero = (self.lower <= 0.0) & (self.upper >= 0.0)
+        return np.where(zero, 0.0, self.middle)
+
+    @property
+    def middle(self) -> FloatArray:
+        """The middle of each range (n,); where an end is open, zero or the other end."""
         ranged = np.isfinite(self.lower) & np.isfinite(self.upper)
         middle = np.where(ranged, (np.where(ranged, self.lower, 0.0) + np.where(ranged, self.upper, 0.0)) / 2.0, 0.0)
-        zero = (self.lower <= 0.0) & (self.upper >= 0.0)
-        return np.clip(np.where(zero, 0.0, middle), self.lower, self.upper)
+        return np.clip(middle, self.lower, self.upper)
+
+    @property
+    def position_unit(self) -> str:
+        """The unit of positions of any joint: ``rad``, ``m``, or ``rad or m``."""
+        return " or ".join(unit for unit in ("rad", "m") if unit in map(self.unit, range(self.n)))
 
     def scaled(
         self, *, velocity: float = 1.0, acceleration: float = 1.0, jerk: float = 1.0, torque: float = 1.0

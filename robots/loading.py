@@ -10,6 +10,7 @@ from pathlib import Path
 from robots.assembly import robot_from_urdf, robot_from_yaml
 from robots.common.errors import AssumedValueWarning, InputError
 from robots.common.files import existing_file
+from robots.geometry.xacro_ import is_description, split_arguments
 from robots.robot import Robot
 
 CATALOG = Path(__file__).parent / "catalog"
@@ -31,14 +32,18 @@ def load_robot(
     tip: str | None = None,
     joints: Sequence[str] | None = None,
     locked: Mapping[str, float] | None = None,
+    unlimited: bool = False,
 ) -> Robot:
     """Load a robot.
 
     Args:
-        spec: a catalogue name, the path of a ``.urdf`` or of a robot's ``.yaml``, or a robot, which is returned.
+        spec: a catalogue name, the path of a ``.urdf``, of a ``.xacro`` (arguments may follow: ``FILE NAME:=VALUE``) or
+            of a robot's ``.yaml``, or a robot, which is returned.
         tip: of a URDF, the link at which the chain ends.
         joints: of a URDF, the moving joints in the chain's order.
         locked: of a URDF, positions of locked joints [rad or m].
+        unlimited: of a URDF, whether revolute and prismatic joints may lack position limits. They are 0 by default in
+            a URDF, which no experiment can be designed for.
 
     Returns:
         The robot.
@@ -48,7 +53,8 @@ def load_robot(
             or joint; when a URDF branches and nothing says which chain is meant.
 
     Warns:
-        AssumedValueWarning: once per process and robot, when the description holds values that no source backs.
+        AssumedValueWarning: once per process and robot, when the description holds values that no source backs; for
+            each of the robot's `notes`, if it is not of the catalogue.
     """
     if isinstance(spec, Robot):
         if tip is not None or joints is not None or locked:
@@ -58,32 +64,35 @@ def load_robot(
         robot = robot_from_yaml(CATALOG / f"{spec}.yaml", str(spec), tip, joints, locked)
     else:
         path = _robot_file(spec)
-        if path.suffix.lower() == ".urdf":
-            robot = robot_from_urdf(path, tip, joints, locked)
+        if is_description(path):
+            robot = robot_from_urdf(path, tip, joints, locked, unlimited)
         else:
-            robot = robot_from_yaml(path, str(path), tip, joints, locked)
-    if robot.assumed and robot.origin not in _warned:
+            robot = robot_from_yaml(path, str(path), tip, joints, locked, unlimited)
+    if robot.origin not in _warned:
         _warned.add(robot.origin)
-        message = f"{robot.name}: these values are assumptions without a source: {', '.join(robot.assumed)}"
-        warnings.warn(message, AssumedValueWarning, stacklevel=2)
+        notes = () if robot.origin in catalogue() else robot.notes
+        if robot.assumed:
+            notes = (f"these values are assumptions without a source: {', '.join(robot.assumed)}", *notes)
+        for note in notes:
+            warnings.warn(f"{robot.name}: {note}", AssumedValueWarning, stacklevel=2)
     return robot
 
 
 def _robot_file(spec: str | Path) -> Path:
     text = str(spec)
     path = Path(text)
-    suffix = path.suffix.lower()
-    if suffix in (".urdf", ".yaml", ".yml"):
+    if is_description(text):
+        existing_file(split_arguments(text)[0])
+        return path
+    if path.suffix.lower() in (".yaml", ".yml"):
         return existing_file(path)
-    if suffix == ".xacro":
-        raise InputError("a xacro file", file=text, remedy="expand it first: xacro FILE.xacro > FILE.urdf")
     if text and path.exists():
         raise InputError(
-            "the file name does not end like that of a robot file", file=text, allowed=".urdf, .yaml or .yml"
+            "the file name does not end like that of a robot file", file=text, allowed=".urdf, .xacro, .yaml or .yml"
         )
     close = get_close_matches(text.lower(), catalogue(), n=1, cutoff=0.4)
     raise InputError(
         f"unknown robot {text!r}",
-        allowed=f"{', '.join(catalogue())}, or the path of a .urdf or .yaml file",
+        allowed=f"{', '.join(catalogue())}, or the path of a .urdf, .xacro or .yaml file",
         remedy=f"did you mean {close[0]!r}?" if close else None,
     )

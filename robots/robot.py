@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from robots.common.errors import InputError
-from robots.geometry.chain import Chain
+from robots.geometry.chain import Chain, LinkPlace
 from robots.limits import Limits
 
 Array = NDArray[np.float64]
@@ -35,8 +35,11 @@ class Robot:
             lowered to what the gear makes of it.
         period: sample period of the controller [s].
         assumed: the quantities that no source backs, such as "limits.jerk".
+        notes: what a reader of its file may not expect: values by default, doubtful ones, parts that are not used.
         origin: the catalogue name, or the file it was read from.
         digest: SHA-256 of what defines the robot; empty for a robot made in memory.
+        urdf: the URDF or xacro file it was read from, with the file's path and arguments; empty without one.
+        links: the links of that file and the bodies that carry them.
         title: full name, for reports.
         payload: rated payload [kg].
         ambient: (lowest, highest) ambient temperature of operation [degC].
@@ -57,7 +60,10 @@ class Robot:
     motor_speed: Array = None  # type: ignore[assignment]
     period: float = 0.004
     assumed: tuple[str, ...] = ()
+    notes: tuple[str, ...] = ()
     origin: str = ""
+    urdf: str = ""
+    links: tuple[LinkPlace, ...] = ()
     digest: str = ""
     title: str = ""
     payload: float | None = None
@@ -90,7 +96,10 @@ class Robot:
         if (reachable < self.limits.velocity).any():
             lowered = np.minimum(self.limits.velocity, reachable)
             object.__setattr__(self, "limits", replace(self.limits, velocity=lowered))
+        if self.limits.kinds != self.chain.kinds:
+            object.__setattr__(self, "limits", replace(self.limits, kinds=self.chain.kinds))
         object.__setattr__(self, "assumed", tuple(self.assumed))
+        object.__setattr__(self, "notes", tuple(self.notes))
 
     def _freeze(self, quantity: str, shape: tuple[int, ...], unknown: float) -> None:
         value = getattr(self, quantity)

@@ -32,7 +32,7 @@ def diagnose(
     *,
     held_out: Log | Sequence[Log] | None = None,
     candidates: Sequence[str | Effect] | None = None,
-    friction: str = "polynomial",
+    friction: str = "auto",
     false_alarm: float = 0.01,
     check: bool = True,
     seed: int = 0,
@@ -53,7 +53,8 @@ def diagnose(
         held_out: logs of other motions for validation; without them, logs or stretches are left out in turn.
         candidates: effects to look for, by name or as objects; by default all that are registered. An own effect is
             registered by being given.
-        friction: of the base model: ``polynomial`` or ``coulomb-viscous``.
+        friction: of the base model: ``auto`` (`BendingFriction`, which grows linearly beyond the recorded speeds),
+            ``polynomial`` or ``coulomb-viscous``.
         false_alarm: chance of finding an effect in logs that have none.
         check: whether each log passes the gate first, which rejects unusable logs. Outlier rows are then interpolated,
             and logs are cut at gaps.

@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 from estimation.estimators.base import Solution
 from estimation.estimators.wls import WeightedLeastSquares
 from estimation.linear_algebra.conic import ConicProgram
+from estimation.linear_algebra.log_determinant import add_log_determinant
 from estimation.regressions.default_prior import joint_scatter
 from estimation.regressions.moments import Moments
 from estimation.regressions.regression_data import RegressionData
@@ -79,7 +80,7 @@ class _Problem:
             inverse = np.linalg.inv(reference)
             if self.entropic:
                 linear[columns] += pull * np.tensordot(BASIS, inverse, axes=2)
-                self._log_determinant(program, linear, columns, size + 14 * link, pull)
+                add_log_determinant(program, linear, columns, size + 14 * link, pull)
             else:
                 # The second-order expansion of the entropic distance about the reference: as free of frames and units.
                 metric = np.einsum("aij,jk,bkl,li->ab", BASIS, inverse, BASIS, inverse)
@@ -89,28 +90,6 @@ class _Problem:
         rows[:, :size] = self.rows
         program.nonnegative(rows, np.zeros(len(rows)))
         return program.solve(quadratic, linear, "physically consistent fit")[:size]
-
-    @staticmethod
-    def _log_determinant(
-        program: ConicProgram, linear: Array, columns: NDArray[np.intp], start: int, pull: float
-    ) -> None:
-        """Adds -pull log det P: with Z lower triangular and [[P, Z], [Z', diag(Z)]] >= 0, det P >= prod diag(Z)."""
-        basis = np.zeros((program.size, 8, 8))
-        basis[columns, :4, :4] = BASIS
-        diagonal = []
-        for offset, (i, j) in enumerate(zip(*np.tril_indices(4), strict=True)):
-            k = start + offset
-            basis[k, i, 4 + j] = basis[k, 4 + j, i] = 1.0
-            if i == j:
-                basis[k, 4 + i, 4 + i] = 1.0
-                diagonal.append(k)
-        program.semidefinite(basis, np.zeros((8, 8)))
-        for offset, k in enumerate(diagonal):
-            logarithm = start + 10 + offset
-            linear[logarithm] -= pull
-            matrix = np.zeros((3, program.size))
-            matrix[0, logarithm] = matrix[2, k] = 1.0
-            program.exponential(matrix, np.array([0.0, 1.0, 0.0]))
 
 
 class PhysicallyConsistent(WeightedLeastSquares):

@@ -1,4 +1,4 @@
-"""An identified model as a URDF: the robot's own file with new inertials, or a new file from its chain."""
+"""An identified model as a URDF: the robot's own file with new bodies and friction, or a new file from its chain."""
 
 from __future__ import annotations
 
@@ -9,20 +9,25 @@ from xml.etree import ElementTree
 import numpy as np
 from numpy.typing import NDArray
 
+from estimation.exports.friction import LinearFriction, linear_friction
 from estimation.exports.standard import REMEDY, standard_parameters
 from estimation.models.model import Model
 from robots.common.errors import InfeasibleError, InputError
 from robots.common.files import write_atomic
 from robots.geometry.chain import Joint
 from robots.geometry.inertia import symmetric
+from robots.geometry.xacro_ import is_description, split_arguments, urdf_bytes
 from robots.robot import Robot
+from robots.version import VERSION
 
 Array = NDArray[np.float64]
 Element = ElementTree.Element
 
+ROUGH = 0.02  # of the friction: a larger difference from the identified curve is named in the file
+
 
 def export_urdf(model: Model, path: str | Path, *, robot: Robot | None = None, force: bool = False) -> None:
-    """Writes a URDF with the identified inertial parameters.
+    """Writes a URDF with the identified inertial parameters and friction.
 
     Args:
         model: an identified model.
@@ -41,24 +46,60 @@ def export_urdf(model: Model, path: str | Path, *, robot: Robot | None = None, f
 def urdf_text(model: Model, robot: Robot | None = None) -> str:
     """Writes the URDF of `export_urdf` as text.
 
-    If the robot came from a URDF, its file is kept with its meshes, and only the inertials change. The link that a
-    joint moves gets all the inertia that moves with it; links fixed or locked to it lose theirs. Any other robot gets a
-    plain chain.
+    If the robot came from a URDF or xacro, its file is kept with its meshes; the inertials, and damping and friction of
+    the moving joints change. The link that a joint moves gets all the inertia that moves with it; links fixed or locked
+    to it lose theirs. Any other robot gets a plain chain. A comment says what a URDF cannot state.
     """
     known = robot or model.robot
     inertia = standard_parameters(model, None if robot is None else np.asarray(robot.inertia))
     if not (inertia[:, 0] > 0).all():
         raise InfeasibleError("a link's identified mass is not positive", remedy=REMEDY)
-    source = Path(known.origin)
-    root = _updated(source, known, inertia) if source.suffix.lower() == ".urdf" and source.is_file() else None
-    root = _chain(known, inertia) if root is None else root
+    friction = linear_friction(model)
+    source = known.origin
+    from_file = is_description(source) and split_arguments(source)[0].is_file()
+    root = _updated(source, known, inertia) if from_file else _chain(known, inertia)
+    if friction is not None:
+        _state_friction(root, known, friction)
+    root.insert(0, ElementTree.Comment(f" {_remarks(model, friction)} "))
     ElementTree.indent(root)
     return ElementTree.tostring(root, encoding="unicode", xml_declaration=True) + "\n"
 
 
-def _updated(source: Path, robot: Robot, inertia: Array) -> Element:
+def _state_friction(root: Element, robot: Robot, friction: LinearFriction) -> None:
+    joints = {joint.get("name"): joint for joint in root.findall("joint")}
+    for name, damping, coulomb in zip(robot.joint_names, friction.viscous, friction.coulomb, strict=True):
+        dynamics = joints[name].find("dynamics")
+        if dynamics is None:
+            dynamics = ElementTree.SubElement(joints[name], "dynamics")
+        dynamics.set("damping", repr(float(damping)))
+        dynamics.set("friction", repr(float(coulomb)))
+
+
+def _remarks(model: Model, friction: LinearFriction | None) -> str:
+    """What the numbers are, and what of the model the file does not state."""
+    parts = [f"identified by robot-oed {VERSION}: inertials"]
+    if friction is not None:
+        parts[0] += ", damping and friction"
+        rough = [
+            f"{friction.error[i]:.2g} {model.robot.limits.unit(i, 'torque')} at joint {name}"
+            for i, name in enumerate(model.robot.joint_names)
+            if friction.error[i] > ROUGH * friction.largest[i]
+        ]
+        if rough:
+            text = "damping and friction approximate the identified friction curve; largest difference up to the"
+            parts.append(f"{text} recorded speed: {', '.join(rough)}")
+    other = {column.term for column in model.parameters if not column.friction and column.term != "rigid_body"}
+    left = [f"{term.replace('_', ' ')} parameters" for term in sorted(other)]
+    left += [e.effect.replace("_", " ") + ("" if e.joint is None else f" of joint {e.joint}") for e in model.extensions]
+    if left:
+        parts.append(f"not stated, because a URDF cannot: {', '.join(left)}")
+    # Two hyphens end a comment.
+    return "; ".join(parts).replace("--", "-")
+
+
+def _updated(source: str, robot: Robot, inertia: Array) -> Element:
     try:
-        root = ElementTree.fromstring(source.read_bytes())
+        root = ElementTree.fromstring(urdf_bytes(source))
     except (OSError, ElementTree.ParseError) as error:
         raise InputError(f"the written URDF could not be read back: {error}", file=source) from error
     links = {link.get("name"): link for link in root.findall("link")}

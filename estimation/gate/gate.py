@@ -11,12 +11,27 @@ from estimation.gate.context import Context, Stage
 from estimation.gate.finding import Finding
 from estimation.gate.report import GateReport, worst_first
 from estimation.logs.known_setup import robot_for_log
+from estimation.regressions.torque_meanings import as_joint_torque
 from robots.common.errors import InputError
 from robots.robot import Robot
 from robots.signals import Log
 
 # Units are found by several checks; one finding of each kind is enough.
 UNITS = ("unit_of_time", "unit_of_position", "motor_side_position")
+# Causes, those of them that count as warnings, too, and findings of the fits that they explain.
+CAUSES = ("gravity_direction", "static_poses", "swapped_columns", "torque_meaning", "unit_of_position", "wrapped_angle")
+FITTED = ("gravity_direction", "swapped_columns")
+CONSEQUENCES = (
+    "badly_excited",
+    "beyond_limits",
+    "delay",
+    "moved_by_others",
+    "negative_friction",
+    "poorly_explained",
+    "position_sign",
+    "torque_sign",
+    "unit_of_torque",
+)
 
 
 # Values of 1e300 overflow when they are squared. They are reported, and never fitted.
@@ -30,7 +45,8 @@ def check_log(robot: Robot, log: Log) -> GateReport:
 
     Args:
         robot: with n joints; limits, gear ratios and inertias are used if they are known.
-        log: of n joints; without torque and current only the motion is checked.
+        log: of n joints; without torque and current only the motion is checked. Torques of another stated meaning are
+            converted first.
 
     Returns:
         The findings, each with its number, severity, and what to do.
@@ -41,6 +57,7 @@ def check_log(robot: Robot, log: Log) -> GateReport:
     file = str(log.metadata.get("file", log.name))
     if log.n != robot.n:
         raise InputError(f"{log.n} joints", file=file or None, allowed=f"{robot.n}, as {robot.name} has")
+    log = as_joint_torque(robot, log)
     context = Context(robot_for_log(robot, log), log)
     for check in checks_in_order():
         if context.reaches(check.stage):
@@ -58,11 +75,13 @@ def _report(context: Context, file: str) -> GateReport:
         samples=len(recorded.log),
         duration=recorded.original.duration,
         period=recorded.timing.period,
-        findings=worst_first(_without_repetitions(context.findings)),
+        findings=worst_first(_without_consequences(_without_repetitions(context.findings))),
         parts=recorded.parts,
+        motion_parts=recorded.motion_parts,
         spikes=recorded.spikes,
         stale=recorded.stale,
         t=recorded.times.t,
+        q=recorded.log.q,
         delay=unknown if fitted is None else fitted.delay_values,
         delay_error=unknown if fitted is None else fitted.delay_errors,
         unexplained=unknown if fitted is None else fitted.unexplained,
@@ -82,3 +101,13 @@ def _without_repetitions(findings: Sequence[Finding]) -> list[Finding]:
         known.add(key)
         kept.append(finding)
     return kept
+
+
+def _without_consequences(findings: Sequence[Finding]) -> list[Finding]:
+    """Leaves out what a refused cause explains: its advice would mislead."""
+    sure = (finding.severity == "refuse" or finding.name in FITTED for finding in findings if finding.name in CAUSES)
+    if not any(sure):
+        return list(findings)
+    if any(finding.name == "static_poses" for finding in findings):
+        return [finding for finding in findings if finding.name == "static_poses"]
+    return [finding for finding in findings if finding.name not in CONSEQUENCES]

@@ -19,6 +19,20 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
+# Findings that do not concern a prediction, and findings on torques, which only make its error wrong.
+NOT_OF_MOTION = frozenset({"badly_excited", "hardly_moves", "no_motion", "poorly_explained", "short", "undetermined"})
+OF_TORQUE = frozenset(
+    {
+        "constant_torque",
+        "moved_by_others",
+        "negative_friction",
+        "nominal_error",
+        "static_poses",
+        "torque_meaning",
+        "torque_sign",
+        "unit_of_torque",
+    }
+)
 # Findings on a log without a fault whose motion does not determine the parameters.
 NO_INFORMATION = frozenset({"badly_excited"})
 
@@ -36,10 +50,12 @@ class GateReport:
         findings: the worst first.
         parts: (first, stop) indices of the parts without a gap and without a column that hung. Nothing is interpolated
             between them.
+        motion_parts: the same, with the rows in which a torque or current hung.
         spikes: indices of rows with isolated outliers, which a fit leaves out.
         stale: indices of rows with wrong times, which a fit leaves out: copies of the row before, and rows that were
             written late by an unknown time.
-        t: times of the rows [s], corrected for rows that were written late, if possible.
+        t: times of the rows (N,) [s], corrected for rows that were written late, if possible.
+        q: positions (N, n) [rad or m], with unwrapped angles.
         delay: by which the torque lags the position (n,) [s], NaN if the log does not determine it.
         delay_error: its standard error (n,) [s].
         unexplained: held-out torque error over the torque's standard deviation (n,), from a quick fit of rigid body
@@ -55,9 +71,11 @@ class GateReport:
     period: float
     findings: tuple[Finding, ...]
     parts: tuple[tuple[int, int], ...]
+    motion_parts: tuple[tuple[int, int], ...]
     spikes: NDArray[np.intp]
     stale: NDArray[np.intp]
     t: Array
+    q: Array
     delay: Array
     delay_error: Array
     unexplained: Array
@@ -113,7 +131,7 @@ class GateReport:
         """
         if len(log) != self.samples:
             raise InputError(f"{len(log)} rows", allowed=f"{self.samples} rows, as in the checked log")
-        log = self.on_time(log)
+        log = self.corrected(log)
         if self.parts == ((0, len(log)),) and not len(self.spikes) and not len(self.stale):
             return (log,)
         kept = np.ones(len(log), dtype=bool)
@@ -124,9 +142,23 @@ class GateReport:
             raise InputError("no part of the log is long enough", file=self.log or None, allowed=f"{FEWEST} rows")
         return logs
 
-    def on_time(self, log: Log) -> Log:
-        """Gives the checked log with corrected time stamps."""
-        return log if np.array_equal(self.t, log.t) else replace(log, t=self.t)
+    def corrected(self, log: Log) -> Log:
+        """Gives the checked log with corrected time stamps and unwrapped angles."""
+        same_times, same_angles = np.array_equal(self.t, log.t), np.array_equal(self.q, log.q)
+        if same_times and same_angles:
+            return log
+        return replace(log, t=log.t if same_times else self.t, q=log.q if same_angles else self.q)
+
+    def for_motion(self) -> GateReport:
+        """Gives the report for a log of which only the motion is used: findings on torques are warnings at most."""
+        kept = [finding for finding in self.findings if finding.name not in NOT_OF_MOTION]
+        mild = [
+            replace(finding, severity="warning")
+            if finding.severity == "refuse" and (finding.name in OF_TORQUE or _is_of_torque(finding))
+            else finding
+            for finding in kept
+        ]
+        return replace(self, findings=worst_first(mild))
 
     def summary(self) -> str:
         """Gives the verdict and lists the findings, the worst first."""
@@ -167,6 +199,10 @@ class GateReport:
 def worst_first(findings: list[Finding]) -> tuple[Finding, ...]:
     """Sorts findings by severity, the worst first, and keeps the order among equals."""
     return tuple(sorted(findings, key=lambda finding: -SEVERITIES.index(finding.severity)))
+
+
+def _is_of_torque(finding: Finding) -> bool:
+    return finding.column is not None and finding.column.startswith(("tau", "i"))
 
 
 def _names(findings: tuple[Finding, ...]) -> list[str]:

@@ -20,6 +20,7 @@ from estimation.logs.provenance import describe_logs
 from estimation.models.model import Model
 from estimation.preprocessing import Harmonics
 from estimation.regressions.preparation import Prepared, prepare_all
+from estimation.regressions.torque_meanings import as_joint_torque
 from estimation.uncertainty import fast_noise, period_noise
 from robots.base_parameters import find_base_parameters
 from robots.common.errors import InputError, NotIdentifiableError
@@ -94,7 +95,7 @@ def identify(
         NotIdentifiableError: logs in which no joint moves, or no joint's torque can be predicted.
     """
     chosen = choose_estimator(method)
-    data = [logs] if isinstance(logs, Log) else list(logs)
+    data = [as_joint_torque(robot, log) for log in ([logs] if isinstance(logs, Log) else logs)]
     if not data:
         raise InputError("no logs", allowed="one or more")
     if chosen.simulates:

@@ -1,4 +1,4 @@
-"""Puts logs with separate clocks on one clock."""
+"""Clocks of logs: several on one clock, and times that are rounded or run backwards."""
 
 from __future__ import annotations
 
@@ -8,10 +8,13 @@ from itertools import pairwise
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from estimation.logs.provenance import are_same_log, describe_logs
 from robots.common.errors import InputError
 from robots.signals import UNKNOWN_PAUSE, Log
+
+Array = NDArray[np.float64]
 
 OWN = 1.0
 """So far [s] a log may reach beyond what is known of it in a fit, to be on the same clock."""
@@ -177,3 +180,61 @@ def _refuse_copies(logs: Sequence[Log], held_out: Sequence[Log]) -> None:
 def _same(one: Log, other: Log) -> bool:
     pairs = ((one.q, other.q), (one.tau, other.tau), (one.current, other.current))
     return all(np.array_equal(a, b) if a is not None and b is not None else a is b for a, b in pairs)
+
+
+def uniform_times(t: Array, parts: Sequence[slice]) -> tuple[Array, float]:
+    """Gives the uniform times nearest to rounded ones: one sample period, and an offset of each part.
+
+    Args:
+        t: (N,) [s].
+        parts: rows without a gap between them.
+
+    Returns:
+        Times (N,) and the sample period [s].
+    """
+    product = square = 0.0
+    for part in parts:
+        rows, times = np.arange(part.stop - part.start) - 0.5 * (part.stop - part.start - 1), t[part] - t[part].mean()
+        product, square = product + float(rows @ times), square + float(rows @ rows)
+    period = product / square if square > 0 else 0.0
+    even = np.array(t)
+    for part in parts:
+        rows = np.arange(part.stop - part.start)
+        rest = t[part] - period * rows
+        # The middle of the range: a few rows do not show the mean of a rounding.
+        even[part] = period * rows + 0.5 * (rest.min() + rest.max())
+    return even, period
+
+
+# Steps of a position at a row are usual if below so many times the 90 % quantile of all steps.
+USUAL = 3.0
+
+
+def advice_on_times(t: Array, q: Array) -> str:
+    """Says what to do about times that repeat or run backwards, by what the positions do there.
+
+    Args:
+        t: (N,) [s], not increasing.
+        q: positions (N, n).
+    """
+    steps = np.abs(np.diff(q, axis=0))
+    usual = USUAL * np.quantile(steps, 0.9, axis=0)
+    back = np.diff(t) < 0
+    few = back.sum() <= max(3, 0.01 * len(t))
+    if not back.any():
+        return "log the time with more digits, or keep one row of each time"
+    places = np.flatnonzero(back)
+    moves_on = bool((steps[places] <= usual).all())
+    order = np.argsort(t, kind="stable")
+    sorted_steps = np.abs(np.diff(q[order], axis=0))
+    interleaves = bool((sorted_steps.sum(axis=0) > 1.5 * steps.sum(axis=0) + 1e-12).any())
+    at = places[0]
+    size = float(t[at] - t[at + 1])
+    if few and moves_on:
+        return (
+            f"the arm moves on there, so the clock was set back by {size:.3g} s or a little more: split the log at "
+            "this row into two logs, and do not sort it by time"
+        )
+    if few or interleaves:
+        return "another recording begins there: split the log at this row into two logs, and do not sort it by time"
+    return "sort the rows by time and keep one of each time"

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
@@ -14,6 +14,7 @@ from robots.regressor import TorqueModel
 from robots.robot import Robot
 from robots.signals import Log, Motion
 from robots.terms import RigidBody
+from robots.terms.situations.flange_body import carrying, require_flange
 from robots.terms.situations.sensitivities import moved_body
 
 Array = NDArray[np.float64]
@@ -44,6 +45,7 @@ def load_of(robot: Robot, log: Log) -> Load | None:
     """Gives a log's payload; None without."""
     if log.payload is None or not log.payload.any():
         return None
+    require_flange(robot)
     return Load(_rigid_body(robot.under(log.gravity)), moved_body(robot.chain.tip) @ log.payload)
 
 
@@ -55,17 +57,7 @@ def _rigid_body(robot: Robot) -> TorqueModel:
 
 def robot_for_log(robot: Robot, log: Log) -> Robot:
     """Gives the robot as it was for a log: on its base, the payload a part of the last link."""
-    standing = robot.under(log.gravity)
-    if log.payload is None or not log.payload.any():
-        return standing
-    return _with_payload(standing, tuple(log.payload.tolist()))
-
-
-@lru_cache(maxsize=16)
-def _with_payload(robot: Robot, body: tuple[float, ...]) -> Robot:
-    inertia = np.array(robot.inertia)
-    inertia[-1] += moved_body(robot.chain.tip) @ np.array(body)
-    return replace(robot, inertia=inertia)
+    return carrying(robot.under(log.gravity), log.payload)
 
 
 def gravities_of(logs: Sequence[Log]) -> list[Array]:

@@ -21,7 +21,11 @@ from robots.common.tables.times import is_time, seconds_of
 
 
 def read_log_table(
-    path: str | PathLike[str], n: int | None, mapping: LogMapping | None, joints: Sequence[str] | None
+    path: str | PathLike[str],
+    n: int | None,
+    mapping: LogMapping | None,
+    joints: Sequence[str] | None,
+    kinds: Sequence[str] | None = None,
 ) -> tuple[Table, list[dict[str, Any]]]:
     """Reads a file as a table with the columns of a log.
 
@@ -33,6 +37,7 @@ def read_log_table(
         n: the number of joints, where it is known.
         mapping: what the columns mean.
         joints: names of the robot's joints in its order.
+        kinds: "revolute" or "prismatic" of each joint, if known.
 
     Returns:
         The table, and notes of what was recognised.
@@ -44,18 +49,22 @@ def read_log_table(
         names = column_names(path)
         recorder = None if names is None else recorder_of(names)
         if recorder is not None:
-            return _recognised(path, recorder, mapping, joints)
+            return _recognised(path, recorder, mapping, joints, kinds)
     if mapping is None:
         table = with_seconds(read_foreign(path, lambda name: parse_name(name) is not None, joints=joints), "t")
         return _noted(table)
     named = mapping.joints if mapping.joints is not None else joints
     # Which columns the mapping names depends on the number of joints, and that on the columns: names come first.
     table = read_foreign(path, lambda name: True, topic=mapping.topic, joints=named)
-    return _noted(_mapped(table, mapping, count_joints(mapping, table.names, n)))
+    return _noted(_mapped(table, mapping, count_joints(mapping, table.names, n), kinds))
 
 
 def _recognised(
-    path: str | PathLike[str], recorder: Recorder, mapping: LogMapping | None, joints: Sequence[str] | None
+    path: str | PathLike[str],
+    recorder: Recorder,
+    mapping: LogMapping | None,
+    joints: Sequence[str] | None,
+    kinds: Sequence[str] | None,
 ) -> tuple[Table, list[dict[str, Any]]]:
     wanted = recorder.wanted.fullmatch
     table = read_foreign(path, lambda name: mapping is not None or wanted(name) is not None)
@@ -71,10 +80,10 @@ def _recognised(
         table = replace(table, metadata={**table.metadata, "no_torque": f"{recorder.name}: {known.remedy}"})
     if source is not None:
         table = replace(table, metadata={**table.metadata, "torque_source": source.to_dict()})
-    return _noted(_mapped(table, merged, known.joints))
+    return _noted(_mapped(table, merged, known.joints, kinds))
 
 
-def _mapped(table: Table, mapping: LogMapping, joints: int) -> Table:
+def _mapped(table: Table, mapping: LogMapping, joints: int, kinds: Sequence[str] | None) -> Table:
     if mapping.time is not None and mapping.time.column in table.columns:
         name, unit = mapping.time.column, mapping.time.unit
         if table.is_text(name) and unit not in (None, "s"):
@@ -86,7 +95,7 @@ def _mapped(table: Table, mapping: LogMapping, joints: int) -> Table:
                 allowed="numbers with a unit, or times such as 2024-05-03T12:34:56.789 without one",
             )
         table = with_seconds(table, name)
-    mapped = map_table(with_seconds(table, "t"), mapping, joints)
+    mapped = map_table(with_seconds(table, "t"), mapping, joints, kinds)
     kept = {name: values for name, values in mapped.columns.items() if parse_name(name) is not None}
     left = tuple(name for name in mapped.columns if name not in kept)
     return replace(mapped, columns=kept, skipped=(*mapped.skipped, *left))

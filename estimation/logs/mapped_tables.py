@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from estimation.logs.columns import BY_FIELD, Quantity, column_name, refuse_text, unit_factor
+from estimation.logs.columns import BY_FIELD, Quantity, column_name, refuse_text, suits, unit_factor, units_note
 from estimation.logs.mapping import LogMapping, PerJoint, Single
 from robots.common.errors import InputError
 from robots.common.tables.table import Column, Table
@@ -24,6 +24,9 @@ _FIELDS = {
     "segment": "segment",
     "cycle": "cycle",
 }
+UNIT_NOTES = "unit_notes"
+"""Key of a mapped table's metadata: notes on units that do not suit all joints."""
+
 # Conversion of motor-side values by the gear: positions are divided, torques multiplied.
 _GEARED = {"q": -1, "dq": -1, "ddq": -1, "qlink": -1, "tau": 1, "current": 0, "temperature": 0}
 
@@ -42,12 +45,14 @@ def count_joints(mapping: LogMapping, names: Sequence[str], n: int | None) -> in
         if listed is not None:
             return len(listed)
     entry = mapping.position
-    if entry is None:
-        return 0
-    if len(entry.columns) > 1:
-        return len(entry.columns)
     present = set(names)
     joints = 0
+    if entry is None:
+        while f"q{joints + 1}" in present:
+            joints += 1
+        return joints
+    if len(entry.columns) > 1:
+        return len(entry.columns)
     if entry.columns[0] in present:
         return 1
     while _columns(entry, mapping, joints + 1, present)[-1] in present:
@@ -55,13 +60,17 @@ def count_joints(mapping: LogMapping, names: Sequence[str], n: int | None) -> in
     return max(joints, 1)
 
 
-def map_table(table: Table, mapping: LogMapping, joints: int) -> Table:
+def map_table(table: Table, mapping: LogMapping, joints: int, kinds: Sequence[str] | None = None) -> Table:
     """Renames and converts a table's columns to those of a log, in SI units.
 
     Args:
         table: as it was read.
         mapping: what its columns mean; quantities it does not name keep the names of a log.
         joints: the number of joints.
+        kinds: "revolute" or "prismatic" of each joint, if known.
+
+    Returns:
+        The table; under `UNIT_NOTES` its metadata has notes on joints that a unit for all joints does not suit.
 
     Raises:
         InputError: a column that is not there or holds text, a list of another length than there are joints, a missing
@@ -70,6 +79,7 @@ def map_table(table: Table, mapping: LogMapping, joints: int) -> Table:
     columns: dict[str, Column] = {}
     units: dict[str, str] = {}
     taken: set[str] = set()
+    left: dict[tuple[str, str], list[int]] = {}
     for key, field in _FIELDS.items():
         entry, quantity = getattr(mapping, key), BY_FIELD[field]
         if entry is None:
@@ -88,7 +98,14 @@ def map_table(table: Table, mapping: LogMapping, joints: int) -> Table:
             # Not every joint has a thermometer, or an encoder behind its gear.
             if not quantity.complete and name not in present and present.intersection(names):
                 continue
-            columns[column_name(quantity, joint)] = _converted(table, mapping, entry, quantity, joint, name, joints)
+            kind = None if kinds is None or entry.side == "motor" else kinds[joint - 1]
+            unit = _joint_unit(table, entry, quantity, joint, joints)
+            if entry.unit is not None and len(entry.unit) == 1 and unit != "%" and not suits(quantity, str(unit), kind):
+                unit_factor(quantity, str(unit), file=table.path, column=name)
+                left.setdefault((field, str(unit)), []).append(joint)
+                unit, kind = quantity.linear_unit if kind == "prismatic" else quantity.unit, None
+            converted = _converted(table, mapping, entry, quantity, joint, name, joints, unit, kind)
+            columns[column_name(quantity, joint)] = converted
         taken.update(names)
     if mapping.torque_constant is not None:
         _add_torque(table, mapping, columns, joints)
@@ -98,6 +115,8 @@ def map_table(table: Table, mapping: LogMapping, joints: int) -> Table:
             if name in table.units:
                 units[name] = table.units[name]
     metadata = {key: value for key, value in table.metadata.items() if key != "units" or units}
+    if left:
+        metadata[UNIT_NOTES] = [units_note(BY_FIELD[field], unit, which) for (field, unit), which in left.items()]
     return Table(
         columns=columns,
         metadata=metadata,
@@ -108,8 +127,28 @@ def map_table(table: Table, mapping: LogMapping, joints: int) -> Table:
     )
 
 
+def _joint_unit(table: Table, entry: PerJoint, quantity: Quantity, joint: int, joints: int) -> str | None:
+    if entry.unit is None:
+        return None
+    if len(entry.unit) not in (1, joints):
+        raise InputError(
+            f"the mapping's unit of {quantity.prefix} has {len(entry.unit)} values",
+            file=table.path,
+            allowed=f"1 or {joints}",
+        )
+    return entry.unit[joint - 1] if len(entry.unit) > 1 else entry.unit[0]
+
+
 def _converted(
-    table: Table, mapping: LogMapping, entry: PerJoint, quantity: Quantity, joint: int, name: str, joints: int
+    table: Table,
+    mapping: LogMapping,
+    entry: PerJoint,
+    quantity: Quantity,
+    joint: int,
+    name: str,
+    joints: int,
+    unit: str | None,
+    kind: str | None,
 ) -> Column:
     def own(what: str, values: list[float]) -> float:
         if len(values) not in (1, joints):
@@ -121,7 +160,7 @@ def _converted(
         return values[joint - 1] if len(values) > 1 else values[0]
 
     factor = own("sign", entry.sign) * own("scale", entry.scale)
-    if entry.unit == "%":
+    if unit == "%":
         if entry.rated is None:
             raise InputError(
                 f"the mapping states {quantity.prefix} in % but lacks `rated`",
@@ -131,7 +170,7 @@ def _converted(
             )
         factor *= own("rated", entry.rated) / 100.0
     else:
-        factor *= _factor(table, quantity, name, entry.unit)
+        factor *= _factor(table, quantity, name, unit, kind)
     if entry.side == "motor":
         factor *= _gear(table, mapping, joint, joints) ** _GEARED[quantity.field]
     with np.errstate(all="ignore"):
@@ -198,6 +237,6 @@ def _value(table: Table, name: str) -> Column:
     return table.columns[name]
 
 
-def _factor(table: Table, quantity: Quantity, name: str, unit: str | None) -> float:
+def _factor(table: Table, quantity: Quantity, name: str, unit: str | None, kind: str | None = None) -> float:
     stated = unit if unit is not None else table.units.get(name)
-    return 1.0 if stated is None else unit_factor(quantity, stated, file=table.path, column=name)
+    return 1.0 if stated is None else unit_factor(quantity, stated, kind, file=table.path, column=name)

@@ -15,7 +15,15 @@ def _listed(value: Any) -> Any:
     return [value] if isinstance(value, str | int | float) and not isinstance(value, bool) else value
 
 
-Texts = Annotated[list[str], BeforeValidator(_listed)]
+def _named(value: Any) -> Any:
+    """Names that are numbers, such as 0 and 1, as text."""
+    listed = _listed(value)
+    if not isinstance(listed, list):
+        return listed
+    return [str(item) if isinstance(item, int) and not isinstance(item, bool) else item for item in listed]
+
+
+Texts = Annotated[list[str], BeforeValidator(_named)]
 Numbers = Annotated[list[float], BeforeValidator(_listed)]
 
 
@@ -25,7 +33,8 @@ class PerJoint(Config):
     Attributes:
         columns: one name a joint in the robot's order, or one name for all: a pattern with ``{joint}`` (the joint's
             name where `LogMapping.joints` states them, else its number from 1) or ``{index}`` (its number from 0).
-        unit: as in `docs/files.md`, or ``%`` of ``rated``.
+        unit: as in `docs/files.md`, or ``%`` of ``rated``; one for all or one per joint. One of angles for all joints
+            leaves linear axes in m and N.
         sign: 1 or -1, one for all or one per joint.
         scale: factors, after the unit.
         offset: added at the end, in the unit of a log [rad, rad/s, ...].
@@ -34,7 +43,7 @@ class PerJoint(Config):
     """
 
     columns: Texts
-    unit: str | None = None
+    unit: Texts | None = None
     sign: Numbers = Field(default_factory=lambda: [1.0])
     scale: Numbers = Field(default_factory=lambda: [1.0])
     offset: Numbers = Field(default_factory=lambda: [0.0])
@@ -88,6 +97,8 @@ class LogMapping(Config):
         torque_constant: torque per current [N m/A]: of the motor where the currents' side is ``motor``, else at the
             joint.
         topic: of a ROS bag, where it holds several with joint states.
+        torque_is: what the torque columns hold, if not joint torques: ``current``, ``motor`` or ``without-gravity``; of
+            some joints only as ``motor:2,5``. It is converted by the robot's description.
     """
 
     time: Single | None = None
@@ -101,10 +112,11 @@ class LogMapping(Config):
     ambient: Single | None = None
     segment: Single | None = None
     cycle: Single | None = None
-    joints: list[str] | None = None
+    joints: Texts | None = None
     gear_ratio: list[float] | None = None
     torque_constant: list[float] | None = None
     topic: str | None = None
+    torque_is: str | None = None
 
 
 def read_mapping(path: str | PathLike[str]) -> LogMapping:

@@ -30,6 +30,7 @@ _UNITS = {
 }
 _TIME = re.compile(r"(?i)t([_ \[(]+[mun]?s(ec)?[\])]?)?|.*(time|stamp|zeit|clock).*")
 _TIME_UNITS = {"ms": "ms", "msec": "ms", "us": "us", "usec": "us", "ns": "ns", "nsec": "ns", "s": "s", "sec": "s"}
+PLAIN_REMEDY = "rename the columns, or describe them in a mapping (--mapping)"
 _KEYS = ("position", "velocity", "torque", "current", "temperature")
 
 
@@ -48,6 +49,20 @@ class _Group:
     words: tuple[str, ...]
 
 
+def remedy_for_columns(names: Sequence[str], n: int | None = None, joints: Sequence[str] | None = None) -> str:
+    """Says what to do about a missing column: if possible, with the mapping that would fit.
+
+    Args:
+        names: of all columns.
+        n: the number of joints, where it is known.
+        joints: names of the robot's joints in its order, where they are known.
+    """
+    suggested = suggest_mapping(names, n, joints)
+    if suggested is None or not ("torque:" in suggested or "current:" in suggested):
+        return PLAIN_REMEDY
+    return f"check this mapping, save it as mapping.yaml and add --mapping mapping.yaml:\n{suggested}".rstrip()
+
+
 def suggest_mapping(names: Sequence[str], n: int | None = None, joints: Sequence[str] | None = None) -> str | None:
     """Writes the mapping that would fit, by the names of the columns.
 
@@ -57,7 +72,7 @@ def suggest_mapping(names: Sequence[str], n: int | None = None, joints: Sequence
         joints: names of the robot's joints in its order, where they are known.
 
     Returns:
-        YAML to be saved and checked; None if no columns look like positions.
+        YAML to be saved and checked; None if no columns look like time or positions.
     """
     chosen: dict[str, _Group] = {}
     for group in _groups(names, joints):
@@ -68,13 +83,11 @@ def suggest_mapping(names: Sequence[str], n: int | None = None, joints: Sequence
         if known is None or _rank(group) < _rank(known):
             chosen[quantity] = group
     position = chosen.get("position")
-    if position is None:
+    time = min((name for name in names if _TIME.fullmatch(name)), key=len, default=None)
+    if position is None or time is None:
         return None
     count = n or len(position.names)
-    lines = []
-    time = min((name for name in names if _TIME.fullmatch(name)), key=len, default=None)
-    if time is not None:
-        lines.append(f"time: {{column: {_text(time)}, unit: {_time_unit(time)}}}")
+    lines = [f"time: {{column: {_text(time)}, unit: {_time_unit(time)}}}"]
     for key in _KEYS:
         found = chosen.get(key)
         if found is None or (key == "current" and "torque" in chosen) or len(found.names) < count:

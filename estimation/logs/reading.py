@@ -12,20 +12,21 @@ import numpy as np
 from numpy.typing import NDArray
 
 from estimation.logs.campaigns import MAPPING, in_order, log_files
+from estimation.logs.clocks import advice_on_times
 from estimation.logs.columns import BY_FIELD, QUANTITIES, Quantity, column_name, parse_name, refuse_text, unit_factors
 from estimation.logs.formats import is_bag_folder
 from estimation.logs.log_tables import read_log_table, without_broken_derivatives
+from estimation.logs.mapped_tables import UNIT_NOTES
 from estimation.logs.mapping import LogMapping, read_mapping
-from estimation.logs.mapping_suggestions import suggest_mapping
-from estimation.logs.repairs import drop_repeated_rows
+from estimation.logs.mapping_suggestions import PLAIN_REMEDY, remedy_for_columns
+from estimation.logs.repairs import repair_rows
+from estimation.logs.torque_source import KEY, parse_meaning
 from robots.common.errors import InputError
 from robots.common.tables.table import Table
 from robots.signals import FloatArray, Log
 
 LISTED = 10
 """Columns of a file that an error message lists."""
-
-_PLAIN_REMEDY = "rename the columns, or describe them in a mapping (--mapping)"
 
 
 def read_log(
@@ -35,6 +36,7 @@ def read_log(
     torque: bool = True,
     mapping: LogMapping | str | PathLike[str] | None = None,
     joints: Sequence[str] | None = None,
+    kinds: Sequence[str] | None = None,
 ) -> Log:
     """Reads a log: ``t, q1..qn``, torque or current, and whatever optional columns there are.
 
@@ -47,6 +49,7 @@ def read_log(
         torque: whether torque or current must be there; a prediction needs the motion only.
         mapping: a mapping YAML, where the columns have other names, units, signs or another order.
         joints: names of the robot's joints in its order: a bag names its joints, in any order.
+        kinds: "revolute" or "prismatic" of each joint: units of angles do not apply to linear axes.
 
     Returns:
         The log in SI units. ``metadata`` holds what the file says of itself, ``file`` (its path),
@@ -57,8 +60,8 @@ def read_log(
             record of another file, both counted from 1.
     """
     known = mapping if isinstance(mapping, LogMapping) or mapping is None else read_mapping(mapping)
-    table, notes = read_log_table(path, n, known, joints)
-    remedy = _remedy(table, known, n, joints)
+    table, notes = read_log_table(path, n, known, joints, kinds)
+    remedy = PLAIN_REMEDY if known else remedy_for_columns((*table.names, *table.skipped), n, joints)
     quantities = _checked_names(table, remedy)
     count = _count_joints(table, quantities, n, remedy)
     for name in table.names:
@@ -66,11 +69,12 @@ def read_log(
     table, dropped = without_broken_derivatives(table)
     quantities = {name: quantities[name] for name in table.names}
     whole = table
-    table, kept, repairs = drop_repeated_rows(table)
+    table, kept, repairs = repair_rows(table)
     repairs = [*notes, *dropped, *repairs]
     if len(table) < 2:
         raise InputError("only one row", file=table.path, row=table.first_row, allowed="2 or more rows")
-    factors = unit_factors(table, quantities)
+    factors, unit_notes = unit_factors(table, quantities, kinds)
+    repairs = [*table.metadata.get(UNIT_NOTES, ()), *unit_notes, *repairs]
     signals = {
         quantity.field: _signal(table, quantity, count, factors)
         for quantity in QUANTITIES
@@ -86,18 +90,23 @@ def read_log(
             remedy=table.metadata.get("no_torque", remedy),
         )
     metadata = _metadata(table) | ({"repairs": repairs} if repairs else {})
+    if known is not None and known.torque_is is not None:
+        parse_meaning(known.torque_is, count)
+        metadata[KEY] = known.torque_is
     try:
         return Log(**signals, name=table.path.stem, metadata=metadata)
     except InputError as error:
-        _raise_for_file(error, whole, kept)
+        _raise_for_file(error, whole, kept, signals)
 
 
 def read_logs(
     paths: str | PathLike[str] | Sequence[str | PathLike[str]],
     n: int | None = None,
     *,
+    torque: bool = True,
     mapping: LogMapping | str | PathLike[str] | None = None,
     joints: Sequence[str] | None = None,
+    kinds: Sequence[str] | None = None,
 ) -> tuple[Log, ...]:
     """Reads the logs of one robot.
 
@@ -105,8 +114,10 @@ def read_logs(
         paths: files, each once, or folders: all logs of a folder are one campaign, in the order of its clock. A
             ``mapping.yaml`` in a folder is that of its logs.
         n: the number of joints of the robot; without it the first log decides.
+        torque: see `read_log`.
         mapping: see `read_log`.
         joints: see `read_log`.
+        kinds: see `read_log`.
 
     Raises:
         InputError: no file, a file twice, another number of joints, or a file that is not a log.
@@ -125,7 +136,7 @@ def read_logs(
                 "the log is given twice", file=path, remedy="give each log once; otherwise it would count twice"
             )
         seen.add(real)
-        log = read_log(path, n, mapping=mapping, joints=joints)
+        log = read_log(path, n, torque=torque, mapping=mapping, joints=joints, kinds=kinds)
         if logs and log.n != logs[0].n:
             raise InputError(
                 f"{log.n} joints, but {logs[0].metadata['file']} has {logs[0].n}",
@@ -173,14 +184,6 @@ def _checked_names(table: Table, remedy: str) -> dict[str, Quantity]:
     return quantities
 
 
-def _remedy(table: Table, mapping: LogMapping | None, n: int | None, joints: Sequence[str] | None) -> str:
-    """Says what to do about a missing column: if possible, with the mapping that would fit."""
-    suggested = None if mapping is not None else suggest_mapping((*table.names, *table.skipped), n, joints)
-    if suggested is None:
-        return _PLAIN_REMEDY
-    return f"check this mapping, save it as mapping.yaml and add --mapping mapping.yaml:\n{suggested}".rstrip()
-
-
 def _listed(table: Table, prefix: str = "") -> str:
     """Lists columns of a file, unknown ones first, then those of a prefix."""
     names = [*table.skipped, *(name for name in table.names if name.startswith(prefix))]
@@ -209,7 +212,7 @@ def _count_joints(table: Table, quantities: Mapping[str, Quantity], n: int | Non
                     column=f"{quantity.prefix}{joint}",
                     row=_header_row(table),
                     allowed=f"one column for each of q1..q{joints}" if joints else "q1..qn",
-                    remedy=_PLAIN_REMEDY
+                    remedy=PLAIN_REMEDY
                     + (f"; or remove all columns {quantity.prefix}1.." if found and quantity.prefix != "q" else "")
                     if joints
                     else remedy,
@@ -252,7 +255,7 @@ def _signal(table: Table, quantity: Quantity, joints: int, factors: Mapping[str,
 
 
 def _metadata(table: Table) -> dict[str, Any]:
-    metadata = {key: value for key, value in table.metadata.items() if key not in ("units", "no_torque")}
+    metadata = {key: value for key, value in table.metadata.items() if key not in ("units", "no_torque", UNIT_NOTES)}
     period = metadata.get("period")
     if period is not None:
         try:
@@ -271,11 +274,13 @@ def _header_row(table: Table) -> int | None:
     return table.first_row - 1 or None
 
 
-def _raise_for_file(error: InputError, table: Table, kept: NDArray[np.intp]) -> NoReturn:
+def _raise_for_file(
+    error: InputError, table: Table, kept: NDArray[np.intp], signals: Mapping[str, FloatArray]
+) -> NoReturn:
     """Raises an error about an array as one about the file: its column by name, its row by line."""
     quantity = BY_FIELD[error.column or "t"]
     if error.problem.startswith("time"):
-        remedy = "sort the rows by time and keep one of each time"
+        remedy = advice_on_times(signals["t"], signals["q"])
     else:
         remedy = "repair or remove these rows, or leave out all columns of the quantity; an empty cell counts as nan"
     raise InputError(

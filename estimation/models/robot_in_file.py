@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import fields
 from typing import Any
 
 import numpy as np
@@ -12,8 +11,9 @@ from numpy.typing import NDArray
 from robots.common.errors import InputError
 from robots.common.plain import all_finite, number
 from robots.geometry.chain import Chain, Joint
-from robots.limits import Limits
+from robots.limits import BOUNDS, Limits
 from robots.robot import Robot
+from robots.terms.situations.flange_body import FLANGE
 
 Array = NDArray[np.float64]
 
@@ -42,8 +42,9 @@ def describe_robot(robot: Robot) -> dict[str, Any]:
         "sha256": robot.digest,
         "gravity": robot.chain.gravity.tolist(),
         "joints": joints,
+        "tip": robot.chain.tip.tolist(),
         **{name: all_finite(getattr(robot, name)) for name in _BY_JOINT},
-        "limits": {item.name: all_finite(getattr(robot.limits, item.name)) for item in fields(Limits)},
+        "limits": {name: all_finite(getattr(robot.limits, name)) for name in BOUNDS},
     }
 
 
@@ -55,16 +56,17 @@ def build_robot(data: Mapping[str, Any]) -> Robot:
     """
     joints = tuple(Joint(**joint) for joint in data["joints"])
     n, limits = len(joints), data.get("limits", {})
-    bounds = {item.name: _array(limits.get(item.name), n, np.inf) for item in fields(Limits) if item.name != "lower"}
+    bounds: dict[str, Any] = {name: _array(limits.get(name), n, np.inf) for name in BOUNDS if name != "lower"}
     return Robot(
         name=data["name"],
-        chain=Chain(joints, np.array(data["gravity"])),
+        chain=Chain(joints, np.array(data["gravity"]), np.array(data.get("tip", np.eye(4)))),
         limits=Limits(lower=_array(limits.get("lower"), n, -np.inf), **bounds),
         rotor_inertia=_array(data.get("rotor_inertia"), n, 0.0),
         gear_ratio=_array(data.get("gear_ratio"), n, 1.0),
         torque_constant=_array(data.get("torque_constant"), n, np.nan),
         origin=data["origin"],
         digest=data["sha256"],
+        assumed=() if "tip" in data else (FLANGE,),
     )
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -10,13 +10,16 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from estimation.gate import GateReport
 from estimation.logs.clocks import clock_shift_between, earlier_logs_on_clock
 from estimation.logs.known_setup import HEAT, require_plain
 from estimation.models.model import Model
 from estimation.predictions.band import band_of_motion, beyond_the_recorded
-from estimation.preprocessing import LowPass, Smoother, SmoothingSpline, resample, smooth
+from estimation.predictions.checked_motions import checked_motion, joined, smoother_of
+from estimation.preprocessing import resample, smooth
 from estimation.preprocessing.smoothing import low_pass
 from estimation.regressions.preparation import torque_of
+from estimation.regressions.torque_meanings import as_joint_torque
 from robots.common.errors import InputError
 from robots.common.plain import all_finite, finite
 from robots.common.tables.table_files import write_table
@@ -47,6 +50,7 @@ class Prediction:
             not seen the like. None without a band.
         beyond: what exceeds the recorded motions, in words.
         cutoff: of the model's smoothing [Hz]: above it, no motion is known.
+        gate: the check of the log; None without one.
     """
 
     motion: Motion
@@ -57,6 +61,7 @@ class Prediction:
     extrapolates: NDArray[np.bool_] | None = None
     beyond: tuple[str, ...] = ()
     cutoff: float = np.inf
+    gate: GateReport | None = None
 
     @property
     def error_rms(self) -> Array:
@@ -148,6 +153,7 @@ class Prediction:
             "extrapolates": None if self.extrapolates is None else self.extrapolates.mean(axis=0).tolist(),
             "beyond_the_recorded": list(self.beyond),
             "cutoff_hz": finite(self.cutoff),
+            "gate": None if self.gate is None else self.gate.to_dict(),
             **{name: all_finite(values) for name, values in quantities.items()},
         }
 
@@ -185,8 +191,9 @@ def predict(
     ambient: float | None = None,
     later: float | None = None,
     before: Sequence[Log] = (),
+    check: bool = True,
 ) -> Prediction:
-    """Predicts the torques of a log's motion.
+    """Predicts the torques of a log's motion, which is checked and repaired first (`checked_motion`).
 
     Args:
         model: an identified model.
@@ -199,13 +206,15 @@ def predict(
         later: how much later [s] than its own clock says the log counts; by default what `clock_shift` says.
         before: logs of what the robot did before, for a model whose effects keep heat: without any it begins cold.
             With `later` their times are as they count (`warmed`). Beside `thermal`, `start` says what was before.
+        check: whether the log passes the gate first.
 
     Returns:
-        The torques at the log's own times.
+        The torques at the log's own times, without parts that are too short to be smoothed.
 
     Raises:
-        InputError: another number of joints, or too few rows; a gravity that shows parameters which the model lacks; a
-            payload or a gravity beside heat; logs before the motion that come after it, or of a model that keeps none.
+        InputError: another number of joints, too few rows, or a motion that the gate refuses; a gravity that shows
+            parameters which the model lacks; a payload or a gravity beside heat; logs before the motion that come after
+            it, or of a model that keeps none.
     """
     robot = model.robot
     if log.n != robot.n:
@@ -213,14 +222,17 @@ def predict(
             f"{log.n} joints", file=log.metadata.get("file"), allowed=f"{robot.n}, as in the model of {robot.name}"
         )
     cutoff = float(model.provenance.get("cutoff_hz", 10.0))
-    motion = smooth(resample(log.t, log.q), _smoother(model, cutoff))
+    log = as_joint_torque(robot, log) if log.tau is not None or log.current is not None else log
+    gate, parts = checked_motion(robot, log) if check else (None, [log])
+    log = joined(parts)
+    motion = Motion.concatenate([smooth(resample(part.t, part.q), smoother_of(model, cutoff)) for part in parts])
     has_torque = log.tau is not None or log.current is not None
     if thermal is None:
         states = (motion.q, motion.dq, motion.ddq)
         if later is None:
             later = clock_shift(model, log)[0]
             before = warmed(model, before, log, later)[0]
-        smoother, clock = _smoother(model, cutoff), motion.t + later
+        smoother, clock = smoother_of(model, cutoff), motion.t + later
         earlier = [smooth(resample(own.t, own.q), smoother) for own in before]
         predicted = model.torque(*states, clock, gravity=log.gravity, payload=log.payload, before=earlier)
     else:
@@ -238,6 +250,7 @@ def predict(
         extrapolates=None if band is None else band[1],
         beyond=beyond_the_recorded(model, motion),
         cutoff=cutoff,
+        gate=gate,
     )
 
 
@@ -277,20 +290,8 @@ def warmed(model: Model, before: Sequence[Log], log: Log, later: float) -> tuple
     shifts = [clock_shift(model, own)[0] for own in before]
     placed, anew = earlier_logs_on_clock(before, log, float(log.t[0]) + later, shifts)
     count = "one log" if len(before) == 1 else f"{len(before)} logs"
-    return (
-        placed,
-        (
-            f"thermal friction: initial temperatures from {count} before; the first is assumed to start "
-            f"cold{f'; {anew}' if anew else ''}"
-        ),
-    )
+    assumed = f"thermal friction: initial temperatures from {count} before; the first is assumed to start cold"
+    return placed, f"{assumed}; {anew}" if anew else assumed
 
 
 COLD = "thermal friction: the robot is assumed cold at the start; give earlier logs with --before if it was warm"
-
-
-def _smoother(model: Model, cutoff: float) -> Smoother:
-    """The smoother of the model's data for another motion; a low-pass instead of harmonics."""
-    smoothing = model.provenance.get("smoothing")
-    kind = smoothing.get("kind") if isinstance(smoothing, Mapping) else None
-    return SmoothingSpline(cutoff) if kind == SmoothingSpline.name else LowPass(cutoff)

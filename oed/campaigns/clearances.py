@@ -85,7 +85,7 @@ class CollisionFreeRanges:
 
     def _ranges(self, limits: Limits, fraction: float) -> tuple[Array, Array]:
         endless = ~np.isfinite(limits.upper - limits.lower)
-        middle = np.where(endless, self._home, (limits.lower + limits.upper) / 2.0)
+        middle = np.where(endless, self._home, limits.middle)
         half = np.where(endless, np.pi, (limits.upper - limits.lower) / 2.0) * fraction
         return np.minimum(middle - half, self._home), np.maximum(middle + half, self._home)
 

@@ -217,8 +217,9 @@ class Planner:
             worst = self.torque.worst(motion)
         assert worst is not None
         usable = (1.0 - self.torque.margin) * worst.limit
+        unit = self.limits.unit(worst.joint - 1, "torque")
         raise InfeasibleError(
-            f"the {name} stage needs {abs(worst.value):.3g} N m (prismatic: N) even with low accelerations",
+            f"the {name} stage needs {abs(worst.value):.3g} {unit} even with low accelerations",
             joint=worst.joint,
             allowed=f"{usable:.3g}, the torque limit minus {100 * self.torque.margin:g} % reserve",
             remedy="reduce --velocity-fraction or --torque-margin",

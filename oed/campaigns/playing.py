@@ -116,7 +116,7 @@ def record(
         listener.start(f"playing on a virtual {campaign.robot.name}", len(names))
         try:
             for done, (name, log) in enumerate(zip(names, play(campaign, plant, seed), strict=True), start=1):
-                write_log(out.path(name), log)
+                write_log(out.path(name), log, kinds=campaign.robot.chain.kinds)
                 listener.update(done, name)
         finally:
             listener.finish()

@@ -196,7 +196,7 @@ class Campaign:
             "torque_margin": self.torque_margin,
             "stages": [
                 {
-                    **stage.to_dict(),
+                    **stage.to_dict(self.robot.limits),
                     "sha256": None if digests is None else digests[stage.name],
                     "heat": self.heat[stage.name].tolist(),
                 }
@@ -227,7 +227,7 @@ class Campaign:
                 "stage": stage.name,
                 "tool": f"robot-oed {VERSION}",
             }
-            write_trajectory(folder / stage.file, stage.motion, metadata, force=force)
+            write_trajectory(folder / stage.file, stage.motion, metadata, kinds=self.robot.chain.kinds, force=force)
             digests[stage.name] = sha256(folder / stage.file)
         text = json.dumps(self.to_dict(digests), indent=2, allow_nan=False) + "\n"
         write_atomic(folder / CAMPAIGN, text, force=force)
@@ -246,7 +246,7 @@ class Campaign:
         file = Path(folder) / CAMPAIGN
         try:
             data = json.loads(existing_file(file).read_text(encoding="utf-8"))
-            known = robot or load_robot(data["robot"]["origin"])
+            known = robot or load_robot(data["robot"]["origin"], unlimited=True)
             if known.name != data["robot"]["name"]:
                 raise InputError(f"the campaign is for {data['robot']['name']}, not for {known.name}", file=file)
             stages = []

@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from oed.experiments.safety_checks.margins import margin_data
+from oed.experiments.safety_checks.margins import margin_data, margin_from
 from robots.common.errors import InputError
-from robots.limits import Margin
+from robots.limits import Limits, Margin
 from robots.signals import Motion
 
 Array = NDArray[np.float64]
@@ -72,7 +72,7 @@ class Stage:
         stated = (margin for margin in self.margins if np.isfinite(margin.limit))
         return min(stated, key=lambda margin: margin.slack_fraction, default=None)
 
-    def to_dict(self) -> dict[str, Any]:
+    def to_dict(self, limits: Limits | None = None) -> dict[str, Any]:
         """Writes all but the samples as plain data."""
         return {
             "name": self.name,
@@ -83,16 +83,13 @@ class Stage:
             "segments": [dict(segment) for segment in self.segments],
             "plateaus": [dict(plateau) for plateau in self.plateaus],
             "details": dict(self.details),
-            "smallest_margins": [margin_data(margin) for margin in self.margins],
+            "smallest_margins": [margin_data(margin, limits) for margin in self.margins],
         }
 
     @classmethod
     def from_dict(cls, data: Mapping[str, Any], motion: Motion) -> Stage:
         """Reads what `to_dict` wrote, with the motion of its file."""
-        margins = tuple(
-            Margin(**{**margin, "limit": np.inf if margin["limit"] is None else margin["limit"]})
-            for margin in data["smallest_margins"]
-        )
+        margins = tuple(margin_from(margin) for margin in data["smallest_margins"])
         return cls(
             name=data["name"],
             kind=data["kind"],

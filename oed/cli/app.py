@@ -8,7 +8,9 @@ import typer
 
 from oed.cli.command import HELP
 from oed.cli.commands.campaign import campaign
+from oed.cli.commands.check import check
 from oed.cli.commands.compare import compare
+from oed.cli.commands.controller import controller
 from oed.cli.commands.design import design
 from oed.cli.commands.diagnose import diagnose
 from oed.cli.commands.doctor import doctor
@@ -17,9 +19,13 @@ from oed.cli.commands.example import example
 from oed.cli.commands.export import export
 from oed.cli.commands.identify import identify
 from oed.cli.commands.pareto import pareto
+from oed.cli.commands.payload import payload
 from oed.cli.commands.predict import predict
+from oed.cli.commands.record import record
 from oed.cli.commands.retime import retime
+from oed.cli.commands.robot import robot, robots
 from oed.cli.commands.simulate import simulate
+from oed.cli.commands.stream import stream
 from oed.cli.commands.thermal import thermal
 from oed.cli.help.groups import Commands
 
@@ -28,14 +34,21 @@ FUNCTIONS = (
     pareto,
     retime,
     export,
+    stream,
+    record,
+    controller,
     campaign,
     simulate,
+    check,
     identify,
     thermal,
     diagnose,
     predict,
     compare,
+    payload,
     example,
+    robot,
+    robots,
     effects,
     doctor,
 )

@@ -23,6 +23,7 @@ APPLY = {
     "tip",
     "joints",
     "lock",
+    "unlimited",
     "png",
     "force",
     "json",

@@ -12,7 +12,7 @@ from robots.common.errors import InputError
 if TYPE_CHECKING:
     from robots.robot import Robot
 
-ROBOT = "a catalogue name (er3a, ur10, panda), a URDF, or a robot YAML"
+ROBOT = "a catalogue name (er3a, ur10, panda), a URDF or xacro, or a robot YAML"
 
 RobotOption = Annotated[str, typer.Option("--robot", help=f"The robot: {ROBOT}.", show_default=False)]
 TipOption = Annotated[
@@ -27,6 +27,9 @@ LockOption = Annotated[
     typer.Option(
         "--lock", help="Hold a joint at a position [rad or m], as name=value. Repeatable.", show_default=False
     ),
+]
+UnlimitedOption = Annotated[
+    bool, typer.Option("--unlimited", help="URDF: accept revolute and prismatic joints without position limits.")
 ]
 LogOption = Annotated[
     list[Path], typer.Option("--log", help="A log, or a folder of logs. Repeatable.", show_default=False)
@@ -47,6 +50,14 @@ WorkersOption = Annotated[
 ]
 OutOption = Annotated[Path, typer.Option("--out", help="Folder for the results.")]
 FrictionOption = Annotated[str, typer.Option("--friction", help="Friction model: polynomial or coulomb-viscous.")]
+FittedFrictionOption = Annotated[
+    str,
+    typer.Option(
+        "--friction",
+        help="Friction model: auto (bends within the recorded speeds, grows linearly beyond), polynomial or "
+        "coulomb-viscous.",
+    ),
+]
 FamilyOption = Annotated[
     str, typer.Option("--family", help="Family of the optimised part: fourier, bspline or fourier-polynomial.")
 ]
@@ -68,8 +79,17 @@ TorqueMarginOption = Annotated[
 PngOption = Annotated[bool, typer.Option("--png", help="Also write the report's figures as PNG files.")]
 
 
-def robot_from(spec: str, tip: str | None = None, joints: str | None = None, lock: list[str] | None = None) -> Robot:
+def robot_from(
+    spec: str,
+    tip: str | None = None,
+    joints: str | None = None,
+    lock: list[str] | None = None,
+    *,
+    unlimited: bool = True,
+) -> Robot:
     """Loads the robot that the options name.
+
+    Only commands that plan a motion need position limits; they pass what `--unlimited` says.
 
     Raises:
         InputError: see `robots.loading.load_robot`; or a lock that is not name=value.
@@ -86,7 +106,7 @@ def robot_from(spec: str, tip: str | None = None, joints: str | None = None, loc
                 f"--lock {item}", allowed="name=value with the value in rad or m, such as elbow_joint=1.57"
             ) from None
     names = [name.strip() for name in joints.split(",")] if joints else None
-    return load_robot(spec, tip=tip, joints=names, locked=locked or None)
+    return load_robot(spec, tip=tip, joints=names, locked=locked or None, unlimited=unlimited)
 
 
 def numbers(option: str, text: str | None) -> list[float] | None:

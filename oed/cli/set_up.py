@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
@@ -11,6 +12,7 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
+    from robots.robot import Robot
     from robots.signals import Log
 
 PayloadOption = Annotated[
@@ -19,7 +21,17 @@ PayloadOption = Annotated[
         "--payload",
         help=(
             "Known payload in a log, as NUMBER=KG,X,Y,Z: number of the log, mass [kg], centre of mass in the flange "
-            "frame [m]."
+            "frame [m]; or NUMBER=payload.json. With one log, NUMBER= may be left out."
+        ),
+        show_default=False,
+    ),
+]
+CarriedOption = Annotated[
+    str | None,
+    typer.Option(
+        "--payload",
+        help=(
+            "Payload on the flange: a payload.json, or KG,X,Y,Z: mass [kg] and centre of mass in the flange frame [m]."
         ),
         show_default=False,
     ),
@@ -36,13 +48,45 @@ GravityOption = Annotated[
     ),
 ]
 
+TorqueIsOption = Annotated[
+    str | None,
+    typer.Option(
+        "--torque-is",
+        help=(
+            "What the torque columns hold, if not joint torques: current, motor, or without-gravity. With joints if it "
+            "concerns some only: motor:2,5."
+        ),
+        show_default=False,
+    ),
+]
+
+
+def with_torque_meaning(robot: Robot, logs: Sequence[Log], torque_is: str | None) -> list[Log]:
+    """Converts torque columns of another meaning to joint torques, by the robot's description.
+
+    Args:
+        robot: of the logs.
+        logs: with their payloads and gravity vectors; a log without torque stays as it is.
+        torque_is: see `estimation.logs.torque_source.parse_meaning`; None for what the mapping states.
+
+    Raises:
+        InputError: an unknown meaning, or a description that lacks what is needed.
+    """
+    from estimation.logs.torque_source import parse_meaning
+    from estimation.regressions.torque_meanings import as_joint_torque
+
+    if torque_is is not None:
+        parse_meaning(torque_is, robot.n)
+    return [log if log.tau is None and log.current is None else as_joint_torque(robot, log, torque_is) for log in logs]
+
 
 def with_known_setup(logs: Sequence[Log], payloads: list[str] | None, gravities: list[str] | None) -> list[Log]:
     """Adds known payloads and gravity vectors to logs.
 
     Args:
         logs: in the order in which they were read; they are numbered from 1.
-        payloads: each NUMBER=KG,X,Y,Z, a point mass [kg] and its position [m] in the flange's frame.
+        payloads: each NUMBER=KG,X,Y,Z, a point mass [kg] and its position [m] in the flange's frame, or NUMBER=FILE, a
+            payload.json; of a single log without the number.
         gravities: each NUMBER=X,Y,Z [m/s2], in the base frame.
 
     Raises:
@@ -69,7 +113,9 @@ def _by_number(
 
     found: dict[int, NDArray[np.float64]] = {}
     for text in texts:
-        name, _, values = text.partition("=")
+        name, equals, values = text.partition("=")
+        if not equals and option == "--payload" and count == 1:
+            name, values = "1", text
         try:
             number, value = int(name), read(values)
         except ValueError:
@@ -85,15 +131,21 @@ def _by_number(
 
 
 _EXAMPLES = {
-    "--payload": ("NUMBER=KG,X,Y,Z; 2=5,0,0,0.1 means log 2 with 5 kg, centred 0.1 m in front of the flange"),
+    "--payload": (
+        "NUMBER=KG,X,Y,Z or NUMBER=payload.json; 2=5,0,0,0.1 means log 2 with 5 kg, centred 0.1 m in front of the "
+        "flange"
+    ),
     "--gravity": "NUMBER=X,Y,Z; 2=0,-2.54,-9.48 means log 2 with the base tilted by 15 degrees",
 }
 
 
 def _payload(values: str) -> NDArray[np.float64]:
-    """Reads KG,X,Y,Z: the ten inertial parameters of a point mass."""
+    """Reads KG,X,Y,Z, or a payload.json: ten inertial parameters in the flange's frame."""
+    from estimation.payloads.body import read_body
     from robots.terms.situations.flange_body import point_mass
 
+    if values.endswith(".json") or (values and Path(values).exists()):
+        return read_body(values).parameters
     mass, x, y, z = map(float, values.split(","))
     return point_mass(mass, (x, y, z))
 

@@ -55,7 +55,7 @@ def check_feasible(robot: Robot, limits: GeometricLimits, home: ArrayLike) -> No
         raise InfeasibleError(
             f"the start pose violates the limit {limits.labels[row]!r} by {-values[row]:.3g}{unit}",
             allowed=f"a limit that is {-values[row]:.3g}{unit} wider, or another start pose",
-            remedy=_advice(nearest_feasible(limits, q)),
+            remedy=_advice(nearest_feasible(limits, q), limits),
         )
 
 
@@ -104,13 +104,14 @@ def _check_clearance(limit: CollisionLimit, limits: GeometricLimits, q: Array) -
     if isinstance(pair.first, Plane):
         allowed = f"a plane at {pair.first.offset - lacking:.4g} m or lower instead of {pair.first.offset:.4g} m"
     problem = f"in the start pose {pair.first.name!r} and {pair.second.name!r} {what}"
-    raise InfeasibleError(problem, allowed=allowed, remedy=_advice(nearest_feasible(limits, q)))
+    raise InfeasibleError(problem, allowed=allowed, remedy=_advice(nearest_feasible(limits, q), limits))
 
 
-def _advice(pose: Array | None) -> str:
+def _advice(pose: Array | None, limits: GeometricLimits) -> str:
     if pose is None:
         return "no pose nearby respects all limits: widen them"
-    return f"the nearest pose that respects all limits is {', '.join(f'{x:.3f}' for x in pose)} rad"
+    unit = limits.robot.limits.position_unit
+    return f"the nearest pose that respects all limits is {', '.join(f'{x:.3f}' for x in pose)} {unit}"
 
 
 def nearest_feasible(limits: GeometricLimits, home: ArrayLike, *, seed: int = 0, room: float = 0.0) -> Array | None:

@@ -82,7 +82,7 @@ def rest_pose(limits: Limits, home: ArrayLike | None) -> Array:
         raise InputError(
             f"the home pose {pose[joint]:g} lies outside the position limits",
             joint=joint + 1,
-            allowed=f"{limits.lower[joint]:.4g} to {limits.upper[joint]:.4g} [rad or m]",
+            allowed=f"{limits.lower[joint]:.4g} to {limits.upper[joint]:.4g} {limits.unit(joint)}",
         )
     return pose
 

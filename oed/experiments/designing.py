@@ -15,7 +15,7 @@ from oed.experiments.assembly import assemble, rest_pose
 from oed.experiments.checks import check_period, usable_limits
 from oed.experiments.options import LimitOptions, ModelOptions, SearchOptions, TrajectoryOptions, WeightOptions
 from oed.experiments.problems.criterion_weighting import choose_weighting
-from oed.experiments.problems.essential import essential_part
+from oed.experiments.problems.essential import essential_part, payload_part
 from oed.experiments.problems.problem import FourierProblem
 from oed.experiments.quality import measure
 from oed.experiments.results.outcome import Outcome
@@ -35,6 +35,7 @@ from robots.loading import load_robot
 from robots.regressor import default_model
 from robots.robot import Robot
 from robots.signals import Motion
+from robots.terms.situations.flange_body import carrying
 
 Array = NDArray[np.float64]
 
@@ -78,10 +79,11 @@ def design(
         InputError: options out of range, an unknown criterion.
         InfeasibleError: a limit of zero, or no start that keeps the limits and excites all parameters.
     """
-    known = robot if isinstance(robot, Robot) else load_robot(robot)
+    described = robot if isinstance(robot, Robot) else load_robot(robot)
     chosen = choose_criterion(criterion)
     fitted, plan = model or ModelOptions(), trajectory or TrajectoryOptions()
     kept, weighed, work = limits or LimitOptions(), weights or WeightOptions(), search or SearchOptions()
+    known = carrying(described, kept.payload)
     settings: dict[str, Any] = {}
     for group in (fitted, plan, kept, weighed, work):
         settings |= group.settings()
@@ -146,6 +148,8 @@ def _base(
         rotor=fitted.rotor,
         offset=fitted.offset,
     )
+    if fitted.payload_only:
+        return payload_part(model)
     base = find_base_parameters(model)
     if not fitted.essential:
         return base

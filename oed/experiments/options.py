@@ -20,6 +20,7 @@ from oed.trajectories import family as choose_family
 from robots.common.errors import InputError
 from robots.common.plain import finite
 from robots.plants import PlantEffect
+from robots.signal_checks import checked_body
 from robots.signals import Motion
 from robots.terms import FrictionTerm
 
@@ -35,6 +36,8 @@ class ModelOptions:
         essential: leaves out base parameters whose torque, by the robot's description, stays below this share of each
             joint's on random motions; 0 keeps all.
         velocity_scale: of the Coulomb column tanh(dq / scale) [rad/s].
+        payload_only: the criterion judges the ten parameters of a body on the flange alone: the arm counts as known, as
+            in the difference of two logs of one path. The other options then matter for the torque limits only.
     """
 
     friction: str | FrictionTerm = "polynomial"
@@ -42,6 +45,7 @@ class ModelOptions:
     rotor: bool = True
     essential: float = 0.0
     velocity_scale: float = 0.02
+    payload_only: bool = False
 
     def settings(self) -> dict[str, Any]:
         """Writes them as plain data; a term of one's own by its name."""
@@ -52,6 +56,7 @@ class ModelOptions:
             "rotor": self.rotor,
             "essential": self.essential,
             "velocity_scale": self.velocity_scale,
+            "payload_only": self.payload_only,
         }
 
 
@@ -114,9 +119,11 @@ class LimitOptions:
         motion: limits of position, velocity and acceleration of one's own, see `StateLimit`.
         effects: what the robot has beyond its description, as a diagnosis found it: the torque of those that follow
             from position, velocity and acceleration counts within the torque limits.
+        payload: ten inertial parameters (10,) of a body that the robot carries on its flange, in the flange's frame:
+            its torque counts within the torque limits.
 
     Raises:
-        InputError: a velocity fraction out of range.
+        InputError: a velocity fraction out of range, or a payload of another shape.
     """
 
     velocity_fraction: float = 1.0
@@ -127,10 +134,13 @@ class LimitOptions:
     space: Sequence[GeometricLimit] = ()
     motion: Sequence[StateLimit] = ()
     effects: Sequence[PlantEffect] = ()
+    payload: ArrayLike | None = None
 
     def __post_init__(self) -> None:
         if not 0 < self.velocity_fraction <= 1:
             raise InputError(f"the velocity fraction is {self.velocity_fraction}", allowed="above 0, up to 1")
+        if self.payload is not None:
+            object.__setattr__(self, "payload", checked_body(self.payload))
         for limit in self.space:
             if not isinstance(limit, GeometricLimit):
                 raise InputError(f"the limit {limit!r}", allowed="a subclass of GeometricLimit in `space`")
@@ -153,6 +163,7 @@ class LimitOptions:
             "space": [repr(limit) for limit in self.space],
             "motion": [repr(limit) for limit in self.motion],
             "effects": [asdict(effect) for effect in self.effects],
+            "payload": None if self.payload is None else np.asarray(self.payload, dtype=float).tolist(),
         }
 
 

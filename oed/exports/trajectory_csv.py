@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from os import PathLike
 from typing import Any
 
@@ -18,7 +18,8 @@ from robots.signals import Motion
 Array = NDArray[np.float64]
 
 QUANTITIES = ("q", "dq", "ddq")
-UNITS = {"q": "rad", "dq": "rad/s", "ddq": "rad/s2"}
+RATES = {"q": "", "dq": "/s", "ddq": "/s2"}
+LENGTHS = {"rad": 1.0, "deg": float(np.pi / 180.0), "m": 1.0, "mm": 1e-3}
 _JOINT_COLUMN = re.compile(r"(q|dq|ddq)([1-9]\d*)")
 
 
@@ -27,6 +28,7 @@ def write_trajectory(
     motion: Motion,
     metadata: Mapping[str, Any] | None = None,
     *,
+    kinds: Sequence[str] | None = None,
     degrees: bool = False,
     positions_only: bool = False,
     bare: bool = False,
@@ -38,6 +40,8 @@ def write_trajectory(
         path: the file, ending in .csv.
         motion: uniform in time.
         metadata: what else the block shall state, such as robot, criterion and tool version.
+        kinds: "revolute" or "prismatic" of each joint; by default those under "kinds" in the metadata, as
+            `read_trajectory` returns them, or all revolute. Prismatic joints are in m.
         degrees: angles in degrees; the block says so, and `read_trajectory` turns them back.
         positions_only: leave out velocities and accelerations.
         bare: no block, just the header line.
@@ -50,16 +54,20 @@ def write_trajectory(
         raise InputError(
             "the motion is not uniform in time", file=path, remedy="resample it at the controller's period"
         )
+    stated = {"period": motion.period, **(metadata or {})}
+    known = stated.pop("kinds", None)
+    kinds = list(kinds or known or ["revolute"] * motion.n)
+    if len(kinds) != motion.n:
+        raise InputError(f"{len(kinds)} joint kinds", file=path, allowed=f"{motion.n}, one per joint")
     columns: dict[str, Array] = {"t": motion.t}
     units = {"t": "s"}
     for quantity in QUANTITIES[:1] if positions_only else QUANTITIES:
-        values = getattr(motion, quantity)
-        values = np.rad2deg(values) if degrees else values
-        for joint in range(motion.n):
-            columns[f"{quantity}{joint + 1}"] = values[:, joint]
-            units[f"{quantity}{joint + 1}"] = UNITS[quantity].replace("rad", "deg") if degrees else UNITS[quantity]
+        for joint, kind in enumerate(kinds):
+            values = getattr(motion, quantity)[:, joint]
+            length = "m" if kind == "prismatic" else "deg" if degrees else "rad"
+            columns[f"{quantity}{joint + 1}"] = np.rad2deg(values) if length == "deg" else values
+            units[f"{quantity}{joint + 1}"] = f"{length}{RATES[quantity]}"
     if not bare:
-        stated = {"period": motion.period, **(metadata or {})}
         write_table(path, columns, stated, units=units, force=force)
         return
     rows = np.column_stack(list(columns.values())).tolist()
@@ -70,29 +78,36 @@ def write_trajectory(
 def read_trajectory(path: str | PathLike[str], *, n: int | None = None) -> tuple[Motion, dict[str, Any]]:
     """Reads a trajectory file and checks that it can be followed.
 
-    Other columns than t, q, dq and ddq are ignored. Columns whose stated unit begins with "deg" become radians.
+    Other columns than t, q, dq and ddq are ignored. Columns in degrees or millimetres become radians or metres.
 
     Args:
         path: the file.
         n: the number of joints it must have, if known.
 
     Returns:
-        The motion in rad and s, and what the block states.
+        The motion in rad or m and s, and what the block states. Where it states units, "kinds" has "revolute" or
+        "prismatic" of each joint.
 
     Raises:
-        InputError: a missing column, an empty cell or NaN, time that runs backward or unevenly, or velocities and
-            accelerations that are not the derivatives of the positions; with column and line of the file.
+        InputError: a missing column, an unknown unit, an empty cell or NaN, time that runs backward or unevenly, or
+            velocities and accelerations that are not the derivatives of the positions; with column and line.
     """
     table = read_table(path, wanted=lambda name: name == "t" or _JOINT_COLUMN.fullmatch(name) is not None)
     count = _count_joints(table, n)
     t = _column(table, "t")
     q, dq, ddq = (
-        np.column_stack([_angles(table, f"{quantity}{joint + 1}") for joint in range(count)]) for quantity in QUANTITIES
+        np.column_stack([_lengths(table, quantity, joint + 1) for joint in range(count)]) for quantity in QUANTITIES
     )
     _check_time(t, table)
     motion = Motion(t, q, dq, ddq)
     _check_derivatives(motion, table)
-    return motion, dict(table.metadata)
+    return motion, dict(table.metadata) | _kinds(table, count)
+
+
+def _kinds(table: Table, count: int) -> dict[str, list[str]]:
+    """What the units say of the joints; nothing where one has none."""
+    units = [table.units.get(f"q{joint + 1}") for joint in range(count)]
+    return {} if None in units else {"kinds": ["prismatic" if unit in ("m", "mm") else "revolute" for unit in units]}
 
 
 def _count_joints(table: Table, n: int | None) -> int:
@@ -134,9 +149,18 @@ def _column(table: Table, name: str) -> Array:
     return values
 
 
-def _angles(table: Table, name: str) -> Array:
-    values = _column(table, name)
-    return np.deg2rad(values) if table.units.get(name, "").startswith("deg") else values
+def _lengths(table: Table, quantity: str, joint: int) -> Array:
+    """Positions [rad or m], velocities or accelerations of a joint, counted from 1."""
+    name = f"{quantity}{joint}"
+    values, unit = _column(table, name), table.units.get(name)
+    if unit is None:
+        return values
+    length, rate = re.sub(r"[\s*^]", "", unit), RATES[quantity]
+    factor = LENGTHS.get(length.removesuffix(rate)) if length.endswith(rate) else None
+    if factor is None:
+        allowed = ", ".join(f"{known}{rate}" for known in LENGTHS)
+        raise InputError(f"unit {unit!r}", file=table.path, column=name, allowed=allowed)
+    return values if factor == 1.0 else np.deg2rad(values) if length.startswith("deg") else values * factor
 
 
 def _check_time(t: Array, table: Table) -> None:
@@ -194,5 +218,5 @@ def _check_derivatives(motion: Motion, table: Table) -> None:
                 file=table.path,
                 column=f"{name}{joint + 1}",
                 row=table.line(row + 1),
-                allowed="the derivative, in radians and seconds (degrees only if the comment block says so)",
+                allowed="the derivative, in rad or m, and s (degrees only if the comment block says so)",
             )

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from oed.reports.pages.campaign_report import campaign_page, save_campaign_report
-from oed.reports.pages.comparison_report import comparison_page, save_comparison_report
+from oed.reports.pages.comparisons.comparison_report import comparison_page, save_comparison_report
 from oed.reports.pages.design_report import design_page, save_design_report
 from oed.reports.pages.diagnosis_limits import limits_page, save_limits_report
 from oed.reports.pages.diagnosis_report import diagnosis_page, save_diagnosis_report
 from oed.reports.pages.estimate_report import estimate_page, save_estimate_report
 from oed.reports.pages.pareto_report import pareto_page, save_pareto_report
+from oed.reports.pages.payload_report import payload_page, save_payload_report
 from oed.reports.pages.prediction_report import prediction_page
 from oed.reports.pages.retime_report import retime_page, save_retime_report
 from oed.reports.pictures.parameter_pictures import error_bars_picture, friction_picture, parameter_picture
@@ -43,6 +44,7 @@ __all__ = [
     "margins_picture",
     "parameter_picture",
     "pareto_page",
+    "payload_page",
     "percent",
     "prediction_page",
     "render",
@@ -55,6 +57,7 @@ __all__ = [
     "save_estimate_report",
     "save_limits_report",
     "save_pareto_report",
+    "save_payload_report",
     "save_png",
     "save_retime_report",
     "significant",

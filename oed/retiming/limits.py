@@ -8,16 +8,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from robots.common.errors import InfeasibleError, InputError
-from robots.limits import Limits, finite_jerk
+from robots.limits import ACCELERATION_PER_VELOCITY, JERK_PER_ACCELERATION, Limits, finite_jerk
 from robots.signals import Motion
 
 Array = NDArray[np.float64]
-
-ACCELERATION_PER_VELOCITY = 4.0
-"""Default acceleration limit over the velocity limit [1/s]: full speed in a quarter of a second, as small arms do."""
-
-JERK_PER_ACCELERATION = 20.0
-"""Default jerk limit over the acceleration limit [1/s]: full acceleration within 50 ms."""
 
 
 def finite_limits(limits: Limits) -> Limits:
@@ -98,27 +92,29 @@ def require_inside(q: Array, limits: Limits, tolerance: float = 1e-9) -> None:
     if np.any(outside):
         row, column = np.argwhere(outside)[0]
         raise InfeasibleError(
-            f"the position {q[row, column]:.4g} rad is outside its limits",
+            f"the position {q[row, column]:.4g} {limits.unit(int(column))} is outside its limits",
             joint=int(column) + 1,
-            allowed=f"{limits.lower[column]:.4g} to {limits.upper[column]:.4g} rad",
+            allowed=f"{limits.lower[column]:.4g} to {limits.upper[column]:.4g} {limits.unit(int(column))}",
         )
 
 
-def too_weak_to_hold(held: Array, limit: Array, what: str) -> InfeasibleError | None:
+def too_weak_to_hold(held: Array, limit: Array, what: str, limits: Limits) -> InfeasibleError | None:
     """Names the joint that cannot hold the arm somewhere on a path; None where all can.
 
     Args:
         held: torque at rest on the path (M, n) [N m].
         limit: of the torque (n,) [N m].
         what: asks for that torque, in words with the verb.
+        limits: of the joints, for their units.
     """
     ratio = np.abs(held) / np.maximum(limit, 1e-300)
     row, column = np.unravel_index(int(ratio.argmax()), ratio.shape)
     if ratio[row, column] <= 1.0:
         return None
+    unit = limits.unit(int(column), "torque")
     return InfeasibleError(
-        f"{what} {abs(held[row, column]):.3g} N m on the path",
+        f"{what} {abs(held[row, column]):.3g} {unit} on the path",
         joint=int(column) + 1,
-        allowed=f"{limit[column]:.4g} N m",
+        allowed=f"{limit[column]:.4g} {unit}",
         remedy="choose a path with poses that the joint can hold, or correct the torque limit",
     )

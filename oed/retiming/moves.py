@@ -147,7 +147,7 @@ def _profile(bounds: Array, stretch: Array, period: float, minimum_duration: flo
     leader = int(np.abs(stretch).argmax())
     met = np.array([abs(p.p[-1] - s) <= FOLLOWER * abs(s) for p, s in zip(profiles, stretch, strict=True)])
     if not met[leader]:
-        raise SolverError(f"ruckig misses the target by {profiles[leader].p[-1] - stretch[leader]:.3g} rad")
+        raise SolverError(f"ruckig misses the target by {profiles[leader].p[-1] - stretch[leader]:.3g} rad or m")
     # Ruckig is not to be trusted with strokes of the size of its own tolerances.
     met &= np.abs(stretch) > FOLLOWER * abs(stretch[leader])
     sources = np.where(met, np.arange(n), leader)
@@ -194,4 +194,4 @@ def _check_between(move: PlannedMove, first: Array, last: Array) -> None:
     overshoot = np.maximum(np.minimum(first, last) - q.min(axis=(0, 1)), q.max(axis=(0, 1)) - np.maximum(first, last))
     if np.any(overshoot > tolerance):
         joint = int(np.argmax(overshoot))
-        raise SolverError(f"the planned move overshoots its ends by {overshoot[joint]:.3g} rad", joint=joint + 1)
+        raise SolverError(f"the planned move overshoots its ends by {overshoot[joint]:.3g} rad or m", joint=joint + 1)

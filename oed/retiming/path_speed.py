@@ -120,16 +120,16 @@ def _with_friction(piece: PathPiece, limits: Limits, torque: TorqueConstraint | 
     path = _SplinePath(piece)
     constraints = [JointVelocityConstraint(limits.velocity), JointAccelerationConstraint(limits.acceleration)]
     if torque is None:
-        return _solve(path, constraints, grid, None)
+        return _solve(path, constraints, grid, None, limits)
     torque.speed = None
     constraints.append(torque)
-    speed = _solve(path, constraints, grid, torque)
+    speed = _solve(path, constraints, grid, torque, limits)
     if torque.friction is None:
         return speed
     for _ in range(_FRICTION_ROUNDS):
         torque.speed = speed if torque.speed is None else (torque.speed + speed) / 2.0
         try:
-            update = _solve(path, constraints, grid, torque)
+            update = _solve(path, constraints, grid, torque, limits)
         except InfeasibleError:
             # Friction at a speed that is itself too high may leave no torque at all; half the speed leaves some.
             torque.speed = torque.speed / 2.0
@@ -142,23 +142,27 @@ def _with_friction(piece: PathPiece, limits: Limits, torque: TorqueConstraint | 
 
 
 def _solve(
-    path: _SplinePath, constraints: list[LinearConstraint], grid: Array, torque: TorqueConstraint | None
+    path: _SplinePath,
+    constraints: list[LinearConstraint],
+    grid: Array,
+    torque: TorqueConstraint | None,
+    limits: Limits,
 ) -> Array:
     solver = TOPPRA(constraints, path, gridpoints=grid, solver_wrapper="seidel", parametrizer="ParametrizeConstAccel")
     trajectory = solver.compute_trajectory(0.0, 0.0)
     speed = None if trajectory is None else np.asarray(solver.problem_data.sd_vec, dtype=np.float64)
     if speed is None or not np.all(np.isfinite(speed)) or np.any(speed[:-1] + speed[1:] <= 0.0):
-        raise _infeasible(path, grid, torque)
+        raise _infeasible(path, grid, torque, limits)
     return speed
 
 
-def _infeasible(path: _SplinePath, grid: Array, torque: TorqueConstraint | None) -> InfeasibleError:
+def _infeasible(path: _SplinePath, grid: Array, torque: TorqueConstraint | None, limits: Limits) -> InfeasibleError:
     if torque is not None:
         q, slope = path(grid), path(grid, 1)
         held = torque.inverse_dynamics(q, np.zeros_like(q), np.zeros_like(q))
         if torque.friction is not None:
             held = held + torque.friction(1e-6 * slope)
-        weak = too_weak_to_hold(held, torque.limit, "gravity and friction alone need")
+        weak = too_weak_to_hold(held, torque.limit, "gravity and friction alone need", limits)
         if weak is not None:
             return weak
     return InfeasibleError(

@@ -25,8 +25,9 @@ class Retimed:
         usage: peak over limit by the samples of `motion`, (n,) each, of velocity, acceleration, jerk and, where a model
             was given, torque; 1 is at the limit.
         usage_before: the same of the given timing; None for waypoints.
-        deviation: largest distance of any given point from the retimed path in any joint [rad].
+        deviation: largest distance of any given point from the retimed path in any joint, in `unit`.
         stops: number of rests between the two ends.
+        unit: of positions.
     """
 
     motion: Motion
@@ -37,6 +38,7 @@ class Retimed:
     usage_before: dict[str, NDArray[np.float64]] | None = None
     deviation: float
     stops: int
+    unit: str = "rad"
 
     @property
     def peak(self) -> tuple[str, int, float]:
@@ -77,7 +79,7 @@ class Retimed:
         line = (
             f"{self.method}: {before}{self.duration_after:.3f} s, "
             f"{100 * fraction:.1f} % of the {name} limit of joint {joint}, "
-            f"path deviation {self.deviation:.2g} rad, {self.stops} intermediate stops"
+            f"path deviation {self.deviation:.2g} {self.unit}, {self.stops} intermediate stops"
         )
         return f"{line}\n  {self.verdict()}" if self.verdict() else line
 

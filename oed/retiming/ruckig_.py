@@ -43,7 +43,7 @@ def retime_with_stops(path: Motion | ArrayLike, limits: Limits, *, period: float
             f"found a path of shape {points.shape}", allowed=f"two or more points of {limits.lower.size} joints"
         )
     if tolerance <= 0.0:
-        raise InputError(f"found the tolerance {tolerance} rad", allowed="a positive number")
+        raise InputError(f"found the tolerance {tolerance} rad or m", allowed="a positive number")
     vertices = points[simplify(points, tolerance)] if isinstance(path, Motion) else points
     moved = np.abs(np.diff(vertices, axis=0)).max(axis=1) > STANDSTILL
     vertices = vertices[np.concatenate([[True], moved])]
@@ -67,6 +67,7 @@ def retime_with_stops(path: Motion | ArrayLike, limits: Limits, *, period: float
         usage_before=limit_usage(path, finite_limits(limits)) if isinstance(path, Motion) else None,
         deviation=_deviation(points, vertices),
         stops=len(parts) - 1,
+        unit=limits.position_unit,
     )
 
 

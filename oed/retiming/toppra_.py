@@ -111,6 +111,7 @@ def retime(
         usage_before=limit_usage(path, usable, torque(path)) if isinstance(path, Motion) else None,
         deviation=max(timing.deviation for timing in chosen),
         stops=sum(timing.stops for timing in chosen) + len(chosen) - 1,
+        unit=limits.position_unit,
     )
 
 
@@ -220,7 +221,7 @@ def _too_weak(piece: PathPiece, limits: Limits, torque: Torque) -> InfeasibleErr
     q = piece.spline(np.linspace(0.0, piece.length, 501))
     held = torque(Motion(np.arange(501.0), q, np.zeros_like(q), np.zeros_like(q)))
     if held is not None:
-        weak = too_weak_to_hold(held, limits.torque, "gravity alone needs")
+        weak = too_weak_to_hold(held, limits.torque, "gravity alone needs", limits)
         if weak is not None:
             return weak
     return InfeasibleError("no slower timing of this path respects the limits", remedy="check the torque limits")

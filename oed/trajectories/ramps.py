@@ -256,7 +256,7 @@ def checked_pose(limits: Limits, pose: ArrayLike, name: str = "pose") -> Array:
     if np.any(outside):
         joint = int(np.argmax(outside))
         raise InputError(
-            f"the {name} {array[joint]:.6g} rad lies outside",
+            f"the {name} {array[joint]:.6g} {limits.unit(joint)} lies outside",
             joint=joint + 1,
             allowed=f"{limits.lower[joint]:.6g} to {limits.upper[joint]:.6g}",
         )

@@ -137,9 +137,9 @@ class Sequence(Trajectory):
 
     def _check_joints(self) -> None:
         checks = (
-            ("position", "rad", POSITION_TOLERANCE),
-            ("velocity", "rad/s", VELOCITY_TOLERANCE),
-            ("acceleration", "rad/s^2", ACCELERATION_TOLERANCE),
+            ("position", "rad or m", POSITION_TOLERANCE),
+            ("velocity", "rad/s or m/s", VELOCITY_TOLERANCE),
+            ("acceleration", "rad/s2 or m/s2", ACCELERATION_TOLERANCE),
         )
         for number, (before, after) in enumerate(pairwise(self.segments), start=1):
             end = before.trajectory.sample([before.trajectory.duration])

@@ -45,7 +45,7 @@ class Sinusoid(Trajectory):
             raise InputError("the joint does not exist", joint=self.joint, allowed=f"1 to {self.start.size}")
         if not (np.isfinite(self.stroke_duration) and self.stroke_duration > 0 and np.isfinite(self.delta)):
             raise InputError(
-                f"found a stroke of {self.delta} rad in {self.stroke_duration} s",
+                f"found a stroke of {self.delta} rad or m in {self.stroke_duration} s",
                 joint=self.joint,
                 allowed="a finite stroke in a positive time",
             )
@@ -148,7 +148,8 @@ def velocity_reaching_stroke(limits: Limits, joint: int, centre: ArrayLike, *, p
         )
     lower, upper = limits.lower[joint - 1], limits.upper[joint - 1]
     if not lower <= pose[joint - 1] <= upper:
-        raise InputError(f"the pose {pose[joint - 1]:.6g} rad lies outside", joint=joint, allowed=f"{lower} to {upper}")
+        found = f"the pose {pose[joint - 1]:.6g} {limits.unit(joint - 1)} lies outside"
+        raise InputError(found, joint=joint, allowed=f"{lower} to {upper}")
     needed = max(np.pi * velocity**2 / (2.0 * acceleration), np.pi * velocity**1.5 / np.sqrt(2.0 * jerk))
     # The time is rounded first and the stroke follows, so that the velocity bound is met and not just approached.
     duration = max(round_up(2.0 * needed / velocity, period), period)

@@ -103,7 +103,7 @@ def stated_capsules(descriptions: Iterable[CapsuleDescription], chain: Chain) ->
                 source=entry.source,
             )
         )
-    return _numbered(capsules)
+    return numbered(capsules)
 
 
 def segment_capsules(chain: Chain, fraction: float) -> tuple[Capsule, ...]:
@@ -136,8 +136,12 @@ def link_name(link: int) -> str:
     return f"link {link}" if link else "base"
 
 
-def _numbered(capsules: list[Capsule]) -> tuple[Capsule, ...]:
-    """Numbers capsules that share a name, so that a message names one of them."""
+def numbered(capsules: list[Capsule]) -> tuple[Capsule, ...]:
+    """Numbers capsules that share a name, so that a message names one of them.
+
+    Args:
+        capsules: in any order.
+    """
     shared, seen = Counter(capsule.name for capsule in capsules), Counter[str]()
     named = []
     for capsule in capsules:

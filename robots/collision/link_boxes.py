@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from xml.etree import ElementTree
 
 import numpy as np
 from numpy.typing import NDArray
 
 from robots.common.errors import InputError
-from robots.geometry.chain import homogeneous, rotation_from_rpy
 from robots.geometry.urdf import UrdfTree, read_urdf
+from robots.geometry.urdf_reader import UrdfReader
+from robots.geometry.xacro_ import is_description, urdf_bytes
 from robots.robot import Robot
 
 Array = NDArray[np.float64]
@@ -29,8 +29,8 @@ def link_boxes(robot: Robot) -> dict[int, Box]:
     Returns:
         Link, counted from 1, to its lowest and highest corner in the link's frame, (3,) [m].
     """
-    path = Path(robot.origin)
-    if path.suffix.lower() != ".urdf":
+    path = robot.origin
+    if not is_description(path):
         return {}
     try:
         tree = read_urdf(path)
@@ -64,9 +64,9 @@ def _corners(tree: UrdfTree, shapes: dict[str, Array | None], name: str, pose: A
     return np.concatenate(found)
 
 
-def _shapes(path: Path) -> dict[str, Array | None]:
+def _shapes(path: str) -> dict[str, Array | None]:
     """Corners (k, 3) about each link's shapes in its own frame; None where one is a mesh or cannot be read."""
-    root = ElementTree.fromstring(path.read_bytes())
+    root = ElementTree.fromstring(urdf_bytes(path))
     shapes: dict[str, Array | None] = {}
     for link in root.findall("link"):
         drawn = link.findall("collision") or link.findall("visual")
@@ -89,15 +89,10 @@ def _shape(element: ElementTree.Element) -> Array | None:
             half = np.full(3, float(sphere.get("radius", "")))
         else:
             return None
-        origin = element.find("origin")
-        xyz, rpy = (
-            np.array([float(word) for word in (origin.get(key, "0 0 0") if origin is not None else "0 0 0").split()])
-            for key in ("xyz", "rpy")
-        )
-        if half.shape != (3,) or xyz.shape != (3,) or rpy.shape != (3,):
+        if half.shape != (3,):
             return None
-        pose = homogeneous(rotation_from_rpy(rpy), xyz)
-    except ValueError:
+        pose = UrdfReader("", "shape").placement(element)
+    except (ValueError, InputError):
         return None
     signs = np.array(np.meshgrid([-1, 1], [-1, 1], [-1, 1])).reshape(3, -1).T
     return np.asarray((signs * half) @ pose[:3, :3].T + pose[:3, 3])

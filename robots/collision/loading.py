@@ -7,7 +7,8 @@ from collections.abc import Collection
 from pathlib import Path
 
 from robots.collision.boxes import Scene, stated_scene
-from robots.collision.capsules import Capsule, segment_capsules, stated_capsules
+from robots.collision.capsules import Capsule, numbered, segment_capsules, stated_capsules
+from robots.collision.drawn.links import drawn_links
 from robots.collision.model import SMOOTHING, CollisionModel
 from robots.common.config import read_config
 from robots.common.errors import AssumedValueWarning, InputError
@@ -32,6 +33,9 @@ def collision_model(
 ) -> CollisionModel:
     """Make the collision model of a robot.
 
+    The shapes are those of the robot's YAML; without any, capsules about the collision shapes of its URDF; without
+    those, capsules along the links.
+
     Args:
         robot: the robot.
         scene: obstacles, in addition to those of the robot's file.
@@ -54,18 +58,27 @@ def collision_model(
     if stated is None:
         stated, own_links = _stated(robot)
     try:
+        shapes, reason = Scene(), ""
+        touching: tuple[frozenset[int | str], ...] = ()
         if stated.links and own_links:
-            capsules, reason = stated_capsules(stated.links, robot.chain), ""
+            capsules = stated_capsules(stated.links, robot.chain)
         else:
-            capsules = segment_capsules(robot.chain, radius_fraction)
-            reason = f"radius {1e3 * capsules[0].radius:.0f} mm = {radius_fraction:g} of the reach, "
+            drawn = drawn_links(robot) if description is None else None
+            if drawn is None:
+                capsules = assumed = segment_capsules(robot.chain, radius_fraction)
+            else:
+                shapes, touching = Scene(obstacles=drawn.boxes), drawn.ignored
+                assumed = tuple(segment_capsules(robot.chain, radius_fraction)[link] for link in drawn.without)
+                capsules = numbered([*drawn.capsules, *assumed])
+            if assumed:
+                reason = f"radius {1e3 * assumed[0].radius:.0f} mm = {radius_fraction:g} of the reach, "
         model = CollisionModel(
             name=robot.name,
             chain=robot.chain,
             limits=robot.limits,
             capsules=capsules,
-            scene=stated_scene(stated) + (scene or Scene()),
-            ignored=(*(frozenset(pair) for pair in stated.ignore), *ignored),
+            scene=stated_scene(stated) + shapes + (scene or Scene()),
+            ignored=(*(frozenset(pair) for pair in stated.ignore), *touching, *ignored),
             smoothing=smoothing,
         )
     except InputError as error:

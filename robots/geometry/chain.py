@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import Any, Literal, get_args
+from typing import Any, Literal, NamedTuple, get_args
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -74,6 +74,25 @@ def rotation_from_rpy(rpy: ArrayLike) -> Array:
             [cy * cp, cy * sp * sr - sy * cr, cy * sp * cr + sy * sr],
             [sy * cp, sy * sp * sr + cy * cr, sy * sp * cr - cy * sr],
             [-sp, cp * sr, cp * cr],
+        ]
+    )
+
+
+def rotation_from_quaternion(quaternion: ArrayLike) -> Array:
+    """Rotation of a quaternion x, y, z, w, which is normalised.
+
+    Args:
+        quaternion: (4,), not zero.
+
+    Returns:
+        (3, 3).
+    """
+    x, y, z, w = np.asarray(quaternion, dtype=np.float64) / np.linalg.norm(quaternion)
+    return np.array(
+        [
+            [1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y - w * z), 2.0 * (x * z + w * y)],
+            [2.0 * (x * y + w * z), 1.0 - 2.0 * (x * x + z * z), 2.0 * (y * z - w * x)],
+            [2.0 * (x * z - w * y), 2.0 * (y * z + w * x), 1.0 - 2.0 * (x * x + y * y)],
         ]
     )
 
@@ -158,6 +177,14 @@ class Joint:
             (..., 4, 4).
         """
         return self.placement @ joint_motion(self.kind, self.axis, q)
+
+
+class LinkPlace(NamedTuple):
+    """Where a named link of a file is: ``pose`` (4, 4) in the frame of ``body``, 0 the base, i what joint i moves."""
+
+    name: str
+    body: int
+    pose: Array
 
 
 @dataclass(frozen=True, eq=False)

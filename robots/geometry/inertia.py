@@ -13,7 +13,11 @@ SIZE = 10  # m, mPx, mPy, mPz, Ixx, Ixy, Ixz, Iyy, Iyz, Izz
 _UPPER = np.triu_indices(3)  # (xx, xy, xz, yy, yz, zz), the order of our inertial parameters
 _INDEFINITE = 1e-6  # relative; real files carry four or five digits, so a thin rod's small moment may round below zero
 
+_EXCESS = 0.02  # of the triangle inequality, relative; as above, and scaled models of bodies breach it a little
+
 _NEGLIGIBLE = 1e-12  # kg m2, a grain of dust: some files give markers a mass and an inertia of 1e-35
+
+_SMALL_ARM = 0.3  # m; the frames of a pendulum or of a single axis may all coincide
 
 
 def symmetric(six: ArrayLike) -> Array:
@@ -84,3 +88,35 @@ def check_body(mass: float, inertia_at_com: ArrayLike, what: str, *, file: str |
             file=file,
             allowed="a positive definite inertia about the centre of mass",
         )
+
+
+def body_doubts(mass: float, com: ArrayLike, inertia_at_com: ArrayLike, size: float) -> list[str]:
+    """Lists what no body of a robot has, but what a description may still state.
+
+    Args:
+        mass: [kg].
+        com: (3,) centre of mass in the link's frame [m].
+        inertia_at_com: (3, 3) about the centre of mass [kg m2].
+        size: the reach of the arm [m].
+
+    Returns:
+        One clause each: a principal moment above the sum of the other two, which no distribution of mass has; an
+        inertia or a centre of mass much larger than the arm, which is usually one in other units.
+    """
+    if not mass > 0.0:
+        return []
+    doubts = []
+    low, middle, high = np.linalg.eigvalsh(np.asarray(inertia_at_com, dtype=np.float64))
+    if high > (1.0 + _EXCESS) * (low + middle) + _NEGLIGIBLE:
+        doubts.append(
+            f"principal moments of {low:.3g}, {middle:.3g} and {high:.3g} kg m2 that no body has "
+            "(the largest exceeds the sum of the others)"
+        )
+    distance = float(np.linalg.norm(com))
+    scale = 2.0 * max(size, _SMALL_ARM)
+    if distance > scale:
+        doubts.append(f"a centre of mass {distance:.3g} m from its joint, farther than the arm reaches")
+    gyration = float(np.sqrt(max(high, 0.0) / mass))
+    if gyration > max(scale, distance):
+        doubts.append(f"an inertia of {high:.3g} kg m2 with {mass:.3g} kg, as if its mass were {gyration:.3g} m away")
+    return doubts

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import logging
 from collections.abc import Mapping, Sequence
 from functools import cached_property
 from pathlib import Path
@@ -12,24 +11,30 @@ import numpy as np
 from numpy.typing import NDArray
 
 from robots.common.errors import InputError
-from robots.geometry.chain import Chain, Joint, joint_motion
-from robots.geometry.inertia import SIZE, check_body, inertial_parameters
+from robots.geometry.chain import Chain, Joint, LinkPlace, joint_motion
+from robots.geometry.inertia import SIZE, body_doubts, check_body, inertial_parameters
+from robots.geometry.urdf_limits import JointBounds, joint_bounds
 from robots.geometry.urdf_selection import Selection, nearest, select
 from robots.geometry.urdf_xml import UrdfElements, UrdfJoint, UrdfLink, read_elements
 from robots.limits import Limits
 
 Array = NDArray[np.float64]
 
-_log = logging.getLogger(__name__)
-
 
 class UrdfChain(NamedTuple):
-    """A chain taken from a URDF: ``inertia`` is (n, 10) about the link frames, everything locked lumped in."""
+    """A chain taken from a URDF: ``inertia`` is (n, 10) about the link frames, everything locked lumped in.
+
+    ``unlimited`` names the joints that have stops but state none. ``notes`` says what a reader may not expect.
+    ``links`` has all links of the file with the body that carries each.
+    """
 
     chain: Chain
     limits: Limits
     inertia: Array
     names: tuple[str, ...]
+    unlimited: tuple[str, ...] = ()
+    notes: tuple[str, ...] = ()
+    links: tuple[LinkPlace, ...] = ()
 
 
 class UrdfTree:
@@ -46,6 +51,7 @@ class UrdfTree:
         self.file = elements.file
         self.name = elements.name
         self.digest = elements.digest
+        self.unused = elements.unused
         self.links: dict[str, UrdfLink] = {link.name: link for link in elements.links}
         self.joints: dict[str, UrdfJoint] = {joint.name: joint for joint in elements.joints}
         if not self.joints:
@@ -133,8 +139,8 @@ class UrdfTree:
                 that one's locked position.
 
         Returns:
-            The chain, its limits (acceleration and jerk are infinite: a URDF does not state them), and the inertial
-            parameters of its n bodies about their link frames. Gravity is along -z of the root link.
+            The chain, its limits (infinite where the file states none), and the inertial parameters of its n bodies
+            about their link frames. Gravity is along -z of the root link.
 
         Raises:
             InputError: naming the joint or link; and when several chains are possible, listing them.
@@ -144,10 +150,12 @@ class UrdfTree:
         chain_joints: list[Joint] = []
         inertia = np.zeros((len(moving), SIZE))
         lumped: list[list[str]] = [[] for _ in moving]
+        places: list[LinkPlace] = []
         flange: Array = np.eye(4)
         stack: list[tuple[str, int, Array]] = [(self.root, -1, np.eye(4))]
         while stack:
             name, body, pose = stack.pop()
+            places.append(LinkPlace(name, body + 1, pose))
             if body >= 0:
                 link = self.links[name]
                 # Only what moves: bodies of the base without a proper inertia are common, and do no harm.
@@ -176,7 +184,18 @@ class UrdfTree:
         inertia.flags.writeable = False
         chain_joints.sort(key=lambda joint: moving[joint.name])
         chain = Chain(tuple(chain_joints), tip=flange)
-        return UrdfChain(chain, self._limits(selection.moving), inertia, chain.names)
+        bounds = [self._bounds(joint) for joint in selection.moving]
+        unlimited = tuple(name for name, bound in zip(chain.names, bounds, strict=True) if bound.unlimited)
+        notes = [
+            *self._limit_notes(chain.names, bounds),
+            *self._body_notes(chain, lumped),
+            *(
+                f"joint {joint.name} mimics the moving joint {joint.mimic[0]}; it is treated as locked"
+                for joint in self.joints.values()
+                if joint.mimic is not None and joint.mimic[0] in moving and joint.name not in selection.locked
+            ),
+        ]
+        return UrdfChain(chain, _limits(bounds), inertia, chain.names, unlimited, tuple(notes), tuple(places))
 
     def _locked_motion(self, joint: UrdfJoint, selection: Selection) -> Array:
         if not joint.moves:
@@ -192,51 +211,31 @@ class UrdfTree:
         if leader in seen or leader == joint.name:
             raise InputError("it mimics itself, directly or through other joints", file=self.file, joint=joint.name)
         if any(leader == moving.name for moving in selection.moving):
-            _log.warning(
-                "%s: joint %s mimics the moving joint %s; it is treated as locked", self.file, joint.name, leader
-            )
             return offset
         return multiplier * self._locked_value(self.joints[leader], selection, (*seen, joint.name)) + offset
 
-    def _limits(self, moving: Sequence[UrdfJoint]) -> Limits:
-        bounds = np.array([self._bounds(joint) for joint in moving])
-        unknown = np.full(len(moving), np.inf)
-        return Limits(
-            lower=bounds[:, 0],
-            upper=bounds[:, 1],
-            velocity=bounds[:, 2],
-            acceleration=unknown,
-            jerk=unknown.copy(),
-            torque=bounds[:, 3],
-        )
+    def _bounds(self, joint: UrdfJoint) -> JointBounds:
+        return joint_bounds(joint.limit, joint.type, name=joint.name, file=self.file)
 
-    def _bounds(self, joint: UrdfJoint) -> tuple[float, float, float, float]:
-        limit = joint.limit
-        if limit is None:
-            if joint.type == "continuous":
-                return -np.inf, np.inf, np.inf, np.inf
-            problem = f"a {joint.type} joint without <limit>"
-            raise InputError(
-                problem, file=self.file, joint=joint.name, allowed="<limit> with lower, upper, velocity and effort"
-            )
-        if joint.type != "continuous" and (limit.velocity is None or limit.effort is None):
-            missing = "velocity" if limit.velocity is None else "effort"
-            raise InputError(
-                f"<limit> states no {missing}",
-                file=self.file,
-                joint=joint.name,
-                allowed="velocity [rad/s or m/s] and effort [N m or N]",
-                remedy="add it there",
-            )
-        velocity = np.inf if limit.velocity is None else limit.velocity
-        effort = np.inf if limit.effort is None else limit.effort
-        # Exporters write zeros, and URDF assumes them, if the values are unknown.
-        if joint.type == "continuous" or limit.lower == limit.upper == 0.0:
-            return -np.inf, np.inf, velocity, effort
-        if limit.lower >= limit.upper:
-            problem = f"<limit> has lower {limit.lower:g} and upper {limit.upper:g}"
-            raise InputError(problem, file=self.file, joint=joint.name, allowed="lower below upper")
-        return limit.lower, limit.upper, velocity, effort
+    def _limit_notes(self, names: Sequence[str], bounds: Sequence[JointBounds]) -> list[str]:
+        """One note for all joints that share it."""
+        shared: dict[str, list[str]] = {}
+        for name, bound in zip(names, bounds, strict=True):
+            for note in bound.notes:
+                shared.setdefault(note, []).append(name)
+        return [
+            f"{'joints' if len(named) > 1 else 'joint'} {', '.join(named)}: {note}" for note, named in shared.items()
+        ]
+
+    def _body_notes(self, chain: Chain, lumped: Sequence[Sequence[str]]) -> list[str]:
+        size = sum(float(np.linalg.norm(joint.translation)) for joint in chain.joints)
+        size += float(np.linalg.norm(chain.tip[:3, 3]))
+        links = [self.links[name] for names in lumped for name in names]
+        return [
+            f"link {link.name} has {doubt}"
+            for link in links
+            for doubt in body_doubts(link.mass, link.com, link.inertia_at_com, size)
+        ]
 
     def friction(self, names: Sequence[str]) -> Array:
         """Friction as the file's ``<dynamics friction= damping=>`` states it.
@@ -250,11 +249,25 @@ class UrdfTree:
         return np.array([[self.joints[name].friction, self.joints[name].damping, 0.0, 0.0] for name in names])
 
 
+def _limits(bounds: Sequence[JointBounds]) -> Limits:
+    def of(name: str) -> Array:
+        return np.array([getattr(bound, name) for bound in bounds])
+
+    return Limits(
+        lower=of("lower"),
+        upper=of("upper"),
+        velocity=of("velocity"),
+        acceleration=of("acceleration"),
+        jerk=of("jerk"),
+        torque=of("effort"),
+    )
+
+
 def read_urdf(path: str | Path) -> UrdfTree:
     """Read a URDF file.
 
     Args:
-        path: the file, expanded if it came from xacro.
+        path: the file, a ``.urdf`` or a ``.xacro``.
 
     Returns:
         Its tree of links; ``tree.chain(...)`` takes the robot's chain out of it.

@@ -90,12 +90,12 @@ def _locked_values(tree: _Tree, locked: Mapping[str, float]) -> dict[str, float]
             raise InputError("a fixed joint cannot be locked at a position", file=tree.file, joint=name)
         if not math.isfinite(value):
             raise InputError(f"locked at {value}", file=tree.file, joint=name, allowed="a finite position")
-        limit = joint.limit
-        if joint.type == "continuous" or limit is None or limit.lower >= limit.upper:
+        stops = None if joint.limit is None or joint.type == "continuous" else joint.limit.range(joint.kind)
+        if stops is None or stops[0] >= stops[1]:
             continue
         # A position beyond the stops is nearly always one in degrees or millimetres.
-        if not limit.lower - 1e-6 <= value <= limit.upper + 1e-6:
-            allowed = f"{limit.lower:g} to {limit.upper:g} {'m' if joint.kind == 'prismatic' else 'rad'}"
+        if not stops[0] - 1e-6 <= value <= stops[1] + 1e-6:
+            allowed = f"{stops[0]:g} to {stops[1]:g} {'m' if joint.kind == 'prismatic' else 'rad'}"
             raise InputError(f"locked at {value:g}, beyond its limits", file=tree.file, joint=name, allowed=allowed)
     return {name: float(value) for name, value in locked.items()}
 

@@ -12,9 +12,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from robots.common.errors import InputError
-from robots.common.files import existing_file
-from robots.geometry.chain import Kind, homogeneous, rotation_from_rpy
+from robots.geometry.chain import Kind
 from robots.geometry.inertia import symmetric
+from robots.geometry.urdf_limits import UrdfLimit, read_limit
+from robots.geometry.urdf_reader import UrdfReader
+from robots.geometry.urdf_schema import unused_parts
+from robots.geometry.xacro_ import split_arguments, urdf_bytes
 
 Array = NDArray[np.float64]
 JointType = Literal["revolute", "continuous", "prismatic", "fixed", "floating", "planar"]
@@ -23,7 +26,7 @@ JointType = Literal["revolute", "continuous", "prismatic", "fixed", "floating", 
 _KINEMATIC = frozenset(
     ("link", "joint", "origin", "axis", "limit", "mass", "inertia", "parent", "child", "mimic", "dynamics")
 )
-_EXPAND = "expand it first: xacro FILE.xacro > FILE.urdf"
+_EXPAND = "expand it first: xacro FILE.xacro > FILE.urdf, or name it .xacro"
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -34,16 +37,6 @@ class UrdfLink:
     mass: float = 0.0
     com: Array
     inertia_at_com: Array
-
-
-@dataclass(frozen=True, kw_only=True)
-class UrdfLimit:
-    """A ``<limit>``: positions [rad or m], velocity [rad/s or m/s] and effort [N m or N]; None where not stated."""
-
-    lower: float
-    upper: float
-    velocity: float | None
-    effort: float | None
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -74,65 +67,28 @@ class UrdfJoint:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class UrdfElements:
-    """What a URDF file states, in its order, and the SHA-256 of its bytes."""
+    """What a URDF file states, in its order, and the SHA-256 of its bytes.
+
+    ``unused`` lists elements and attributes that are not read, with where or how often they occur.
+    """
 
     file: str
     name: str
     links: tuple[UrdfLink, ...]
     joints: tuple[UrdfJoint, ...]
     digest: str
-
-
-class _Reader:
-    """One element's values; errors name the file and the link or joint at hand."""
-
-    def __init__(self, file: str, what: str, joint: str | None = None) -> None:
-        self.file, self.what, self.joint = file, what, joint
-
-    def error(self, problem: str, allowed: str | None = None, remedy: str | None = None) -> InputError:
-        prefix = "" if self.joint is not None else f"{self.what}: "
-        return InputError(prefix + problem, file=self.file, joint=self.joint, allowed=allowed, remedy=remedy)
-
-    def numbers(self, element: ElementTree.Element, key: str, count: int, default: str | None = None) -> Array:
-        text = element.get(key, default)
-        place = f"<{element.tag}> {key}"
-        if text is None:
-            raise self.error(f"{place} is missing")
-        try:
-            values = np.array([float(word) for word in text.split()])
-        except ValueError as error:
-            raise self.error(f"{place} is {text!r}", allowed=f"{count} number(s)") from error
-        if values.shape != (count,) or not np.isfinite(values).all():
-            raise self.error(f"{place} is {text!r}", allowed=f"{count} finite number(s)")
-        return values
-
-    def number(self, element: ElementTree.Element, key: str, default: str | None = None) -> float:
-        return float(self.numbers(element, key, 1, default)[0])
-
-    def placement(self, parent: ElementTree.Element) -> Array:
-        origin = parent.find("origin")
-        if origin is None:
-            return np.eye(4)
-        xyz = self.numbers(origin, "xyz", 3, "0 0 0")
-        return homogeneous(rotation_from_rpy(self.numbers(origin, "rpy", 3, "0 0 0")), xyz)
-
-    def reference(self, joint: ElementTree.Element, key: str) -> str:
-        element = joint.find(key)
-        name = "" if element is None else element.get("link", "")
-        if not name:
-            raise self.error(f"<{key} link=...> is missing")
-        return name
+    unused: tuple[str, ...] = ()
 
 
 def _link(element: ElementTree.Element, file: str) -> UrdfLink:
     name = element.get("name", "")
     if not name:
         raise InputError("a <link> has no name", file=file)
-    read = _Reader(file, f"link {name!r}")
-    inertial = element.find("inertial")
+    read = UrdfReader(file, f"link {name!r}")
+    inertial = read.child(element, "inertial")
     if inertial is None:
         return UrdfLink(name=name, com=np.zeros(3), inertia_at_com=np.zeros((3, 3)))
-    mass_element, inertia_element = inertial.find("mass"), inertial.find("inertia")
+    mass_element, inertia_element = read.child(inertial, "mass"), read.child(inertial, "inertia")
     if mass_element is None or inertia_element is None:
         raise read.error(f"<inertial> has no <{'mass' if mass_element is None else 'inertia'}>")
     mass = read.number(mass_element, "value")
@@ -145,22 +101,11 @@ def _link(element: ElementTree.Element, file: str) -> UrdfLink:
     return UrdfLink(name=name, mass=mass, com=pose[:3, 3], inertia_at_com=inertia)
 
 
-def _limit(joint: ElementTree.Element, read: _Reader) -> UrdfLimit | None:
-    element = joint.find("limit")
-    if element is None:
-        return None
-    bounds = {key: read.number(element, key) if key in element.attrib else None for key in ("velocity", "effort")}
-    for key, value in bounds.items():
-        if value is not None and value < 0.0:
-            raise read.error(f"<limit> {key} is {value:g}", allowed="zero or more")
-    return UrdfLimit(lower=read.number(element, "lower", "0"), upper=read.number(element, "upper", "0"), **bounds)
-
-
 def _joint(element: ElementTree.Element, file: str) -> UrdfJoint:
     name = element.get("name", "")
     if not name:
         raise InputError("a <joint> has no name", file=file)
-    read = _Reader(file, f"joint {name!r}", name)
+    read = UrdfReader(file, f"joint {name!r}", name)
     type_ = element.get("type", "")
     if type_ not in get_args(JointType):
         raise read.error(f"unknown joint type {type_!r}", allowed="revolute, continuous, prismatic or fixed")
@@ -171,14 +116,14 @@ def _joint(element: ElementTree.Element, file: str) -> UrdfJoint:
             remedy="make it fixed: a robot here stands on a fixed base",
         )
     axis = np.array([1.0, 0.0, 0.0])
-    axis_element = element.find("axis")
+    axis_element = read.child(element, "axis")
     if axis_element is not None and type_ != "fixed":
         axis = read.numbers(axis_element, "xyz", 3)
         length = np.linalg.norm(axis)
         if length < 1e-9:
             raise read.error("the axis has no length", allowed="a vector other than zero")
         axis = axis / length
-    dynamics, mimic_element = element.find("dynamics"), element.find("mimic")
+    dynamics, mimic_element = read.child(element, "dynamics"), read.child(element, "mimic")
     mimic = None
     if mimic_element is not None and type_ != "fixed":
         leader = mimic_element.get("joint", "")
@@ -190,9 +135,9 @@ def _joint(element: ElementTree.Element, file: str) -> UrdfJoint:
         child=read.reference(element, "child"),
         placement=read.placement(element),
         axis=axis,
-        limit=None if type_ == "fixed" else _limit(element, read),
-        damping=0.0 if dynamics is None else read.number(dynamics, "damping", "0"),
-        friction=0.0 if dynamics is None else read.number(dynamics, "friction", "0"),
+        limit=None if type_ == "fixed" else read_limit(element, read),
+        damping=read.positive(dynamics, "damping") or 0.0,
+        friction=read.positive(dynamics, "friction") or 0.0,
         mimic=mimic,
     )
 
@@ -205,11 +150,15 @@ def _parse(content: bytes, file: str) -> ElementTree.Element:
         if b"xacro:" in content and "unbound prefix" in str(error):
             raise InputError("the file holds xacro macros", file=file, row=row, remedy=_EXPAND) from error
         raise InputError(f"not well-formed XML: {error}", file=file, row=row) from error
+    own = robot.tag.rpartition("}")[0]
     for element in robot.iter():
-        space, _, tag = element.tag.rpartition("}") if isinstance(element.tag, str) else ("", "", "")
+        # Comments have no name.
+        space, _, tag = element.tag.rpartition("}") if isinstance(element.tag, str) else (own, "", "")
         if "xacro" in space or (tag in _KINEMATIC and any("${" in value for value in element.attrib.values())):
             raise InputError("the file holds xacro macros", file=file, remedy=_EXPAND)
-        element.tag = tag
+        # An element of another name space is none of a URDF, whatever its name is.
+        if space == own:
+            element.tag = tag
     if robot.tag != "robot":
         raise InputError(f"the root element is <{robot.tag}>", file=file, allowed="<robot>, as in every URDF")
     return robot
@@ -219,7 +168,7 @@ def read_elements(path: str | Path) -> UrdfElements:
     """Read the links and joints of a URDF file, each on its own; nothing is said yet of how they hang together.
 
     Args:
-        path: the file.
+        path: the file; a ``.xacro`` is expanded, with the arguments that may follow it (``FILE NAME:=VALUE``).
 
     Returns:
         What the file states.
@@ -229,7 +178,7 @@ def read_elements(path: str | Path) -> UrdfElements:
             not yet expanded from xacro, or states something impossible.
     """
     file = str(path)
-    content = existing_file(path).read_bytes()
+    content = urdf_bytes(path)
     robot = _parse(content, file)
     # Direct children only: <transmission> holds elements of the name <joint> that define none.
     links = tuple(_link(element, file) for element in robot.findall("link"))
@@ -239,4 +188,11 @@ def read_elements(path: str | Path) -> UrdfElements:
         if repeated is not None:
             raise InputError(f"two {what}s have the name {repeated!r}", file=file)
     digest = hashlib.sha256(content).hexdigest()
-    return UrdfElements(file=file, name=robot.get("name", Path(path).stem), links=links, joints=joints, digest=digest)
+    return UrdfElements(
+        file=file,
+        name=robot.get("name", split_arguments(path)[0].stem),
+        links=links,
+        joints=joints,
+        digest=digest,
+        unused=unused_parts(robot),
+    )

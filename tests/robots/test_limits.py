@@ -1,3 +1,5 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -177,3 +179,38 @@ def test_signal_that_does_not_fit_is_refused(values, limit):
     with pytest.raises(InputError) as caught:
         symmetric_margins("torque", np.array([0.0]), np.array(values), np.array(limit))
     assert caught.value.column == "torque"
+
+
+def test_units_of_quantities():
+    """A joint's quantities have the units of its kind; an unknown quantity has none."""
+    bounds = np.ones(2)
+    limits = Limits(
+        lower=-bounds,
+        upper=bounds,
+        velocity=bounds,
+        acceleration=bounds,
+        jerk=bounds,
+        torque=bounds,
+        kinds=("revolute", "prismatic"),
+    )
+    quantities = ("position", "lower", "velocity", "acceleration", "jerk", "torque", "torque RMS", "motor speed")
+    assert [limits.unit(0, name) for name in quantities] == [
+        *("rad", "rad", "rad/s", "rad/s2", "rad/s3", "N m", "N m", "")
+    ]
+    assert [limits.unit(1, name) for name in quantities] == ["m", "m", "m/s", "m/s2", "m/s3", "N", "N", ""]
+    assert limits.position_unit == "rad or m"
+    assert replace(limits, kinds=()).position_unit == "rad"
+    assert limits.scaled(velocity=0.5).kinds == limits.kinds
+    with pytest.raises(InputError, match="found the kinds"):
+        replace(limits, kinds=("revolute",))
+    with pytest.raises(InputError, match="found the kinds"):
+        replace(limits, kinds=("revolute", "screw"))
+
+
+def test_the_middle_is_finite():
+    """The middle of an endless range is zero or its one end, without a warning."""
+    ends = np.array([-np.inf, -1.0, 2.0, -np.inf]), np.array([np.inf, 3.0, np.inf, -5.0])
+    bounds = np.ones(4)
+    limits = Limits(lower=ends[0], upper=ends[1], velocity=bounds, acceleration=bounds, jerk=bounds, torque=bounds)
+    np.testing.assert_array_equal(limits.middle, [0.0, 1.0, 2.0, -5.0])
+    np.testing.assert_array_equal(limits.home, [0.0, 0.0, 2.0, -5.0])

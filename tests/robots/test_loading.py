@@ -177,3 +177,24 @@ dynamics:
     (tmp_path / "geared.yaml").write_text(without)
     with pytest.raises(InputError, match=r"motor_speed refers to the motor, but the gear_ratio .* is missing"):
         load_robot(str(tmp_path / "geared.yaml"))
+
+
+def test_one_value_holds_for_all_joints(tmp_path):
+    """A number without brackets is the value of every joint; a list of one is still a list of the wrong length."""
+    text = TABLE.replace("values: [180, .inf], unit: [deg/s, m/s]", "values: 2.5, unit: [rad/s, m/s]")
+    text = text.replace("lower: [-90, -100]", "lower: -50").replace("coulomb: {values: [1, 2]}", "coulomb: {values: 7}")
+    text = text.replace("gear_ratio: {values: [100, 20]}", "gear_ratio: {values: 50}")
+    path = tmp_path / "pair.yaml"
+    path.write_text(text)
+    robot = load_robot(path)
+    np.testing.assert_array_equal(robot.limits.velocity, [2.5, 2.5])
+    np.testing.assert_allclose(robot.limits.lower, [np.deg2rad(-50), -0.05], rtol=1e-15)
+    np.testing.assert_array_equal(robot.friction[:, 0], [7, 7])
+    np.testing.assert_array_equal(robot.gear_ratio, [50, 50])
+    path.write_text(text.replace("values: 2.5", "values: [2.5]"))
+    with pytest.raises(InputError, match=r"1 values; allowed: 2, one per joint"):
+        load_robot(path)
+    for wrong in ("yes", "true", ".nan", "{}"):
+        path.write_text(text.replace("values: 7", f"values: {wrong}"))
+        with pytest.raises(InputError, match=r"dynamics\.friction\.coulomb\.values"):
+            load_robot(path)

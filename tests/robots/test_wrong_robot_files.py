@@ -17,7 +17,7 @@ from tests.robots.robot_files import TABLE
         ("", "unknown robot ''"),
         ("missing.urdf", "missing.urdf: no such file"),
         ("missing.yaml", "missing.yaml: no such file"),
-        ("robot.urdf.xacro", "expand it first"),
+        ("robot.urdf.xacro", "robot.urdf.xacro: no such file"),
     ],
 )
 def test_a_robot_that_does_not_exist_is_refused(spec, message):
@@ -32,7 +32,8 @@ def test_a_file_of_another_kind_is_refused(tmp_path):
     path.write_text("hello")
     with pytest.raises(
         InputError,
-        match=r"robot\.txt: the file name does not end like that of a robot file; allowed: \.urdf, \.yaml or \.yml",
+        match=r"robot\.txt: the file name does not end like that of a robot file; "
+        r"allowed: \.urdf, \.xacro, \.yaml or \.yml",
     ):
         load_robot(path)
     with pytest.raises(InputError, match="the file name does not end like that of a robot file"):

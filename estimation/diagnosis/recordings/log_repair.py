@@ -14,6 +14,7 @@ from estimation.gate.finding import Finding
 from estimation.gate.measurements.columns import Columns
 from estimation.gate.measurements.outliers import are_isolated, find_outliers
 from estimation.gate.measurements.timing import FEWEST
+from estimation.regressions.torque_meanings import as_joint_torque
 from robots.robot import Robot
 from robots.signals import Log
 
@@ -72,6 +73,7 @@ def repair_log(robot: Robot, log: Log, which: str) -> RepairedLog:
         InputError: the gate refuses the log, for example positions in degrees, times in milliseconds, absurd values, or
             motor torques.
     """
+    log = as_joint_torque(robot, log)
     gate = check_log(robot, log)
     sizes = [f for f in gate.findings if f.name == "unit_of_torque" and f.joint is not None]
     strange = 2 * len(sizes) >= max(robot.n, 3)
@@ -83,7 +85,7 @@ def repair_log(robot: Robot, log: Log, which: str) -> RepairedLog:
         for finding in gate.findings
         if _is_reported(finding)
     ]
-    log = gate.on_time(log)
+    log = gate.corrected(log)
     return RepairedLog(_stretches(_filled(log) if len(gate.spikes) else log, gate), tuple(notes))
 
 

@@ -198,7 +198,8 @@ _TURNING = (
 
 def faster_joints(problem: Problem, seen: HeldOutResult) -> list[str]:
     """Lists joints that are faster in the held-out data than in the fit of the friction polynomial, in one note."""
-    if seen.whole is problem.recording or not any(column.symbol == "f4" for column in problem.baseline.base.columns):
+    columns = problem.baseline.base.columns
+    if seen.whole is problem.recording or not any((c.term, c.symbol) == ("friction", "f4") for c in columns):
         return []
     unseen = cut_recording(seen.whole, slice(seen.first_held_out_row, len(seen.whole)))
     known, there = (np.abs(recording.dq).max(axis=0) for recording in (problem.recording, unseen))
@@ -231,7 +232,7 @@ _FARTHER = (
 )
 _FASTER = (
     "Joint{} {}: up to {:.1f} times as fast in the held-out data as in the fitted logs. The friction polynomial is "
-    "extrapolated there, so error and gain may be wrong. Try `coulomb-viscous` friction."
+    "extrapolated there, so error and gain may be wrong. Try `auto` friction."
 )
 
 

@@ -1,4 +1,4 @@
-"""Jumps of positions: a reset encoder, an angle that wraps, or overwritten rows."""
+"""Jumps of positions: a reset encoder, or overwritten rows."""
 
 from __future__ import annotations
 
@@ -28,8 +28,6 @@ USUAL = 0.01
 SAMPLES = 20_000
 # Share of the travel above which a jump would make a fit wrong.
 MUCH = 0.05
-# A jump by a turn, to this error [rad], is a wrapped angle.
-TURN_ERROR = 0.1
 
 
 class Jumps(Check):
@@ -78,13 +76,11 @@ def jump_rows(periods: Array, q: Array) -> Rows:
 def _finding(joint: int, q: Array, rows: Rows, travel: float) -> Finding:
     sizes = q[rows] - q[rows - 1]
     largest = int(np.argmax(np.abs(sizes)))
-    wraps = abs(abs(sizes[largest]) - 2 * np.pi) < TURN_ERROR
     return Finding(
         name="jump",
         severity="refuse" if abs(sizes[largest]) > MUCH * travel else "warning",
-        text=f"jumps {len(rows)} time{'s' if len(rows) > 1 else ''}, by up to {sizes[largest]:.4g} in one sample"
-        + (": the angle wraps" if wraps else ""),
-        action="unwrap the angle" if wraps else "cut the log there, and check the encoder and the logger",
+        text=f"jumps {len(rows)} time{'s' if len(rows) > 1 else ''}, by up to {sizes[largest]:.4g} in one sample",
+        action="cut the log there, and check the encoder and the logger",
         value=float(sizes[largest]),
         unit="rad or m",
         column=f"q{joint + 1}",

@@ -42,7 +42,8 @@ class PositionUnits(Check):
         if suspicion is not None and (suspicion.certain or _fits_better(context, suspicion.factor)):
             return [suspicion.finding]
         return [
-            _beyond_finding(robot, columns.extreme(int(j)), int(j)) for j in np.flatnonzero(_beyond(robot, columns))
+            _single(robot, columns, int(j)) or _beyond_finding(robot, columns.extreme(int(j)), int(j))
+            for j in np.flatnonzero(_beyond(robot, columns))
         ]
 
 
@@ -65,7 +66,8 @@ def _suspect(robot: Robot, columns: Columns) -> _Suspicion | None:
     """Finds the unit that brings all positions inside the joints' limits."""
     beyond = _beyond(robot, columns)
     moving = columns.travel > 0
-    if (beyond & moving).sum() < AGREE * max(int(moving.sum()), 1):
+    found, whole = int((beyond & moving).sum()), max(int(moving.sum()), 1)
+    if found < AGREE * whole or (whole == 2 and found < whole):
         return None
     revolute = np.array([joint.kind == "revolute" for joint in robot.chain.joints])
     candidates = {
@@ -92,6 +94,27 @@ def _suspect(robot: Robot, columns: Columns) -> _Suspicion | None:
         )
         return _Suspicion(np.asarray(factor, dtype=float), finding, abs(extreme) > CERTAIN * _range(robot, worst))
     return None
+
+
+def _single(robot: Robot, columns: Columns, joint: int) -> Finding | None:
+    """Gives the finding of a single joint in degrees or millimetres, if it is too far from zero for anything else."""
+    extreme = columns.extreme(joint)
+    revolute = robot.chain.kinds[joint] == "revolute"
+    factors = np.ones(robot.n)
+    factors[joint] = np.pi / 180 if revolute else 1e-3
+    if abs(extreme) < CERTAIN * _range(robot, joint) or _beyond(robot, columns, 1 / factors)[joint]:
+        return None
+    scale, unit = ", ".join(f"{factor:.5g}" for factor in factors), "degrees" if revolute else "millimetres"
+    return Finding(
+        name="unit_of_position",
+        severity="refuse",
+        text=f"reaches {extreme:.4g}: only this joint's position seems to be in {unit}",
+        action=f"state `scale: [{scale}]` for the position in a mapping (--mapping)",
+        value=abs(extreme),
+        unit="rad or m",
+        column=f"q{joint + 1}",
+        joint=joint + 1,
+    )
 
 
 def _fits_better(context: Context, factor: Array) -> bool:

@@ -25,7 +25,7 @@ class ReaderNotes(Check):
                 text=str(note["text"]),
                 action=str(note["action"]),
                 value=float(note["value"]),
-                unit="rows",
+                unit=str(note.get("unit", "rows")),
             )
             for note in context.recorded.log.metadata.get("repairs", ())
         ]

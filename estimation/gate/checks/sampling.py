@@ -9,10 +9,17 @@ import numpy as np
 from estimation.gate.check import Check
 from estimation.gate.context import Context, Stage
 from estimation.gate.finding import Finding
+from estimation.gate.measurements.clock_steps import ClockSteps
 from estimation.gate.measurements.timing import FEWEST, Timing
+from robots.signals import Log
 
 # From this period on [s], the samples do not show the accelerations of a robot arm.
 SLOWEST = 0.5
+# A period is that of another column or a unit within this factor.
+ALIKE = 1.5
+# Correlation of the steps of a position with its velocity column from which the period is known, and the share by which
+# the periods of the joints may differ.
+SURE, SIMILAR = 0.95, 0.1
 # Standard deviation of the time steps over the median step, from which jitter is reported.
 JITTER = 0.05
 # Share of rows in too short parts from which the log is refused.
@@ -32,20 +39,26 @@ class Sampling(Check):
         if not len(timing.steps):
             return []
         return [
-            *_rate(timing.period, context.robot.period),
+            *_rate(timing, context.robot.period, _period_by_velocity(context.recorded.log)),
+            *_clock_steps(context.recorded.clock_steps),
             *_gaps(timing, len(context.recorded.log)),
             *_jitter(timing),
         ]
 
 
-def _rate(period: float, controller_period: float) -> list[Finding]:
+def _rate(timing: Timing, controller_period: float, known: float) -> list[Finding]:
+    period = timing.period
     if period < SLOWEST:
         return []
     units = {1e3: "milliseconds", 1e6: "microseconds", 1e9: "nanoseconds"}
-    ratio = period / controller_period
+    ratio = period / (known if np.isfinite(known) else controller_period)
     factor = min(units, key=lambda unit: abs(np.log(ratio / unit)))
     # Controllers sample at 20 Hz to 2 kHz: within a factor of ten of the robot's own period.
-    likely = abs(np.log10(ratio / factor)) < 1.0
+    likely = abs(np.log10(ratio / factor)) < (np.log10(ALIKE) if np.isfinite(known) else 1.0)
+    counts = period == 1.0 and bool(np.all(timing.steps == np.round(timing.steps)))
+    # A controller of 1 kHz also gives steps of one millisecond.
+    if counts and not abs(np.log(ratio / 1e3)) < np.log(ALIKE):
+        return [_row_counter(known, controller_period)]
     return [
         Finding(
             name="unit_of_time" if likely else "rate",
@@ -62,6 +75,62 @@ def _rate(period: float, controller_period: float) -> list[Finding]:
             value=period,
             unit="s",
             column="t",
+        )
+    ]
+
+
+def _row_counter(known: float, controller_period: float) -> Finding:
+    by_velocity = f"the velocity columns show a sample period of {known:.4g} s" if np.isfinite(known) else ""
+    by_robot = f"the robot's description states {controller_period:.4g} s"
+    return Finding(
+        name="row_counter",
+        severity="refuse",
+        text="the column counts rows: it increases by 1 each time, and is no time",
+        action=f"replace it by the row number times the sample period ({by_velocity or by_robot}), or log the time; if "
+        "it is a time in milliseconds, set its unit in a mapping (--mapping)",
+        value=1.0,
+        unit="rows",
+        column="t",
+    )
+
+
+def _period_by_velocity(log: Log) -> float:
+    """Gives the sample period that velocity columns show, as the positions change by velocity times period [s].
+
+    NaN without velocity columns, or if the joints disagree.
+    """
+    if log.dq is None or len(log) < FEWEST:
+        return np.nan
+    moved, mean = np.diff(log.q, axis=0), 0.5 * (log.dq[1:] + log.dq[:-1])
+    energy = np.einsum("tj,tj->j", mean, mean)
+    size = np.einsum("tj,tj->j", moved, moved)
+    moves = (energy > 0) & (size > 0)
+    if not moves.any():
+        return np.nan
+    product = np.einsum("tj,tj->j", moved, mean)[moves]
+    alike = product / np.sqrt(energy[moves] * size[moves])
+    periods = product / energy[moves]
+    periods = periods[alike > SURE]
+    agree = 2 * len(periods) > len(alike) and float(np.ptp(periods)) < SIMILAR * float(periods.max())
+    return float(np.median(periods)) if agree else np.nan
+
+
+def _clock_steps(found: ClockSteps) -> list[Finding]:
+    if not len(found.rows):
+        return []
+    count, largest = len(found.rows), int(np.argmax(np.abs(found.sizes)))
+    size = 1e3 * float(found.sizes[largest])
+    return [
+        Finding(
+            name="clock_step",
+            severity="warning",
+            text=f"the clock was set {'ahead' if size > 0 else 'back'} {f'{count} times' if count > 1 else 'once'}, by "
+            f"{'up to ' if count > 1 else ''}{abs(size):.3g} ms: the arm moved only as far as in one sample period",
+            action="the log is split there; do not set the clock while logging",
+            value=size,
+            unit="ms",
+            column="t",
+            row=int(found.rows[largest]) + 1,
         )
     ]
 
@@ -89,7 +158,7 @@ def _gaps(timing: Timing, rows: int) -> list[Finding]:
 
 
 def _jitter(timing: Timing) -> list[Finding]:
-    even = np.delete(timing.steps, timing.gaps)
+    even = np.delete(timing.steps, np.union1d(timing.gaps, timing.clock_steps))
     jitter = float(even.std() / timing.period) if len(even) else 0.0
     if not jitter > JITTER:
         return []

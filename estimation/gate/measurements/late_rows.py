@@ -7,7 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from estimation.gate.measurements.timing import FEWEST
+from estimation.gate.measurements.timing import FEWEST, measure_timing
+from estimation.logs.clocks import uniform_times
 from robots.signals import Log
 
 Array = NDArray[np.float64]
@@ -115,20 +116,12 @@ def _rounded(log: Log, steps: Array, period: float) -> CorrectedTimes | None:
     if np.abs(multiples - np.round(multiples)).max() > WHOLE:
         return None
     rows = np.arange(len(log))
-    even = _line(log.t)
+    even, true_period = uniform_times(log.t, [slice(*part) for part in measure_timing(log.t).parts])
     error = float(np.abs(log.t - even).max())
     # Equal steps are uniform already, whatever their rounding.
     if not FINE * period < error <= resolution or not _fit_better(log, even, rows[1::2]):
         return None
-    return CorrectedTimes(
-        even, np.zeros(0, dtype=np.intp), rounding=Rounding(resolution, period=float(even[1] - even[0]))
-    )
-
-
-def _line(t: Array) -> Array:
-    """Gives the straight line (N,) through times (N,) by least squares."""
-    rows, times = np.arange(len(t)) - 0.5 * (len(t) - 1), t - t[0]
-    return np.asarray(t[0] + times.mean() + rows * (rows @ times) / (rows @ rows))
+    return CorrectedTimes(even, np.zeros(0, dtype=np.intp), rounding=Rounding(resolution, period=true_period))
 
 
 def _fit_better(log: Log, even: Array, late: NDArray[np.intp]) -> bool:

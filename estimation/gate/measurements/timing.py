@@ -25,25 +25,31 @@ class Timing:
         steps: time steps (N - 1,) [s].
         period: median step [s], NaN without steps.
         gaps: indices of the steps that are gaps.
-        parts: (first, stop) rows of the parts between gaps.
+        clock_steps: indices of the steps in which the clock was set.
+        parts: (first, stop) rows of the parts between gaps, and between steps of the clock.
     """
 
     steps: Array
     period: float
     gaps: NDArray[np.intp]
+    clock_steps: NDArray[np.intp]
     parts: tuple[tuple[int, int], ...]
 
 
-def measure_timing(t: Array) -> Timing:
+def measure_timing(t: Array, set_at: Array | None = None) -> Timing:
     """Measures the time steps and finds the gaps.
 
     Args:
         t: time (N,) [s].
+        set_at: times of the rows before which the clock was set [s].
     """
-    steps = np.diff(t)
+    steps, none = np.diff(t), np.empty(0, dtype=np.intp)
     if not len(steps):
-        return Timing(steps, np.nan, np.empty(0, dtype=np.intp), ((0, len(t)),))
+        return Timing(steps, np.nan, none, none, ((0, len(t)),))
     period = float(np.median(steps))
     gaps = np.flatnonzero((steps > GAP_STEPS * period) & (steps > GAP_TIME))
-    edges = np.concatenate([[0], gaps + 1, [len(t)]])
-    return Timing(steps, period, gaps, tuple((int(first), int(stop)) for first, stop in pairwise(edges)))
+    stepped = none if set_at is None else np.searchsorted(t, set_at) - 1
+    stepped = stepped[(stepped >= 0) & (stepped < len(steps))]
+    gaps = np.setdiff1d(gaps, stepped)
+    edges = np.concatenate([[0], np.union1d(gaps, stepped) + 1, [len(t)]])
+    return Timing(steps, period, gaps, stepped, tuple((int(first), int(stop)) for first, stop in pairwise(edges)))

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from estimation.gate.quick_fits.excerpts import Excerpt
+from estimation.gate.quick_fits.gravity_rows import gravity_rows
 from estimation.gate.quick_fits.rigid_body import joint_rows, rigid_body, used_columns
 from estimation.gate.quick_fits.whole_fit import Moments, solve_scaled
 from robots.robot import Robot
@@ -105,13 +106,21 @@ class Rows:
     speed: Array
 
     @staticmethod
-    def of(robot: Robot, excerpts: Sequence[Excerpt], most: int | None = None) -> Rows:
+    def of(
+        robot: Robot,
+        excerpts: Sequence[Excerpt],
+        most: int | None = None,
+        gravity: Array | None = None,
+        static: bool = False,
+    ) -> Rows:
         """Evaluates the regressor on all excerpts.
 
         Args:
             robot: with n joints.
             excerpts: of its log.
             most: number of rows to which they are thinned; None for all.
+            gravity: (3,) in the base frame [m/s2]; None as the robot's description says.
+            static: without the torques of velocities and accelerations: gravity, friction and offset are left.
         """
         if most is not None:
             stride = max(1, sum(len(part.t) for part in excerpts) // most)
@@ -120,9 +129,12 @@ class Rows:
         rows = len(q)
         block = np.minimum((np.arange(rows) * BLOCKS) // rows, BLOCKS - 1)
         speed = np.sqrt(np.mean(dq**2, axis=0))
-        bodies, used = joint_rows(robot, q, dq, ddq), used_columns(robot)
+        own = np.zeros_like(ddq) if static else ddq
+        bodies, used = joint_rows(robot, q, np.zeros_like(dq) if static else dq, own), used_columns(robot)
+        if gravity is not None:
+            bodies, used = _under_gravity(robot, q, bodies, used, gravity)
         joints = tuple(
-            _joined(body, columns, dq[:, j], ddq[:, j], float(speed[j]))
+            _joined(body, columns, dq[:, j], own[:, j], float(speed[j]))
             for j, (body, columns) in enumerate(zip(bodies, used, strict=True))
         )
         return Rows(tuple(excerpts), q, dq, ddq, joints, rigid_body(robot).size, block, speed)
@@ -242,6 +254,22 @@ class Rows:
     def _place(self, joint: int) -> NDArray[np.intp]:
         """Gives the places of a joint's columns among those of all joints."""
         return np.concatenate([self.joints[joint].used, self.bodies + OWN * joint + np.arange(OWN)])
+
+
+def _under_gravity(
+    robot: Robot, q: Array, bodies: tuple[Array, ...], used: tuple[Places, ...], gravity: Array
+) -> tuple[tuple[Array, ...], tuple[Places, ...]]:
+    """Gives the columns of the rigid body, and the parameters that they belong to, under another gravity."""
+    heavy = gravity_rows(robot, q)
+    change = np.asarray(gravity, dtype=float) - np.asarray(robot.chain.gravity)
+    found, places = [], []
+    for body, columns, own in zip(bodies, used, heavy, strict=True):
+        whole = np.einsum("mkp,k->mp", own, change)
+        whole[:, columns] += body
+        acts = np.flatnonzero(np.abs(whole).max(axis=0) > SILENT * max(float(np.abs(whole).max()), SILENT))
+        found.append(whole[:, acts])
+        places.append(acts.astype(np.intp))
+    return tuple(found), tuple(places)
 
 
 def _joined(body: Array, used: NDArray[np.intp], dq: Array, ddq: Array, speed: float) -> JointColumns:

@@ -37,7 +37,10 @@ class Cleaned:
     @cached_property
     def timing(self) -> Timing:
         """Its time steps and gaps."""
-        return self._recorded.timing if self.log is self._recorded.log else measure_timing(self.log.t)
+        recorded = self._recorded
+        if self.log is recorded.log:
+            return recorded.timing
+        return measure_timing(self.log.t, recorded.log.t[recorded.clock_steps.rows])
 
     @cached_property
     def columns(self) -> Columns:

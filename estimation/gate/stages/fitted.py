@@ -7,6 +7,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from estimation.gate.quick_fits.cutoff_choice import CHOICE_ROWS
 from estimation.gate.quick_fits.delays import Delay, estimate_delays
 from estimation.gate.quick_fits.joint_fit import JointFit, Rows
 from estimation.gate.quick_fits.joint_physics import JointPhysics, joint_physics, mean_inertias
@@ -66,6 +67,19 @@ class Fitted:
         With torques as logged: smoothing would remove the noise that hides the torque of a joint.
         """
         return fit_all(self.rows.moments(self._joints, raw=True), self.logged_spread).unexplained
+
+    @cached_property
+    def dynamic_gain(self) -> Array:
+        """Decrease of the held-out error (log) by velocities and accelerations (n,), NaN without a fit.
+
+        On some rows only, for torques as logged.
+        """
+        errors = []
+        for static in (False, True):
+            rows = Rows.of(self.robot, self.rows.excerpts, CHOICE_ROWS, static=static)
+            errors.append(fit_all(rows.moments(self._joints, raw=True), self.logged_spread).unexplained)
+        dynamic, still = np.maximum(errors, 1e-9)
+        return np.asarray(np.log(still / dynamic))
 
     @cached_property
     def sign_costs(self) -> Array:

@@ -8,6 +8,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from estimation.gate.measurements.clock_steps import ClockSteps, find_clock_steps
 from estimation.gate.measurements.columns import Columns
 from estimation.gate.measurements.hung_columns import Hang, cut_hangs, find_hangs
 from estimation.gate.measurements.late_rows import CorrectedTimes, correct_times
@@ -15,6 +16,7 @@ from estimation.gate.measurements.motion import moving_rows, standing_joints
 from estimation.gate.measurements.outliers import find_outliers, isolated_rows
 from estimation.gate.measurements.repeated_rows import RepeatedRows, find_repeated_rows
 from estimation.gate.measurements.timing import Timing, measure_timing
+from estimation.gate.measurements.wraps import Wraps, find_wraps
 from robots.robot import Robot
 from robots.signals import Log
 
@@ -22,7 +24,7 @@ Rows = NDArray[np.intp]
 
 
 class Recorded:
-    """All rows of the log. Only times are corrected, of rows that were written late.
+    """All rows of the log. Only times of rows that were written late, and wrapped angles, are corrected.
 
     Attributes:
         robot: with n joints, as it was set up for the log.
@@ -35,17 +37,43 @@ class Recorded:
     @cached_property
     def times(self) -> CorrectedTimes:
         """Corrected times, and rows without a known time."""
-        return correct_times(self.original)
+        return correct_times(self.unwrapped)
+
+    @cached_property
+    def wraps(self) -> tuple[Wraps, ...]:
+        """The revolute joints whose angles wrap."""
+        found = (
+            find_wraps(joint, self.original.q[:, joint], self.original.t)
+            for joint, kind in enumerate(self.robot.chain.kinds)
+            if kind == "revolute"
+        )
+        return tuple(wraps for wraps in found if wraps is not None)
+
+    @cached_property
+    def unwrapped(self) -> Log:
+        """The log with its own times and unwrapped angles."""
+        if not self.wraps:
+            return self.original
+        q = np.array(self.original.q)
+        for wraps in self.wraps:
+            q[:, wraps.joint] = wraps.q
+        return replace(self.original, q=q)
 
     @cached_property
     def log(self) -> Log:
-        """The log with corrected times."""
-        return self.original if self.times.t is self.original.t else replace(self.original, t=self.times.t)
+        """The log with corrected times and unwrapped angles."""
+        log = self.unwrapped
+        return log if self.times.t is self.original.t else replace(log, t=self.times.t)
 
     @cached_property
     def timing(self) -> Timing:
         """Its time steps and gaps."""
-        return measure_timing(self.log.t)
+        return measure_timing(self.log.t, self.log.t[self.clock_steps.rows])
+
+    @cached_property
+    def clock_steps(self) -> ClockSteps:
+        """Steps of the clock."""
+        return find_clock_steps(self.log.t, self.columns)
 
     @cached_property
     def columns(self) -> Columns:
@@ -91,3 +119,8 @@ class Recorded:
     def parts(self) -> tuple[tuple[int, int], ...]:
         """Parts (first, stop) without a gap and without a column that hung."""
         return cut_hangs(self.timing.parts, self.hangs)
+
+    @property
+    def motion_parts(self) -> tuple[tuple[int, int], ...]:
+        """Parts (first, stop) without a gap and without a position that hung."""
+        return cut_hangs(self.timing.parts, [hang for hang in self.hangs if hang.prefix == "q"])

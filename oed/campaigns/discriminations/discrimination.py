@@ -192,7 +192,7 @@ class Discrimination:
                     "gravity": None if run.gravity is None else run.gravity.tolist(),
                     "duration": run.motion.duration,
                     "segments": run.table(),
-                    "smallest_margins": [margin_data(margin) for margin in run.margins],
+                    "smallest_margins": [margin_data(margin, self.robot.limits) for margin in run.margins],
                 }
                 for file, run in zip(self.files, self.runs, strict=True)
             ],
@@ -211,7 +211,7 @@ class Discrimination:
         for file, run in zip(self.files, self.runs, strict=True):
             if file not in written:
                 stated = {"robot": self.robot.name, "experiment": self.kind, "tool": f"robot-oed {VERSION}"}
-                write_trajectory(target / file, run.motion, stated, force=True)
+                write_trajectory(target / file, run.motion, stated, kinds=self.robot.chain.kinds, force=True)
                 written.add(file)
         write_atomic(target / DESIGN, json.dumps(self.to_dict(), indent=2, allow_nan=False) + "\n")
 

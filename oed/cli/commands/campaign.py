@@ -20,6 +20,7 @@ from oed.cli.options import (
     SeedOption,
     TipOption,
     TorqueMarginOption,
+    UnlimitedOption,
     VelocityFractionOption,
     WorkersOption,
     robot_from,
@@ -68,6 +69,7 @@ def campaign(
     tip: TipOption = None,
     joints: JointsOption = None,
     lock: LockOption = None,
+    unlimited: UnlimitedOption = False,
     png: PngOption = False,
     force: ForceOption = False,
     json: JsonOption = False,
@@ -96,7 +98,7 @@ def campaign(
         names = ["campaign.json", "report.html", *(f"{name}.csv" for name in programme.stage_names)]
         with ResultFolder(out, force, names=names) as folder:
             result = run(
-                robot_from(robot, tip, joints, lock),
+                robot_from(robot, tip, joints, lock, unlimited=unlimited),
                 programme=programme,
                 design=design,
                 velocity_fraction=velocity_fraction,

@@ -26,11 +26,14 @@ from oed.cli.options import (
     SeedOption,
     TipOption,
     TorqueMarginOption,
+    UnlimitedOption,
     VelocityFractionOption,
     WorkersOption,
     numbers,
     robot_from,
 )
+from oed.cli.payload_designs import is_given, refuse_beside_payload
+from oed.cli.set_up import CarriedOption
 
 
 def design(
@@ -64,6 +67,7 @@ def design(
         bool, typer.Option(help="Respect the torque limits, computed with the robot's nominal dynamics.")
     ] = True,
     torque_margin: TorqueMarginOption = 0.1,
+    payload: CarriedOption = None,
     collision: CollisionOption = False,
     clearance: Annotated[float, typer.Option(help="Minimum clearance for --collision [m].")] = 0.01,
     tool_box: Annotated[
@@ -88,7 +92,7 @@ def design(
     noise: Annotated[
         str | None,
         typer.Option(
-            help="Standard deviation of the torque noise of each joint [N m], comma-separated.", show_default=False
+            help="Standard deviation of the torque noise of each joint [N m or N], comma-separated.", show_default=False
         ),
     ] = None,
     after: Annotated[
@@ -108,6 +112,16 @@ def design(
             show_default=False,
         ),
     ] = None,
+    payload_only: Annotated[
+        bool,
+        typer.Option(
+            "--payload-only",
+            help=(
+                "Design the motion that determines a payload: the arm counts as known, the default criterion is d, and "
+                "there are no strokes."
+            ),
+        ),
+    ] = False,
     discriminate: Annotated[
         str | None,
         typer.Option(
@@ -129,6 +143,7 @@ def design(
     tip: TipOption = None,
     joints: JointsOption = None,
     lock: LockOption = None,
+    unlimited: UnlimitedOption = False,
     png: PngOption = False,
     force: ForceOption = False,
     json: JsonOption = False,
@@ -145,7 +160,7 @@ def design(
 
             refuse_others(context)
             summary, data = design_discriminating(
-                robot_from(robot, tip, joints, lock),
+                robot_from(robot, tip, joints, lock, unlimited=unlimited),
                 discriminate,
                 noise=numbers("--noise", noise),
                 friction=friction,
@@ -159,6 +174,7 @@ def design(
             )
             console.result(f"{summary}\nwritten to {out.resolve()}", data)
             return
+        from estimation.payloads.body import read_body
         from oed.cli.priors import prior_from
         from oed.cli.spaces import spaces_from
         from oed.experiments import LimitOptions, ModelOptions, SearchOptions, TrajectoryOptions, WeightOptions
@@ -168,13 +184,18 @@ def design(
         from oed.trajectories import family as choose_family
         from robots.common.files import ResultFolder
 
+        if payload_only:
+            refuse_beside_payload(context)
+            given = {name for name in ("criterion", "strokes") if is_given(context, name)}
+            criterion = criterion if "criterion" in given else "d"
+            strokes = strokes if "strokes" in given else False
         with ResultFolder(out, force, names=["trajectory.csv", "design.json", "report.html"]) as folder:
-            described = robot_from(robot, tip, joints, lock)
+            described = robot_from(robot, tip, joints, lock, unlimited=unlimited)
             prior, effects = prior_from(after, described.n) if after else (None, ())
             result = run(
                 described,
                 criterion=criterion,
-                model=ModelOptions(friction=friction, offset=offset, essential=essential),
+                model=ModelOptions(friction=friction, offset=offset, essential=essential, payload_only=payload_only),
                 trajectory=TrajectoryOptions(
                     family=choose_family(family, harmonics=harmonics, base_frequency=base_frequency),
                     periods=periods,
@@ -189,6 +210,7 @@ def design(
                     clearance=clearance,
                     space=spaces_from(tool_box, singularity),
                     effects=effects,
+                    payload=None if payload is None else read_body(payload).parameters,
                 ),
                 weights=WeightOptions(
                     scaling=scaling,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import ExitStack
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -9,10 +10,12 @@ import typer
 
 from oed.cli.console import Console
 from oed.cli.options import (
+    FittedFrictionOption,
     ForceOption,
     JointsOption,
     JsonOption,
     LockOption,
+    MappingOption,
     OutOption,
     PngOption,
     QuietOption,
@@ -21,7 +24,7 @@ from oed.cli.options import (
     TipOption,
     robot_from,
 )
-from oed.cli.set_up import GravityOption, PayloadOption, with_known_setup
+from oed.cli.set_up import GravityOption, PayloadOption, TorqueIsOption, with_known_setup, with_torque_meaning
 from robots.common.progress import Progress
 
 if TYPE_CHECKING:
@@ -46,8 +49,10 @@ def diagnose(
             show_default=False,
         ),
     ] = None,
+    mapping: MappingOption = None,
     payload: PayloadOption = None,
     gravity: GravityOption = None,
+    torque_is: TorqueIsOption = None,
     own_clocks: Annotated[
         bool,
         typer.Option(
@@ -55,9 +60,7 @@ def diagnose(
             help="Each log's time starts at its own zero. Logs are put one after the other, one minute apart.",
         ),
     ] = False,
-    friction: Annotated[
-        str, typer.Option(help="Friction of the base model: polynomial or coulomb-viscous.")
-    ] = "polynomial",
+    friction: FittedFrictionOption = "auto",
     limits: Annotated[
         bool,
         typer.Option(
@@ -85,6 +88,12 @@ def diagnose(
     ] = 0.02,
     seed: SeedOption = 0,
     out: OutOption = Path("diagnosed"),
+    urdf: Annotated[
+        Path | None,
+        typer.Option(
+            "--urdf", help="Also write a URDF with the extended model's bodies and friction.", show_default=False
+        ),
+    ] = None,
     tip: TipOption = None,
     joints: JointsOption = None,
     lock: LockOption = None,
@@ -101,9 +110,10 @@ def diagnose(
     with console.working() as progress:
         described = robot_from(robot, tip, joints, lock)
         if limits:
-            if log or held_out or payload or gravity or not trajectory:
+            if log or held_out or mapping or payload or gravity or torque_is or urdf or not trajectory:
                 raise typer.BadParameter(
-                    "--limits needs --trajectory; --log, --held-out, --payload and --gravity do not apply",
+                    "--limits needs --trajectory; --log, --held-out, --mapping, --payload, --gravity, --torque-is and "
+                    "--urdf do not apply",
                     ctx=context,
                 )
             summary, data = _limits(described, trajectory, model, noise, out, force, progress)
@@ -112,7 +122,20 @@ def diagnose(
                 raise typer.BadParameter("give --log, or --limits with --trajectory", ctx=context)
             known = (payload, gravity)
             summary, data = _diagnosis(
-                described, log, held_out or [], known, own_clocks, friction, seed, out, png, force, progress
+                described,
+                log,
+                held_out or [],
+                mapping,
+                known,
+                torque_is,
+                own_clocks,
+                friction,
+                seed,
+                out,
+                urdf,
+                png,
+                force,
+                progress,
             )
     console.result(f"{summary}\nwritten to {out.resolve()}", data)
 
@@ -207,11 +230,14 @@ def _diagnosis(
     robot: Robot,
     logs: list[Path],
     held_out: list[Path],
+    mapping: Path | None,
     known: tuple[list[str] | None, list[str] | None],
+    torque_is: str | None,
     own_clocks: bool,
     friction: str,
     seed: int,
     out: Path,
+    urdf: Path | None,
     png: bool,
     force: bool,
     progress: Progress,
@@ -220,25 +246,32 @@ def _diagnosis(
     from estimation import on_one_clock, read_logs
     from estimation.diagnosis.experiment_plans.experiment_motions import at_rate
     from estimation.diagnosis.pipeline import diagnose as run
+    from estimation.exports import urdf_text
     from oed.exports import write_trajectory
     from oed.reports import save_diagnosis_report
-    from robots.common.files import ResultFolder
+    from robots.common.files import ResultFolder, open_atomic
 
-    with ResultFolder(out, force, names=["diagnosis.json", "model.json", "report.html"]) as folder:
-        read = list(read_logs(logs, n=robot.n))
-        other = list(read_logs(held_out, n=robot.n)) if held_out else []
+    with ExitStack() as files:
+        folder = files.enter_context(ResultFolder(out, force, names=["diagnosis.json", "model.json", "report.html"]))
+        stream = None if urdf is None else files.enter_context(open_atomic(urdf, force=force))
+        given = {"n": robot.n, "mapping": mapping, "joints": robot.joint_names, "kinds": robot.chain.kinds}
+        read = list(read_logs(logs, **given))
+        other = list(read_logs(held_out, **given)) if held_out else []
         # Held-out logs are numbered after the others.
-        both = with_known_setup([*read, *other], *known)
+        both = with_torque_meaning(robot, with_known_setup([*read, *other], *known), torque_is)
         if own_clocks:
             both = on_one_clock(both)
         read, other = both[: len(read)], both[len(read) :]
         result = run(robot, read, held_out=other or None, friction=friction, seed=seed, progress=progress)
         result.save(folder.path("diagnosis.json").parent)
+        if stream is not None:
+            stream.write(urdf_text(result.model, robot).encode())
         following = result.next_experiment
         if following is not None:
             for number, made in enumerate(following.motions, start=1):
                 path = folder.path(f"next_experiment_{number}.csv")
                 motion = at_rate(made, robot.period)
-                write_trajectory(path, motion, {"robot": robot.name, "experiment": following.kind})
+                stated = {"robot": robot.name, "experiment": following.kind}
+                write_trajectory(path, motion, stated, kinds=robot.chain.kinds)
         save_diagnosis_report(result, folder, png=png)
     return result.summary(), result.to_dict()

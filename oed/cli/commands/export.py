@@ -2,42 +2,112 @@
 
 from __future__ import annotations
 
+import warnings
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
 from oed.cli.console import Console
-from oed.cli.options import ForceOption, JsonOption, QuietOption
+from oed.cli.options import (
+    ROBOT,
+    ForceOption,
+    JointsOption,
+    JsonOption,
+    LockOption,
+    QuietOption,
+    TipOption,
+    robot_from,
+)
 
 
 def export(
     trajectory: Annotated[Path, typer.Argument(help="A trajectory.csv.", show_default=False)],
-    to: Annotated[str, typer.Option("--to", help="Format: csv.")] = "csv",
+    to: Annotated[
+        str,
+        typer.Option(
+            "--to",
+            help="Format: csv, ros, ros-goal, moveit-limits, simple-message, urscript, kuka, abb or franka.",
+        ),
+    ] = "csv",
     out: Annotated[
         Path | None, typer.Option("--out", help="File to write. Default: next to the trajectory.", show_default=False)
     ] = None,
-    degrees: Annotated[bool, typer.Option("--degrees", help="Write angles in degrees.")] = False,
-    positions_only: Annotated[bool, typer.Option("--positions-only", help="Write only t and q1..qn.")] = False,
-    bare: Annotated[
-        bool, typer.Option("--bare", help="Write the column names without the comment block above them.")
+    robot: Annotated[
+        str | None,
+        typer.Option(
+            "--robot", help=f"The robot: {ROBOT}. Default: the robot named in the trajectory file.", show_default=False
+        ),
+    ] = None,
+    period: Annotated[
+        float | None,
+        typer.Option(
+            "--period", help="Sample period of the controller [s]. Default: see the page.", show_default=False
+        ),
+    ] = None,
+    start_tolerance: Annotated[
+        float, typer.Option("--start-tolerance", help="urscript, ros-goal: tolerance of the pose [rad or m].")
+    ] = 0.01,
+    name: Annotated[
+        str, typer.Option("--name", help="urscript, kuka, abb: name of the program or module.")
+    ] = "trajectory",
+    degrees: Annotated[
+        bool, typer.Option("--degrees", help="csv: angles in degrees; linear axes stay in metres.")
     ] = False,
+    positions_only: Annotated[bool, typer.Option("--positions-only", help="csv: only t and q1..qn.")] = False,
+    bare: Annotated[
+        bool, typer.Option("--bare", help="csv: the column names without the comment block above them.")
+    ] = False,
+    tip: TipOption = None,
+    joints: JointsOption = None,
+    lock: LockOption = None,
     force: ForceOption = False,
     json: JsonOption = False,
     quiet: QuietOption = False,
 ) -> None:
-    """Writes a trajectory file for a robot controller."""
+    """Writes a trajectory file for a robot controller or a simulator."""
     console = Console(json=json, quiet=quiet)
     with console.working():
-        from oed.exports import FORMS, read_trajectory, write_trajectory
-        from robots.common.errors import InputError
+        from oed.exports import FORMS, ExportOptions, export_trajectory, read_trajectory, write_trajectory
+        from oed.exports.forms.sampling import at_period
+        from robots.common.errors import AssumedValueWarning, InputError
 
         if to not in FORMS:
             raise InputError(f"--to {to}", allowed=", ".join(FORMS))
+        if to != "csv" and (degrees or positions_only or bare):
+            raise InputError(f"--degrees, --positions-only or --bare with --to {to}", allowed="them with csv only")
         motion, metadata = read_trajectory(trajectory)
-        target = out or trajectory.with_name(f"{trajectory.stem}-export.csv")
-        write_trajectory(
-            target, motion, metadata, degrees=degrees, positions_only=positions_only, bare=bare, force=force
-        )
-    data = {"file": str(target), "form": to, "samples": len(motion), "joints": motion.n}
+        if to == "csv":
+            kinds = robot_from(robot, tip, joints, lock).chain.kinds if robot else metadata.get("kinds")
+            if degrees and kinds is None:
+                text = (
+                    f"{trajectory} states no units: all joints are taken as revolute; --robot states which axes are "
+                    "linear"
+                )
+                warnings.warn(text, AssumedValueWarning, stacklevel=1)
+            target = out or trajectory.with_name(f"{trajectory.stem}-export.csv")
+            if period is not None:
+                motion = at_period(motion, period)
+                metadata.pop("period", None)
+            write_trajectory(
+                target,
+                motion,
+                metadata,
+                kinds=kinds,
+                degrees=degrees,
+                positions_only=positions_only,
+                bare=bare,
+                force=force,
+            )
+        else:
+            from oed.exports import CONTROLLER_FORMS
+
+            named = robot or str(metadata.get("robot") or "")
+            if not named:
+                raise InputError("the file does not name its robot", file=trajectory, remedy="give --robot")
+            described = robot_from(named, tip, joints, lock)
+            target = out or trajectory.with_name(f"{trajectory.stem}-export{CONTROLLER_FORMS[to].suffixes[0]}")
+            options = ExportOptions(start_tolerance=start_tolerance, name=name)
+            motion = export_trajectory(target, motion, described, to, period=period, options=options, force=force)
+    data = {"file": str(target), "form": to, "samples": len(motion), "joints": motion.n, "period": motion.period}
     console.result(f"{len(motion)} samples of {motion.n} joints written to {target}", data)

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from contextlib import ExitStack
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from oed.cli.console import Console
 from oed.cli.options import (
+    FittedFrictionOption,
     ForceOption,
     JointsOption,
     JsonOption,
@@ -24,7 +25,10 @@ from oed.cli.options import (
     TipOption,
     robot_from,
 )
-from oed.cli.set_up import GravityOption, PayloadOption, with_known_setup
+from oed.cli.set_up import GravityOption, PayloadOption, TorqueIsOption, with_known_setup, with_torque_meaning
+
+if TYPE_CHECKING:
+    from estimation import Estimate
 
 
 def identify(
@@ -33,6 +37,7 @@ def identify(
     mapping: MappingOption = None,
     payload: PayloadOption = None,
     gravity: GravityOption = None,
+    torque_is: TorqueIsOption = None,
     method: Annotated[
         str,
         typer.Option(
@@ -40,13 +45,7 @@ def identify(
             "`all` to compare them."
         ),
     ] = "wls",
-    friction: Annotated[
-        str,
-        typer.Option(
-            help="Friction model: auto (bends within the recorded speeds, grows linearly beyond), polynomial or "
-            "coulomb-viscous."
-        ),
-    ] = "auto",
+    friction: FittedFrictionOption = "auto",
     position: Annotated[
         bool | None,
         typer.Option(
@@ -60,7 +59,8 @@ def identify(
     seed: SeedOption = 0,
     out: OutOption = Path("identified"),
     urdf: Annotated[
-        Path | None, typer.Option("--urdf", help="Also write a URDF with the identified links.", show_default=False)
+        Path | None,
+        typer.Option("--urdf", help="Also write a URDF with identified bodies and friction.", show_default=False),
     ] = None,
     c_code: Annotated[
         Path | None, typer.Option("--c-code", help="Also write C code for torque and gravity.", show_default=False)
@@ -92,9 +92,10 @@ def identify(
             # Opened before the work: an existing file ends the command early, and an error leaves no file behind.
             streams = {path: files.enter_context(open_atomic(path, force=force)) for path in (urdf, c_code) if path}
             described = robot_from(robot, tip, joints, lock)
-            logs = with_known_setup(
-                read_logs(log, n=described.n, mapping=mapping, joints=described.joint_names), payload, gravity
+            read = read_logs(
+                log, n=described.n, mapping=mapping, joints=described.joint_names, kinds=described.chain.kinds
             )
+            logs = with_torque_meaning(described, with_known_setup(read, payload, gravity), torque_is)
             options: dict[str, Any] = {
                 "friction": friction,
                 "position": position,
@@ -113,18 +114,30 @@ def identify(
             if c_code is not None:
                 streams[c_code].write(c_text(result.model).encode())
     found = "\n".join(gate.summary() for gate in result.gates if gate.findings)
+    weak = _undetermined(result)
     console.result(
         "\n".join(
             [
                 *([found] if found else []),
                 *([table.summary()] if table else []),
                 result.summary(),
+                *([f"  below 3 standard errors: {', '.join(weak)}"] if weak else []),
                 *(f"written to {path.resolve()}" for path in (out, urdf, c_code) if path is not None),
             ]
         ),
         {
             **result.to_dict(),
             "gate": [gate.to_dict() for gate in result.gates],
+            "below_3_standard_errors": weak,
             "methods": table.to_dict() if table else None,
         },
     )
+
+
+def _undetermined(result: Estimate) -> list[str]:
+    """Lists the parameters below three standard errors, if the gate says that a log does not determine inertias."""
+    if not any(finding.name == "undetermined" for gate in result.gates for finding in gate.findings):
+        return []
+    model = result.model
+    pairs = zip(model.names, model.values, model.standard_errors, strict=True)
+    return [name for name, value, error in pairs if not abs(value) >= 3.0 * error]

@@ -21,6 +21,7 @@ from oed.cli.options import (
     QuietOption,
     RobotOption,
     SeedOption,
+    UnlimitedOption,
     WorkersOption,
     robot_from,
 )
@@ -43,6 +44,7 @@ def pareto(
     workers: WorkersOption = None,
     out: OutOption = Path("pareto"),
     png: PngOption = False,
+    unlimited: UnlimitedOption = False,
     force: ForceOption = False,
     json: JsonOption = False,
     quiet: QuietOption = False,
@@ -61,7 +63,7 @@ def pareto(
 
         with ResultFolder(out, force, names=["pareto.json", "report.html"]) as folder:
             front = run(
-                robot_from(robot),
+                robot_from(robot, unlimited=unlimited),
                 criteria=[name.strip() for name in criteria.split(",")],
                 points=points,
                 model=ModelOptions(friction=friction),

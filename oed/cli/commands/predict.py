@@ -11,7 +11,7 @@ import typer
 
 from oed.cli.console import Console
 from oed.cli.options import ForceOption, JsonOption, MappingOption, QuietOption
-from oed.cli.set_up import GravityOption, PayloadOption, with_known_setup
+from oed.cli.set_up import GravityOption, PayloadOption, TorqueIsOption, with_known_setup, with_torque_meaning
 
 if TYPE_CHECKING:
     from estimation.models.model import Model
@@ -24,6 +24,7 @@ def predict(
     mapping: MappingOption = None,
     payload: PayloadOption = None,
     gravity: GravityOption = None,
+    torque_is: TorqueIsOption = None,
     before: Annotated[
         list[Path] | None,
         typer.Option(
@@ -67,8 +68,10 @@ def predict(
             page_file = files.enter_context(open_atomic(report, force=force)) if report else None
             identified = load_model(model)
             robot = identified.robot
-            read = read_log(log, n=robot.n, torque=False, mapping=mapping, joints=robot.joint_names)
-            (recorded,) = with_known_setup([read], payload, gravity)
+            read = read_log(
+                log, n=robot.n, torque=False, mapping=mapping, joints=robot.joint_names, kinds=robot.chain.kinds
+            )
+            (recorded,) = with_torque_meaning(robot, with_known_setup([read], payload, gravity), torque_is)
             progress.start("predicting", None)
             later, clock = clock_shift(identified, recorded)
             heat = _heat(model, identified, recorded, before or [], ambient, mapping, later)
@@ -77,7 +80,10 @@ def predict(
             if page_file is not None:
                 page = prediction_page(result, robot.name, robot.chain.kinds)
                 page_file.write(render(page).encode())
-    summary = "\n".join([result.summary(), *(word for word in (heat.assumed, clock) if word), f"written to {out}"])
+    found = [result.gate.summary()] if result.gate is not None and result.gate.findings else []
+    summary = "\n".join(
+        [*found, result.summary(), *(word for word in (heat.assumed, clock) if word), f"written to {out}"]
+    )
     words = {"heat": heat.assumed or None, "clock": clock or None}
     console.result(summary, {"file": str(out), **result.to_dict(), **words})
 
@@ -108,7 +114,9 @@ def _heat(
 
     file = path / "model.json" if path.is_dir() else path
     thermal = thermal_from_dict(model, codec.loads(file.read_text(encoding="utf-8")))
-    earlier = read_logs(before, n=model.robot.n, mapping=mapping, joints=model.robot.joint_names) if before else []
+    robot = model.robot
+    names, kinds = robot.joint_names, robot.chain.kinds
+    earlier = read_logs(before, n=robot.n, mapping=mapping, joints=names, kinds=kinds) if before else []
     if thermal is None:
         if ambient is not None:
             raise InputError(

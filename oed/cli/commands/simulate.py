@@ -19,6 +19,7 @@ from oed.cli.options import (
     TipOption,
     robot_from,
 )
+from oed.cli.set_up import CarriedOption
 
 
 def simulate(
@@ -54,6 +55,7 @@ def simulate(
             show_default=False,
         ),
     ] = None,
+    payload: CarriedOption = None,
     out: Annotated[
         Path | None,
         typer.Option(
@@ -76,17 +78,25 @@ def simulate(
     """
     console = Console(json=json, quiet=quiet)
     with console.working() as progress:
+        from dataclasses import replace
+
+        import numpy as np
+
         from estimation.logs import write_log
+        from estimation.payloads.body import read_body
         from oed.campaigns import Campaign, record
         from oed.exports import read_trajectory
         from robots.common.errors import InputError
         from robots.plants import load_plant, nominal_plant
         from robots.plants import simulate as run
+        from robots.terms.situations.flange_body import with_body
 
         if (trajectory is None) == (campaign is None):
             raise typer.BadParameter("give either --trajectory or --campaign", ctx=context)
         if model is not None and (plant or campaign):
             raise typer.BadParameter("--model takes the place of --plant and needs a --trajectory", ctx=context)
+        if payload is not None and campaign is not None:
+            raise typer.BadParameter("--payload needs a --trajectory", ctx=context)
         given = robot_from(robot, tip, joints, lock) if robot else None
         if campaign is not None:
             planned = Campaign.load(campaign, given)
@@ -119,8 +129,12 @@ def simulate(
                 virtual = load_plant(plant, described) if plant else nominal_plant(described)
             else:
                 raise InputError("the file does not name its robot", file=trajectory, remedy="give --robot")
+            if payload is not None:
+                body = read_body(payload).parameters
+                loaded = with_body(virtual.model, np.asarray(virtual.parameters), body)
+                virtual = replace(virtual, parameters=loaded)
             log = run(virtual, motion, seed=seed)
-            write_log(target, log, force=force)
+            write_log(target, log, force=force, kinds=described.chain.kinds)
             data = {"file": str(target), "samples": len(log), "duration": log.duration, "robot": described.name}
             size = f"{len(log)} samples, {log.duration:.1f} s"
     console.result(f"{size} of a virtual {data['robot']} written to {target}", data)

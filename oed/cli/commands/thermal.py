@@ -10,6 +10,7 @@ import typer
 
 from oed.cli.console import Console
 from oed.cli.options import (
+    FittedFrictionOption,
     ForceOption,
     JointsOption,
     JsonOption,
@@ -56,7 +57,7 @@ def thermal(
         float | None,
         typer.Option(help="Ambient temperature of logs that do not state it [degC].", show_default=False),
     ] = None,
-    friction: Annotated[str, typer.Option(help="Friction model: polynomial or coulomb-viscous.")] = "polynomial",
+    friction: FittedFrictionOption = "auto",
     seed: SeedOption = 0,
     out: OutOption = Path("thermal"),
     tip: TipOption = None,
@@ -93,7 +94,12 @@ def thermal(
             described = robot_from(robot, tip, joints, lock)
             if joint is not None and joint > described.n:
                 raise InputError(f"--joint {joint}", allowed=f"1 to {described.n}")
-            logs = _surrounded(read_logs(log, n=described.n, mapping=mapping, joints=described.joint_names), ambient)
+            logs = _surrounded(
+                read_logs(
+                    log, n=described.n, mapping=mapping, joints=described.joint_names, kinds=described.chain.kinds
+                ),
+                ambient,
+            )
             identified = identify(described, logs, friction=friction, seed=seed, progress=progress)
             options: dict[str, Any] = {"alpha": alpha, "seed": seed, "progress": progress}
             result = fit_campaign(described, logs, order=wanted, model=identified.model, **options)

@@ -16,7 +16,18 @@ OTHER = "Other commands"
 OPTIONS = {
     "Robot": ("robot", "tip", "joints", "lock", "unlimited", "home"),
     "Input": (
-        *("trajectory", "log", "held_out", "before", "own_clocks", "mapping", "torque_is", "model", "campaign_folder"),
+        *(
+            "trajectory",
+            "log",
+            "without",
+            "held_out",
+            "before",
+            "own_clocks",
+            "mapping",
+            "torque_is",
+            "model",
+            "campaign_folder",
+        ),
         *("payload", "gravity", "ambient", "plant", "after", "task", "design", "extension"),
     ),
     "Output": (
@@ -35,11 +46,28 @@ EXAMPLES = {
     ),
     "pareto": ("oed pareto --robot er3a --criteria cond,d --points 5 --out pareto",),
     "retime": ("oed retime experiment/trajectory.csv --method toppra --out retimed",),
-    "export": ("oed export experiment/trajectory.csv --degrees --positions-only --bare --out for_controller.csv",),
+    "export": (
+        "oed export experiment/trajectory.csv --degrees --positions-only --bare --out for_controller.csv",
+        "oed export experiment/trajectory.csv --to ros-goal --out goal.yaml",
+        "oed export experiment/trajectory.csv --to urscript --period 0.008 --out excitation.script",
+    ),
+    "stream": (
+        "oed stream experiment/trajectory.csv --host 192.168.0.10 --dry-run",
+        "oed stream experiment/trajectory.csv --host 192.168.0.10 --log log.csv",
+    ),
+    "record": ("oed record --robot er3a --host 192.168.0.10 --log log.csv --duration 60",),
+    "controller": (
+        "oed controller --robot er3a --plant plant.yaml",
+        "oed controller --robot er3a --replies echo --lose 0.05 --double 0.05 --late 0.05",
+    ),
     "campaign": ("oed campaign --robot er3a --design experiment --out campaign",),
     "simulate": (
         "oed simulate --trajectory experiment/trajectory.csv --out log.csv",
         "oed simulate --trajectory experiment/trajectory.csv --plant plant.yaml --seed 1 --out log.csv",
+    ),
+    "check": (
+        "oed check log.csv --robot er3a",
+        "oed check logs --robot arm.urdf --torque-is current --json",
     ),
     "identify": (
         "oed identify --robot er3a --log log.csv --out model",
@@ -52,7 +80,13 @@ EXAMPLES = {
         "oed compare monday/model.json friday/model.json --out compared",
         "oed compare logs/day1.csv logs/day2.csv logs/day3.csv --robot er3a --out compared",
     ),
+    "payload": (
+        "oed payload --robot ur10 --log with.csv --without without.csv --to urscript --out payload",
+        "oed payload --model model --log with.csv --to franka kuka --out payload",
+    ),
     "example": ("oed example --out example",),
+    "robots": ("oed robots",),
+    "robot": ("oed robot show ur10", "oed robot show arm.urdf --tip tool0 --json"),
     "effects": ("oed effects", "oed effects --json"),
     "doctor": ("oed doctor",),
 }

@@ -1,4 +1,4 @@
-"""The base parameters that matter, for a criterion that leaves the others out."""
+"""The base parameters that a criterion judges, where it leaves the others out."""
 
 from __future__ import annotations
 
@@ -8,8 +8,10 @@ from dataclasses import replace
 import numpy as np
 
 from oed.experiments.problems.problem import FourierProblem
-from robots.base_parameters import BaseParameters
+from robots.base_parameters import BaseParameters, find_base_parameters
 from robots.common.errors import InputError
+from robots.regressor import TorqueModel
+from robots.terms.situations.flange_body import last_link
 
 # Random motions on which the shares are measured: enough that every joint moves in all of its range and speed.
 MOTIONS = 20
@@ -44,6 +46,14 @@ def essential_part(problem: FourierProblem, share: float) -> BaseParameters:
     if not kept:
         raise InputError(f"no parameter reaches the threshold {share}", remedy="use a smaller threshold")
     return restricted(base, kept)
+
+
+def payload_part(model: TorqueModel) -> BaseParameters:
+    """Gives what the torques show of a body on the flange if all else is known: the last link's parameters.
+
+    A body on the flange and the last link move alike, so that their ten columns are the same but for the frame.
+    """
+    return find_base_parameters(model, columns=last_link(model))
 
 
 def restricted(base: BaseParameters, kept: Sequence[int]) -> BaseParameters:

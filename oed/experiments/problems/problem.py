@@ -98,8 +98,7 @@ class FourierProblem:
         Raises:
             InfeasibleError: neither keeps the pointwise limits, so that no motion around it does.
         """
-        middle = (self.limits.lower + self.limits.upper) / 2
-        middle = np.where(np.isfinite(middle), middle, 0.0)
+        middle = self.limits.middle
         if not self.curved:
             return middle
         poses = [middle] if self.home is None else [middle, np.asarray(self.home, dtype=float)]

@@ -10,7 +10,7 @@ import numpy as np
 
 from oed.criteria import Criterion
 from oed.criteria import criterion as choose_criterion
-from oed.experiments.problems.essential import restricted
+from oed.experiments.problems.essential import payload_part, restricted
 from oed.experiments.quality import Quality, design_model
 from oed.experiments.results.outcome import Outcome
 from oed.experiments.safety_checks.margins import margin_from
@@ -21,6 +21,7 @@ from robots.common.errors import InputError
 from robots.common.files import existing_file
 from robots.loading import load_robot
 from robots.robot import Robot
+from robots.terms.situations.flange_body import carrying
 
 TRAJECTORY, DESIGN = "trajectory.csv", "design.json"
 
@@ -42,9 +43,10 @@ def read_design(
     file = Path(folder) / DESIGN
     try:
         data = json.loads(existing_file(file).read_text(encoding="utf-8"))
-        known = robot or load_robot(data["robot"]["origin"])
         settings = data["settings"]
-        base = find_base_parameters(design_model(known, settings))
+        known = carrying(robot or load_robot(data["robot"]["origin"], unlimited=True), settings.get("payload"))
+        model = design_model(known, settings)
+        base = payload_part(model) if settings.get("payload_only") else find_base_parameters(model)
         if settings.get("essential"):
             base = restricted(base, [i for i, name in enumerate(base.names) if name in data["model"]["columns"]])
         if list(base.names) != data["model"]["columns"]:

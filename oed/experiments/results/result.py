@@ -229,7 +229,7 @@ class Design:
             "limits_in_space": [asdict(margin) for margin in self.space],
             "collision": None if self.freedom is None else dict(self.freedom),
             "strokes_left_out": list(self.strokes_left_out),
-            "smallest_margins": [margin_data(margin) for margin in self.margins],
+            "smallest_margins": [margin_data(margin, self.robot.limits) for margin in self.margins],
             "solver": {
                 "name": self.settings["solver"]["name"],
                 "islands": [island.to_dict() for island in self.islands],
@@ -253,7 +253,8 @@ class Design:
         Raises:
             InputError: a file is there, and force is not given.
         """
-        write_trajectory(Path(folder) / TRAJECTORY, self.motion, self.metadata(), force=force)
+        kinds = self.robot.chain.kinds
+        write_trajectory(Path(folder) / TRAJECTORY, self.motion, self.metadata(), kinds=kinds, force=force)
         write_atomic(Path(folder) / DESIGN, json.dumps(self.to_dict(), indent=2, allow_nan=False) + "\n", force=force)
 
     @classmethod

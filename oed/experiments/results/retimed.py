@@ -159,7 +159,7 @@ class RetimedExperiment:
             "segments": [{"kind": "move", "start": 0.0, "end": self.motion.duration, "joint": None}],
             "duration": self.motion.duration,
             "period": self.robot.period,
-            "smallest_margins": [margin_data(margin) for margin in self.margins],
+            "smallest_margins": [margin_data(margin, self.robot.limits) for margin in self.margins],
         }
 
     def save(self, folder: str | Path, *, force: bool = False) -> None:
@@ -173,7 +173,7 @@ class RetimedExperiment:
             "period": self.robot.period,
             "tool": f"robot-oed {VERSION}",
         }
-        write_trajectory(Path(folder) / TRAJECTORY, self.motion, metadata, force=force)
+        write_trajectory(Path(folder) / TRAJECTORY, self.motion, metadata, kinds=self.robot.chain.kinds, force=force)
         write_atomic(Path(folder) / DESIGN, json.dumps(self.to_dict(), indent=2, allow_nan=False) + "\n", force=force)
 
     @classmethod
@@ -190,7 +190,7 @@ class RetimedExperiment:
         file = Path(folder) / DESIGN
         try:
             data = json.loads(existing_file(file).read_text(encoding="utf-8"))
-            known = robot or load_robot(data["robot"]["origin"])
+            known = robot or load_robot(data["robot"]["origin"], unlimited=True)
             base = find_base_parameters(design_model(known, data["settings"]))
             if list(base.names) != data["model"]["columns"]:
                 raise InputError(f"the experiment is for {data['robot']['name']}, not for {known.name}", file=file)

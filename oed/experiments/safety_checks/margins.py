@@ -72,11 +72,12 @@ def _rms_margins(motion: Motion, tau: Array, limits: Limits) -> list[Margin]:
     ]
 
 
-def margin_data(margin: Margin) -> dict[str, Any]:
-    """Writes a margin as plain data; a limit that is not there is null."""
+def margin_data(margin: Margin, limits: Limits | None = None) -> dict[str, Any]:
+    """Writes a margin as plain data, with its unit if the limits are given; a limit that is not there is null."""
     return {
         "quantity": margin.quantity,
         "joint": margin.joint,
+        **({} if limits is None else {"unit": limits.unit(margin.joint - 1, margin.quantity)}),
         "value": margin.value,
         "limit": finite(margin.limit),
         "time": margin.time,
@@ -86,4 +87,5 @@ def margin_data(margin: Margin) -> dict[str, Any]:
 
 def margin_from(data: Mapping[str, Any]) -> Margin:
     """Reads what `margin_data` wrote."""
-    return Margin(**{**data, "limit": np.inf if data["limit"] is None else data["limit"]})
+    known = {key: value for key, value in data.items() if key != "unit"}
+    return Margin(**{**known, "limit": np.inf if data["limit"] is None else data["limit"]})

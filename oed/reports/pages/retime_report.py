@@ -62,7 +62,11 @@ def retime_page(result: RetimedExperiment, given: Motion) -> Page:
                 status="bad" if retimed.slower and retimed.given_keeps_limits else "neutral",
             ),
             Fact(label="Intermediate stops", value=retimed.stops),
-            Fact(label="Path deviation", value=f"{retimed.deviation:.2g}", note="rad or m, largest of all joints"),
+            Fact(
+                label="Path deviation",
+                value=f"{retimed.deviation:.2g}",
+                note=f"{retimed.unit}, largest of all joints",
+            ),
         ),
         warnings=tuple(warnings),
         sections=(

@@ -62,4 +62,5 @@ class AsymmetricFriction(StaticJointEffect):
     def coordinate(self, situation: Situation, joint: Place, shape: tuple[float, ...] = ()) -> tuple[str, Array]:
         """Returns the velocity."""
         assert joint is not None
-        return f"velocity of joint {joint} [rad/s]", situation.dq[:, joint - 1]
+        unit = length_unit(situation.robot, joint - 1)
+        return f"velocity of joint {joint} [{unit}/s]", situation.dq[:, joint - 1]

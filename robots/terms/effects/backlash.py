@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from robots.terms.base import length_unit
+from robots.terms.base import force_unit, length_unit
 from robots.terms.effect_bases.base import Coefficient, Effect, Place, Shape, Situation
 from robots.terms.effect_bases.capabilities import AboveBand, AtReversals, GearLoad
 from robots.terms.effect_bases.unknown_rotor import (
@@ -192,7 +192,8 @@ class Backlash(Effect):
     def coordinate(self, situation: Situation, joint: Place, shape: tuple[float, ...] = ()) -> tuple[str, Array]:
         """Returns the gear's load."""
         assert joint is not None
-        return f"load of joint {joint} [N m]", load_beside(situation, joint, shape[3] if len(shape) > 3 else KNOWN)
+        unit = force_unit(situation.robot, joint - 1)
+        return f"load of joint {joint} [{unit}]", load_beside(situation, joint, shape[3] if len(shape) > 3 else KNOWN)
 
 
 def _course(since: Array, flight: Array, landing: float) -> tuple[Array, Array, Array]:

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from scipy.special import ndtr
 
 from robots.common.stretches import spans
+from robots.terms.base import force_unit
 from robots.terms.effect_bases.base import Coefficient, JointEffect, Place, Shape, Situation
 from robots.terms.effect_bases.capabilities import Reading
 
@@ -114,7 +115,8 @@ class CurrentClipping(JointEffect):
         """Returns the torque before clipping."""
         assert joint is not None
         name = "the base model" if situation.beyond is None else "the model without a limit"
-        return f"torque of joint {joint} by {name} [N m]", situation.whole[:, joint - 1]
+        unit = force_unit(situation.robot, joint - 1)
+        return f"torque of joint {joint} by {name} [{unit}]", situation.whole[:, joint - 1]
 
 
 LEAST = 0.5

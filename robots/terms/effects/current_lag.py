@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
+from robots.terms.base import force_unit
 from robots.terms.effect_bases.base import Coefficient, JointEffect, Place, Shape, Situation
 from robots.terms.effects.time_delay import INEXACT, SHIFT, SHORTEST, SMALL, Late, lateness, near
 
@@ -56,4 +57,5 @@ class CurrentLag(Late, JointEffect):
     def coordinate(self, situation: Situation, joint: Place, shape: tuple[float, ...] = ()) -> tuple[str, Array]:
         """Returns the rate of the joint's torque."""
         assert joint is not None
-        return f"rate of the torque of joint {joint} [N m/s]", -lateness(situation, shape[0])[:, joint - 1]
+        unit = force_unit(situation.robot, joint - 1)
+        return f"rate of the torque of joint {joint} [{unit}/s]", -lateness(situation, shape[0])[:, joint - 1]

@@ -96,7 +96,8 @@ class JointCoupling(StaticEffect):
     def coordinate(self, situation: Situation, joint: Place, shape: tuple[float, ...] = ()) -> tuple[str, Array]:
         """Returns the velocity of the inner joint, which should not influence the outer one."""
         assert joint is not None
-        return f"velocity of joint {joint - 1} [rad/s]", situation.dq[:, joint - 2]
+        unit = length_unit(situation.robot, joint - 2)
+        return f"velocity of joint {joint - 1} [{unit}/s]", situation.dq[:, joint - 2]
 
 
 COULOMB_SCALE = 5e-3

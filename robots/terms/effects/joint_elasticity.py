@@ -116,7 +116,8 @@ class JointElasticity(Effect):
         assert joint is not None
         rotor = shape[1] if len(shape) > 1 else KNOWN
         curve = situation.derivatives(load_beside(situation, joint, rotor))[1]
-        return f"second derivative of the load of joint {joint} [N m/s2]", curve
+        unit = force_unit(situation.robot, joint - 1)
+        return f"second derivative of the load of joint {joint} [{unit}/s2]", curve
 
 
 def followed(situation: Situation, load: Array, stiffness: float, inertia: Array) -> Array:

@@ -8,7 +8,7 @@ import casadi
 import numpy as np
 from numpy.typing import NDArray
 
-from robots.terms.base import length_unit
+from robots.terms.base import force_unit, length_unit
 from robots.terms.effect_bases.base import Coefficient, Place, Shape, Situation
 from robots.terms.effect_bases.capabilities import GearLoad
 from robots.terms.effect_bases.static import Instant, StaticJointEffect
@@ -108,4 +108,5 @@ class LoadDependentFriction(StaticJointEffect):
         back, rotor = shape or (ALIKE, KNOWN)
         load = load_beside(situation, joint, rotor)
         signed = np.where(load * situation.dq[:, j] > 0, 1.0, back) * np.abs(load) * situation.sign[:, j]
-        return f"load of joint {joint}, signed by its direction [N m]", signed
+        unit = force_unit(situation.robot, joint - 1)
+        return f"load of joint {joint}, signed by its direction [{unit}]", signed

@@ -8,6 +8,7 @@ import casadi
 import numpy as np
 from numpy.typing import NDArray
 
+from robots.terms.base import length_unit
 from robots.terms.effect_bases.base import Coefficient, Place, Shape, Situation
 from robots.terms.effect_bases.capabilities import GearLoad
 from robots.terms.effect_bases.states import moving_speed
@@ -69,4 +70,5 @@ class LoadStribeck(StaticJointEffect):
     def coordinate(self, situation: Situation, joint: Place, shape: tuple[float, ...] = ()) -> tuple[str, Array]:
         """Returns the velocity."""
         assert joint is not None
-        return f"velocity of joint {joint} [rad/s]", situation.dq[:, joint - 1]
+        unit = length_unit(situation.robot, joint - 1)
+        return f"velocity of joint {joint} [{unit}/s]", situation.dq[:, joint - 1]

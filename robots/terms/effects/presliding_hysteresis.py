@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from robots.terms.base import force_unit
+from robots.terms.base import force_unit, length_unit
 from robots.terms.effect_bases.base import Coefficient, JointEffect, Place, Shape, Situation
 from robots.terms.effect_bases.capabilities import AtReversals
 from robots.terms.effect_bases.states import bristle
@@ -78,7 +78,10 @@ class PreslidingHysteresis(JointEffect):
         """Returns the travel since the last reversal."""
         assert joint is not None
         q = situation.q[:, joint - 1]
-        return f"travel of joint {joint} since it reversed [rad]", travel_since_reversal(q, situation.runs)
+        return (
+            f"travel of joint {joint} since it reversed [{length_unit(situation.robot, joint - 1)}]",
+            travel_since_reversal(q, situation.runs),
+        )
 
 
 def travel_since_reversal(q: Array, runs: tuple[slice, ...]) -> Array:

@@ -137,7 +137,8 @@ class Spring(StaticJointEffect):
     def coordinate(self, situation: Situation, joint: Place, shape: tuple[float, ...] = ()) -> tuple[str, Array]:
         """Returns the position."""
         assert joint is not None
-        return f"position of joint {joint} [rad]", situation.q[:, joint - 1]
+        unit = length_unit(situation.robot, joint - 1)
+        return f"position of joint {joint} [{unit}]", situation.q[:, joint - 1]
 
 
 def _has_lever(shape: tuple[float, ...]) -> bool:

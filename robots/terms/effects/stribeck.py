@@ -8,7 +8,7 @@ import casadi
 import numpy as np
 from numpy.typing import NDArray
 
-from robots.terms.base import force_unit
+from robots.terms.base import force_unit, length_unit
 from robots.terms.effect_bases.base import Coefficient, Place, Shape, Situation
 from robots.terms.effect_bases.states import moving_speed
 from robots.terms.effect_bases.static import Instant, StaticJointEffect
@@ -79,4 +79,5 @@ class Stribeck(StaticJointEffect):
     def coordinate(self, situation: Situation, joint: Place, shape: tuple[float, ...] = ()) -> tuple[str, Array]:
         """Returns the velocity."""
         assert joint is not None
-        return f"velocity of joint {joint} [rad/s]", situation.dq[:, joint - 1]
+        unit = length_unit(situation.robot, joint - 1)
+        return f"velocity of joint {joint} [{unit}/s]", situation.dq[:, joint - 1]

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import PchipInterpolator, make_interp_spline
 
+from robots.terms.base import force_unit
 from robots.terms.effect_bases.base import Coefficient, Effect, Place, Shape, Situation
 from robots.terms.effect_bases.capabilities import AtReversals
 
@@ -95,7 +96,8 @@ class TimeDelay(Late):
         """Returns the rate of torque of the joint where it is largest."""
         rate = -lateness(situation, shape[0])
         most = int(np.argmax(np.mean(rate**2, axis=0)))
-        return f"rate of the torque of joint {most + 1} [N m/s]", rate[:, most]
+        unit = force_unit(situation.robot, most)
+        return f"rate of the torque of joint {most + 1} [{unit}/s]", rate[:, most]
 
 
 def lateness(situation: Situation, shift: float) -> Array:

@@ -8,6 +8,7 @@ import casadi
 import numpy as np
 from numpy.typing import NDArray
 
+from robots.terms.base import force_unit
 from robots.terms.effect_bases.base import Coefficient, Place, Situation
 from robots.terms.effect_bases.static import Instant, StaticJointEffect
 
@@ -55,4 +56,7 @@ class TorqueConstantError(StaticJointEffect):
     def coordinate(self, situation: Situation, joint: Place, shape: tuple[float, ...] = ()) -> tuple[str, Array]:
         """Returns the base model's torque."""
         assert joint is not None
-        return f"torque of joint {joint} by the base model [N m]", situation.torque[:, joint - 1]
+        return (
+            f"torque of joint {joint} by the base model [{force_unit(situation.robot, joint - 1)}]",
+            situation.torque[:, joint - 1],
+        )

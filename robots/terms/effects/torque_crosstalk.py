@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
+from robots.terms.base import force_unit
 from robots.terms.effect_bases.base import Coefficient, JointEffect, Place, Situation
 
 if TYPE_CHECKING:
@@ -54,7 +55,8 @@ class TorqueCrosstalk(JointEffect):
         """Returns the torque of the first neighbour."""
         assert joint is not None
         neighbour = _neighbours(situation.robot, joint)[0]
-        return f"torque of joint {neighbour} [N m]", situation.torque[:, neighbour - 1]
+        unit = force_unit(situation.robot, neighbour - 1)
+        return f"torque of joint {neighbour} [{unit}]", situation.torque[:, neighbour - 1]
 
 
 def _neighbours(robot: Robot, joint: int) -> tuple[int, ...]:

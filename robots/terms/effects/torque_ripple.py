@@ -172,7 +172,10 @@ class TorqueRipple(StaticJointEffect):
         """Returns the position within the ripple's period."""
         assert joint is not None
         period = 2 * np.pi / shape[0]
-        return f"position of joint {joint} within 1/{shape[0]:.4g} turn [rad]", situation.q[:, joint - 1] % period
+        return (
+            f"position of joint {joint} within 1/{shape[0]:.4g} turn [{length_unit(situation.robot, joint - 1)}]",
+            situation.q[:, joint - 1] % period,
+        )
 
 
 def _of_gear(robot: Robot, joint: int) -> tuple[float, ...]:

@@ -2,14 +2,21 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+from functools import lru_cache
+
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from robots.common.errors import InputError
 from robots.regressor import TorqueModel
+from robots.robot import Robot
 from robots.terms.situations.sensitivities import moved_body
 
 Array = NDArray[np.float64]
+
+FLANGE = "chain.tip"
+"""In `Robot.assumed` where the pose of the flange on the last link is not known."""
 
 
 def with_body(model: TorqueModel, parameters: Array, body: Array) -> Array:
@@ -24,15 +31,58 @@ def with_body(model: TorqueModel, parameters: Array, body: Array) -> Array:
         The parameters with the body (p,).
 
     Raises:
-        InputError: a body of another shape, or a model without links.
+        InputError: a body of another shape, a model without links, or a robot whose flange is not known.
     """
     result = np.array(parameters)
     if body.any():
-        last = [i for i, column in enumerate(model.columns) if column.term == "rigid_body"][-10:]
+        require_flange(model.robot)
+        last = last_link(model)
         if body.shape != (10,) or not last:
             raise InputError(f"a body of shape {body.shape}", allowed="(10,), on a model with rigid links")
-        result[last] += moved_body(model.robot.chain.tip) @ body
+        result[list(last)] += moved_body(model.robot.chain.tip) @ body
     return result
+
+
+def last_link(model: TorqueModel) -> tuple[int, ...]:
+    """Gives the indices of the last link's ten columns; none of a model without links."""
+    return tuple(i for i, column in enumerate(model.columns) if column.term == "rigid_body")[-10:]
+
+
+def carrying(robot: Robot, body: ArrayLike | None) -> Robot:
+    """Gives the robot with a body on its flange as a part of its last link, the same object for the same body.
+
+    Args:
+        robot: the robot; without known inertias it stays as it is.
+        body: ten inertial parameters in the flange's frame (10,); None for none.
+
+    Raises:
+        InputError: a robot whose flange is not known.
+    """
+    values = None if body is None else np.asarray(body, dtype=float)
+    if values is None or not values.any():
+        return robot
+    require_flange(robot)
+    return _carrying(robot, tuple(values.tolist()))
+
+
+def require_flange(robot: Robot) -> None:
+    """Refuses a robot whose flange is not known, such as that of an older model file.
+
+    Raises:
+        InputError: naming the robot.
+    """
+    if FLANGE in robot.assumed:
+        raise InputError(
+            f"the model file of {robot.name} does not state the pose of the flange, which a payload refers to",
+            remedy="it was written by another version: identify the model again",
+        )
+
+
+@lru_cache(maxsize=16)
+def _carrying(robot: Robot, body: tuple[float, ...]) -> Robot:
+    inertia = np.array(robot.inertia)
+    inertia[-1] += moved_body(robot.chain.tip) @ np.array(body)
+    return replace(robot, inertia=inertia)
 
 
 def point_mass(mass: float, centre: tuple[float, float, float]) -> Array:

@@ -19,11 +19,13 @@ from tests.estimation.gate.findings_of import found
 ORDER = {
     Stage.RECORDED: [
         "too_few_rows",
+        "static_poses",
         "sampling",
         "late_rows",
         "repeated_rows",
         "stuck_columns",
         "resolution",
+        "wrapped_angles",
         "spikes",
         "reader_notes",
         "clipping",
@@ -36,11 +38,14 @@ ORDER = {
     Stage.SMOOTHED: ["position_units", "speeds", "velocity_columns", "too_few_smoothed_rows"],
     Stage.FITTED: [
         "few_rows_per_parameter",
+        "likely_causes",
         "torque_signs",
         "torque_units",
         "joint_directions",
         "excitation",
+        "undetermined",
         "torque_sizes",
+        "torque_meanings",
         "delays",
     ],
 }

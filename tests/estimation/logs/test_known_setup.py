@@ -13,7 +13,6 @@ from estimation import check_log, identify, load_model, predict
 from estimation.estimators import RegressionData, WeightedLeastSquares
 from estimation.exports import urdf_text
 from estimation.identifications.fit import sum_moments
-from estimation.identifications.payloads import identify_payload
 from estimation.regressions.joint_regressor import JointRegressor
 from estimation.regressions.preparation import Rows
 from estimation.thermal import fit_campaign
@@ -123,9 +122,10 @@ def test_identify_counts_gravity_and_payload_of_logs(upright: Robot, build: Buil
     assert all(joint.residual_rms < 0.05 for joint in estimate.joints)
     alone = identify(upright, build(0), friction="coulomb-viscous", offset=False)
     assert len(alone.model.values) == len(model.values) - 2
-    blind = identify(
-        upright, [build(0), replace(build(1, TILTED, MASS), gravity=None, payload=None)], friction="coulomb-viscous"
-    )
+    unstated = replace(build(1, TILTED, MASS), gravity=None, payload=None)
+    with pytest.raises(InputError, match=r"mounted otherwise .*--gravity 1="):
+        identify(upright, unstated, friction="coulomb-viscous")
+    blind = identify(upright, [build(0), unstated], friction="coulomb-viscous", check=False)
     assert max(joint.residual_rms for joint in blind.joints) > 1.0
 
 
@@ -176,9 +176,8 @@ def test_the_gate_knows_how_the_robot_was_set_up(upright: Robot, build: Build) -
         lambda robot, model, log: identify(robot, log, method="iv"),
         lambda robot, model, log: identify(robot, [log], method="didim"),
         lambda robot, model, log: fit_campaign(robot, log),
-        lambda robot, model, log: identify_payload(model, log),
     ],
-    ids=["iv", "didim", "heat", "payload"],
+    ids=["iv", "didim", "heat"],
 )
 def test_what_does_not_know_a_payload_or_a_gravity_refuses_it(
     upright: Robot, build: Build, two: tuple, use: Callable, stated: str

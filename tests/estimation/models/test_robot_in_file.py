@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from dataclasses import fields, replace
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -13,7 +13,7 @@ from estimation.models.extension import Extension
 from estimation.models.model import Model
 from robots import load_robot
 from robots.common.errors import InputError
-from robots.limits import Limits
+from robots.limits import BOUNDS
 from robots.regressor import default_model
 from robots.terms.effects import EFFECTS, situation
 
@@ -91,8 +91,8 @@ def test_the_robot_of_a_file_is_that_of_the_model(base, tmp_path):
     model = replace(base, torque_model=replace(base.torque_model, robot=robot))
     model.save(tmp_path / "model.json")
     loaded = load_model(tmp_path).robot
-    for item in fields(Limits):
-        np.testing.assert_array_equal(getattr(loaded.limits, item.name), getattr(robot.limits, item.name))
+    for name in (*BOUNDS, "kinds"):
+        np.testing.assert_array_equal(getattr(loaded.limits, name), getattr(robot.limits, name))
     for quantity in ("gear_ratio", "rotor_inertia", "torque_constant"):
         np.testing.assert_array_equal(getattr(loaded, quantity), getattr(robot, quantity))
 
@@ -113,3 +113,30 @@ def test_effects_of_a_file_without_limits_are_refused(base, tmp_path):
                 load_model(path)
         else:
             assert np.isinf(load_model(path).robot.limits.upper).all()
+
+
+def test_the_flange_is_in_the_file_and_a_payload_acts_there(tmp_path):
+    """A model of an arm whose flange is not its last link's frame predicts a payload alike before and after."""
+    ur10 = load_robot("ur10")
+    model = default_model(ur10, velocity_scale=1e-3)
+    made = Model(
+        torque_model=model,
+        columns=tuple(range(model.size)),
+        values=model.nominal,
+        covariance=np.zeros((model.size, model.size)),
+        determined=np.full(model.size, True),
+        formulas=model.names,
+    )
+    path = tmp_path / "model.json"
+    made.save(path)
+    state = np.random.default_rng(0).normal(size=(3, 5, 6))
+    body = [2.0, 0.1, 0.0, 0.2, 0.03, 0.0, 0.0, 0.03, 0.0, 0.01]
+    again = load_model(path)
+    np.testing.assert_allclose(again.torque(*state, payload=body), made.torque(*state, payload=body), rtol=1e-12)
+    data = json.loads(path.read_text())
+    del data["robot"]["tip"]
+    path.write_text(json.dumps(data))
+    older = load_model(path)
+    np.testing.assert_allclose(older.torque(*state), made.torque(*state), rtol=1e-12)
+    with pytest.raises(InputError, match="does not state the pose of the flange"):
+        older.torque(*state, payload=body)

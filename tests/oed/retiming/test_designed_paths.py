@@ -77,11 +77,11 @@ def test_another_grid_is_tried(limits, monkeypatch):
     (piece,) = split_path(np.linspace(0.0, 1.0, 50)[:, None] * np.ones(6), limits.velocity)
     solve, grids = path_speed_module._solve, []
 
-    def picky(path, constraints, grid, torque):
+    def picky(path, constraints, grid, *others):
         grids.append(len(grid))
         if len(grids) < 3:
             raise InfeasibleError("no luck")
-        return solve(path, constraints, grid, torque)
+        return solve(path, constraints, grid, *others)
 
     monkeypatch.setattr(path_speed_module, "_solve", picky)
     grid, speed = path_speed(piece, limits, None, 500)

@@ -87,7 +87,7 @@ def test_a_hand_that_moved_the_arm_is_found(data):
     """In three runs of a pendulum, hand guiding in the third is named, with its time."""
     folder = data("simple_pendulum_dfki")
     logs = on_one_clock([read_log(folder / f"{name}.parquet") for name in ("ddp", "dircol", "gravity_comp")])
-    said = diagnose(load_robot(folder / "simple_pendulum.urdf"), logs)
+    said = diagnose(load_robot(folder / "simple_pendulum.urdf", unlimited=True), logs)
     assert said.verdict == "named"
     (finding,) = said.findings
     assert finding.effect == "hand_guiding"
@@ -105,6 +105,6 @@ def test_logs_that_contradict_each_other_are_not_passed_over(data):
     """Two short runs that contradict each other give a note, whatever the verdict."""
     folder = data("simple_pendulum_dfki")
     logs = on_one_clock([read_log(folder / f"{name}.parquet") for name in ("dircol", "gravity_comp")])
-    said = diagnose(load_robot(folder / "simple_pendulum.urdf"), logs)
+    said = diagnose(load_robot(folder / "simple_pendulum.urdf", unlimited=True), logs)
     assert said.baseline[0] > LARGE_HELD_OUT_ERROR
     assert said.verdict != "none" or any("differ in something" in note for note in said.notes)

@@ -6,7 +6,7 @@ import numpy as np
 
 from estimation.comparisons import ModelComparison
 from estimation.comparisons.friction_changes import interval_of, percent_of
-from oed.reports.pages.comparison_tables import (
+from oed.reports.pages.comparisons.comparison_tables import (
     drift_table,
     merged_table,
     parameters_table,

@@ -1,11 +1,11 @@
-"""Payload and drive gains from logs, as a user has them."""
+"""Drive gains from logs, as a user has them."""
 
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from estimation import identify, identify_drive_gains, identify_payload
+from estimation import identify_drive_gains
 from robots.common.errors import InputError
 from robots.geometry.inertia import inertial_parameters
 from robots.plants import Plant, Sensors, nominal_plant, simulate
@@ -34,21 +34,6 @@ def logs(plant, fourier_motion):
         simulate(plant, fourier_motion(plant.robot, 0), seed=1),
         simulate(loaded(plant), fourier_motion(plant.robot, 1), seed=2),
     )
-
-
-@pytest.mark.slow
-def test_a_payload_is_found_from_a_run_with_it(arm, logs):
-    """Of a planar arm's payload, first moments and inertia come out within four standard errors, mass included."""
-    free, carrying = logs
-    payload = identify_payload(identify(arm, free, friction="coulomb-viscous").model, carrying)
-    known = payload.determined
-    assert known[[1, 2, 9]].all()
-    error = np.abs(payload.parameters - LOAD)[known]
-    # A few parameters at four standard errors: a wrong alarm in 1 of 3000 draws, and the draws are fixed.
-    assert (error < 4 * payload.standard_errors[known] + 1e-6).all()
-    np.testing.assert_allclose(payload.parameters[1:3], LOAD[1:3], atol=0.02)
-    assert (payload.eigenvalues > 0).all()
-    assert (payload.residual_rms < 0.2 * payload.unloaded_rms).all()
 
 
 def test_gains_are_found_from_currents_with_a_known_payload(arm, logs):

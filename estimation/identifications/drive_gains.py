@@ -1,4 +1,4 @@
-"""The verbs: identifies a payload, and the drives' gains, from runs with and without it."""
+"""The verb: identifies the drives' gains from currents with and without a known payload."""
 
 from __future__ import annotations
 
@@ -7,9 +7,7 @@ from collections.abc import Sequence
 from numpy.typing import ArrayLike
 
 from estimation.estimators.drive_gains import CurrentRun, DriveGains, fit_drive_gains
-from estimation.estimators.payload import Payload, fit_payload
 from estimation.logs.known_setup import require_plain
-from estimation.models.model import Model
 from estimation.regressions.preparation import prepare
 from robots.base_parameters import find_base_parameters
 from robots.common.errors import InputError
@@ -21,35 +19,6 @@ from robots.signals import Log
 CUTOFF = 5.0
 # Coulomb friction fades below this speed [rad/s or m/s].
 SHARP = 1e-3
-
-
-@one_blas_thread()
-def identify_payload(model: Model, logs: Log | Sequence[Log], *, consistent: bool = True) -> Payload:
-    """Identifies the ten inertial parameters of a payload from runs that carry it.
-
-    Args:
-        model: identified without the payload; its covariance counts in the payload's.
-        logs: one log or several, smoothed as the model's own were.
-        consistent: whether the payload must be a body that can exist.
-
-    Returns:
-        The payload, about the last link's frame.
-
-    Raises:
-        InputError: logs of another robot, without torque, or that state a payload or gravity of their own.
-        NotIdentifiableError: runs that move no payload.
-    """
-    runs = [logs] if isinstance(logs, Log) else list(logs)
-    require_plain(runs, "the fit of a payload")
-    cutoff = float(model.provenance.get("cutoff_hz", CUTOFF))
-    return fit_payload(
-        model.torque_model,
-        model.values,
-        [prepare(model.robot, log).rows(cutoff) for log in runs],
-        columns=model.columns,
-        covariance=model.covariance,
-        consistent=consistent,
-    )
 
 
 @one_blas_thread()

@@ -1,0 +1,280 @@
+"""One cause that explains why the torques do not fit: exchanged columns, a joint's unit, the base, missing gravity."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import combinations
+from typing import ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from estimation.gate.candidates.candidate_fits import STANDARD, CandidateFits, Meaning
+from estimation.gate.candidates.described_torques import described_torques, scales
+from estimation.gate.check import Check
+from estimation.gate.context import Context, Stage
+from estimation.gate.finding import Finding
+from robots.robot import Robot
+
+Array = NDArray[np.float64]
+
+# Held-out error over the torque's standard deviation (geometric mean of the joints), below which columns and units are
+# right, and below which gravity is right as well.
+WELL, VERY_WELL = 0.1, 0.04
+# Held-out error of a single joint over its torque's standard deviation, from which columns and units are doubted.
+DOUBTFUL = 0.2
+# Decrease of the error from which an exchange of columns is followed up, and by which an axis may be worse than the
+# refined direction of gravity.
+FOLLOWED, SNAP = 0.01, 0.02
+# Decrease of the held-out error (mean log), for a warning and for a refusal, and that by other columns or units.
+# Right simulated logs, with descriptions that are 20 % off, stay below 0.05, and measured ones below 0.35.
+BETTER, CERTAIN, OTHER_COLUMNS = 0.15, 0.4, 0.4
+# Findings that explain a bad fit already.
+EXPLAINED = ("motor_side_position", "static_poses", "unit_of_position", "unit_of_time", "wrapped_angle")
+# A direction of gravity within this angle [rad] of the described one is the described one.
+SAME = 0.03
+
+
+@dataclass(frozen=True, eq=False)
+class _Cause:
+    """A meaning of the log, and what kind of cause it would be.
+
+    Attributes:
+        kind: ``gravity``, ``weightless``, ``order``, ``unit``; or ``sign`` and ``size``, which other checks report.
+        meaning: of the log.
+        joint: counted from 0, for a unit.
+    """
+
+    kind: str
+    meaning: Meaning
+    joint: int = 0
+
+
+class LikelyCauses(Check):
+    """Fits the log under other meanings, and reports the one that explains the torques best.
+
+    All meanings are compared by the same number: the held-out error of all joints together. Nothing is reported if a
+    change of sign explains as much, which other checks report.
+    """
+
+    name: ClassVar[str] = "likely_causes"
+    stage: ClassVar[Stage] = Stage.FITTED
+    order: ClassVar[int] = 15
+
+    def run(self, context: Context) -> list[Finding]:
+        """Reports at most one cause."""
+        before = context.smoothed.choice.cost
+        doubtful = before > np.log(WELL) or float(np.nanmax(context.fitted.unexplained, initial=0.0)) > DOUBTFUL
+        explained = any(finding.severity != "info" for finding in context.found(EXPLAINED))
+        if explained or (before < np.log(VERY_WELL) and not doubtful):
+            return []
+        fits = CandidateFits(context.fitted)
+        before = fits.cost(Meaning())
+        causes = _gravities(fits)
+        if doubtful:
+            bad = np.flatnonzero(context.fitted.unexplained > DOUBTFUL).tolist()
+            causes += _sizes(context)
+            causes += [_ordered(fits, before, bad), *_units(context.robot, bad), *_signs(context.robot, bad)]
+        found = _best(fits, causes, before)
+        if found is None:
+            return []
+        cause, after = found
+        cause, after = _refined(fits, cause, after)
+        if cause.kind in ("sign", "size"):
+            return []
+        return [_finding(context, cause, before - after, float(np.exp(after)))]
+
+
+def _gravities(fits: CandidateFits) -> list[_Cause]:
+    """Lists other directions of gravity, and none."""
+    described = np.asarray(fits.robot.chain.gravity, dtype=float)
+    size = float(np.linalg.norm(described))
+    if not size > 0:
+        return []
+    directions = [sign * STANDARD * axis for axis in np.eye(3) for sign in (1.0, -1.0)]
+    estimated = fits.described_gravity()
+    if estimated is not None and np.linalg.norm(estimated) > 0.5 * STANDARD:
+        directions.append(STANDARD * estimated / np.linalg.norm(estimated))
+    others = [g for g in directions if _angle(g, described) > SAME]
+    return [
+        *(_Cause("gravity", Meaning(gravity=direction)) for direction in others),
+        _Cause("weightless", Meaning(gravity=np.zeros(3))),
+    ]
+
+
+def _ordered(fits: CandidateFits, before: float, bad: list[int]) -> _Cause:
+    """Finds the order of the columns with the smallest error, by exchanging two joints at a time.
+
+    The columns of positions, of torques, or of both are exchanged. One of the joints must be a bad one. The search
+    also starts from the reversed order and from rotated ones.
+    """
+    straight = np.arange(fits.robot.n)
+    both = [straight, straight[::-1], np.roll(straight, 1), np.roll(straight, -1)]
+    starts = [(order, order) for order in both[: 1 if fits.robot.n < 3 else None]]
+    best, lowest = (straight, straight), before
+    kinds = (True, True), (True, False), (False, True)
+    for start in starts:
+        q, tau = start
+        cost = before if start is starts[0] else fits.cost(Meaning(q_from=q, tau_from=tau), few=True)
+        allowed = kinds if start is starts[0] else kinds[:1]
+        if cost > before + FOLLOWED:
+            continue
+        for _ in range(fits.robot.n):
+            tried = []
+            for pair in combinations(range(fits.robot.n), 2):
+                if not set(pair) & set(bad):
+                    continue
+                swap = straight.copy()
+                swap[list(pair)] = pair[::-1]
+                # Torques last: the regressor of the same positions is used again.
+                for kind in allowed:
+                    order = (q[swap] if kind[0] else q, tau[swap] if kind[1] else tau)
+                    tried.append((fits.cost(Meaning(q_from=order[0], tau_from=order[1]), few=True), kind, order))
+            if not tried or min(one[0] for one in tried) > cost - FOLLOWED:
+                break
+            cost, kind, (q, tau) = min(tried, key=lambda one: one[0])
+            allowed = (kind,)
+        if cost < lowest:
+            best, lowest = (q, tau), cost
+    return _Cause("order", Meaning(q_from=best[0], tau_from=best[1]))
+
+
+def _units(robot: Robot, joints: list[int]) -> list[_Cause]:
+    """Lists other units of one joint's position: degrees or millimetres, or radians or metres twice."""
+    causes = []
+    for joint in joints:
+        for factor in (np.pi / 180, 180 / np.pi) if robot.chain.kinds[joint] == "revolute" else (1e-3, 1e3):
+            factors = np.ones(robot.n)
+            factors[joint] = factor
+            causes.append(_Cause("unit", Meaning(q_factor=factors), joint))
+    return causes
+
+
+def _signs(robot: Robot, joints: list[int]) -> list[_Cause]:
+    causes = []
+    for joint in joints:
+        sign = np.ones(robot.n)
+        sign[joint] = -1.0
+        for q, tau in ((sign, sign), (sign, None), (None, sign)):
+            causes.append(_Cause("sign", Meaning(q_factor=q, tau_factor=tau), joint))
+    return causes
+
+
+def _sizes(context: Context) -> list[_Cause]:
+    """Lists torques of the described size, if the description has links and some joints are far from it."""
+    described = np.asarray(context.robot.inertia, dtype=float).ravel()
+    if not np.isfinite(described).all() or not described.any():
+        return []
+    factors = scales(described_torques(context.fitted), context.robot.n)
+    return [_Cause("size", Meaning(tau_factor=factors))] if (factors != 1.0).any() else []
+
+
+def _best(fits: CandidateFits, causes: list[_Cause], before: float) -> tuple[_Cause, float] | None:
+    """Gives the cause with the smallest error, if that is clearly smaller than before."""
+    few = np.array([fits.cost(cause.meaning, few=True) for cause in causes])
+    found = None
+    for place in np.argsort(few)[:3]:
+        after = fits.cost(causes[place].meaning)
+        least = OTHER_COLUMNS if causes[place].kind in ("order", "unit") else BETTER
+        if before - after > least and (found is None or after < found[1]):
+            found = causes[place], after
+    weightless = [cause for cause in causes if cause.kind == "weightless"]
+    # Gravity along the axes of a planar arm acts on no joint.
+    if found is not None and found[0].kind == "gravity" and weightless:
+        after = fits.cost(weightless[0].meaning)
+        if after < found[1] + SNAP:
+            found = weightless[0], after
+    return found
+
+
+def _refined(fits: CandidateFits, cause: _Cause, after: float) -> tuple[_Cause, float]:
+    """Refines a direction of gravity; one along an axis of the base frame is preferred if it explains as much."""
+    if cause.kind != "gravity":
+        return cause, after
+    assert cause.meaning.gravity is not None
+    refined = fits.refined_gravity(cause.meaning.gravity)
+    cost = fits.cost(Meaning(gravity=refined))
+    if after < cost:
+        refined, cost = cause.meaning.gravity, after
+    # What does not act on any joint, as gravity along the axes of a planar arm, is not made up.
+    axes = [sign * STANDARD * axis for axis in np.eye(3) for sign in (1.0, -1.0)]
+    costs = [fits.cost(Meaning(gravity=axis)) for axis in axes]
+    if min(costs) < cost + SNAP:
+        refined = axes[int(np.argmin(costs))]
+    return _Cause("gravity", Meaning(gravity=refined)), cost
+
+
+def _finding(context: Context, cause: _Cause, better: float, error: float) -> Finding:
+    smaller = 100 * float(1 - np.exp(-better))
+    severity = "refuse" if better > CERTAIN else "warning"
+    if cause.kind == "gravity":
+        assert cause.meaning.gravity is not None
+        values = ",".join(f"{component:.3g}" for component in np.round(cause.meaning.gravity, 2) + 0.0)
+        return Finding(
+            name="gravity_direction",
+            severity=severity,  # type: ignore[arg-type]
+            text="the base seems to be mounted otherwise than described: errors are "
+            f"{smaller:.3g} % smaller with gravity along ({values}) m/s2 in the base frame",
+            action=f"state it with --gravity 1={values} (1 is the number of the log)",
+            value=smaller,
+            unit="%",
+        )
+    if cause.kind == "weightless":
+        return without_gravity(
+            f"errors are {smaller:.3g} % smaller if the torques carry no gravity", smaller, "%", better > CERTAIN
+        )
+    if cause.kind == "unit":
+        assert cause.meaning.q_factor is not None
+        factor = float(cause.meaning.q_factor[cause.joint])
+        unit = {True: "degrees", False: "turned into radians twice"}[factor < 1]
+        if context.robot.chain.kinds[cause.joint] == "prismatic":
+            unit = {True: "millimetres", False: "turned into metres twice"}[factor < 1]
+        scale = ", ".join(f"{value:.5g}" for value in cause.meaning.q_factor)
+        return Finding(
+            name="unit_of_position",
+            severity=severity,  # type: ignore[arg-type]
+            text=f"only this joint's position seems to be in another unit ({unit}): errors are then {smaller:.3g} % "
+            "smaller",
+            action=f"state `scale: [{scale}]` for the position in a mapping (--mapping)",
+            value=factor,
+            column=f"q{cause.joint + 1}",
+            joint=cause.joint + 1,
+        )
+    return _order_finding(cause.meaning, severity, smaller, context.cleaned.columns.prefix)
+
+
+def _order_finding(meaning: Meaning, severity: str, smaller: float, prefix: str) -> Finding:
+    lists, words = [], []
+    key = "torque" if prefix == "tau" else "current"
+    for name, column, source in (("position", "q", meaning.q_from), (key, prefix, meaning.tau_from)):
+        assert source is not None
+        if not np.array_equal(source, np.arange(len(source))):
+            words.append(f"{name}s")
+            lists.append(f"{name}: {{columns: [{', '.join(f'{column}{k + 1}' for k in source)}]}}")
+    return Finding(
+        name="swapped_columns",
+        severity=severity,  # type: ignore[arg-type]
+        text=f"the columns of {' and '.join(words)} seem to be in another order: errors are {smaller:.3g} % smaller "
+        f"with {'; '.join(lists)}",
+        action="state this order in a mapping (--mapping), or correct the logger",
+        value=smaller,
+        unit="%",
+    )
+
+
+def without_gravity(why: str, value: float, unit: str, certain: bool) -> Finding:
+    """Gives the finding of torques without gravity."""
+    return Finding(
+        name="torque_meaning",
+        severity="refuse" if certain else "warning",
+        text=f"the torques seem to be without gravity, as those of a controller that compensates it: {why}",
+        action="state --torque-is without-gravity (or `torque_is: without-gravity` in a mapping): the gravity of the "
+        "robot's description is then added",
+        value=value,
+        unit=unit,
+    )
+
+
+def _angle(one: Array, other: Array) -> float:
+    cosine = float(one @ other) / float(np.linalg.norm(one) * np.linalg.norm(other))
+    return float(np.arccos(np.clip(cosine, -1.0, 1.0)))

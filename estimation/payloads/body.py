@@ -1,0 +1,172 @@
+"""A rigid body in a frame: mass, centre of mass, inertia, principal axes, and the texts that state one."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from robots.common.errors import InputError
+from robots.consistency import normalised_eigenvalues
+from robots.geometry.inertia import SIZE, check_body, inertial_parameters, symmetric
+from robots.terms.situations.flange_body import point_mass
+from robots.terms.situations.sensitivities import moved_body
+
+Array = NDArray[np.float64]
+
+FORMAT = "robot-oed payload"
+FORMAT_VERSION = 1
+EXAMPLE = "a payload.json, or KG,X,Y,Z: mass [kg] and centre of mass in the flange frame [m], such as 1.5,0,0,0.08"
+
+
+@dataclass(frozen=True, eq=False)
+class Body:
+    """A rigid body.
+
+    Attributes:
+        parameters: ``m, mPx, mPy, mPz, Ixx, Ixy, Ixz, Iyy, Iyz, Izz`` about the frame's origin (10,).
+    """
+
+    parameters: Array
+
+    @staticmethod
+    def of(mass: float, centre: ArrayLike, inertia: ArrayLike) -> Body:
+        """Builds a body.
+
+        Args:
+            mass: [kg].
+            centre: centre of mass (3,) [m].
+            inertia: (3, 3) about the centre of mass [kg m2].
+        """
+        return Body(inertial_parameters(mass, centre, inertia, np.eye(4)))
+
+    @property
+    def mass(self) -> float:
+        """[kg]."""
+        return float(self.parameters[0])
+
+    @property
+    def centre(self) -> Array:
+        """Centre of mass (3,) [m]."""
+        return np.asarray(self.parameters[1:4] / self.parameters[0])
+
+    @cached_property
+    def inertia(self) -> Array:
+        """Inertia (3, 3) about the centre of mass, in the frame's axes [kg m2]."""
+        return central_inertia(self.parameters)
+
+    @property
+    def possible(self) -> bool:
+        """Whether a body of positive density has these parameters."""
+        return bool((normalised_eigenvalues(self.parameters) > 0).all())
+
+    @cached_property
+    def principal(self) -> tuple[Array, Array]:
+        """Principal moments of inertia (3,) [kg m2], and the principal axes as columns of a rotation matrix (3, 3).
+
+        The axes are those nearest to the frame's own.
+        """
+        moments, axes = np.linalg.eigh(self.inertia)
+        order: list[int] = []
+        for row in np.abs(axes):
+            order.append(max((k for k in range(3) if k not in order), key=lambda k: row[k]))
+        axes = axes[:, order] * np.where(np.diag(axes[:, order]) < 0, -1.0, 1.0)
+        if np.linalg.det(axes) < 0:
+            axes[:, int(np.argmin(np.abs(np.diag(axes))))] *= -1.0
+        return moments[order], axes
+
+    def seen_from(self, pose: ArrayLike) -> Body:
+        """Expresses the body in another frame.
+
+        Args:
+            pose: (4, 4) of that frame in this body's frame.
+        """
+        return Body(moved_body(np.linalg.inv(np.asarray(pose, dtype=float))) @ self.parameters)
+
+
+def central_inertia(parameters: ArrayLike) -> Array:
+    """Gives the inertia about the centre of mass.
+
+    ``I_c = I - (h'h 1 - h h') / m`` with h = m c (parallel axes).
+
+    Args:
+        parameters: (10,) about a frame's origin.
+
+    Returns:
+        (3, 3) in the frame's axes [kg m2].
+    """
+    values = np.asarray(parameters, dtype=float)
+    moment = values[1:4]
+    return np.asarray(symmetric(values[4:]) - (moment @ moment * np.eye(3) - np.outer(moment, moment)) / values[0])
+
+
+def read_body(text: str) -> Body:
+    """Reads a payload as people state one.
+
+    Args:
+        text: a `payload.json` or its folder; or ``KG,X,Y,Z``, a point mass [kg] and its position [m] in the flange
+            frame.
+
+    Returns:
+        The body in the flange frame.
+
+    Raises:
+        InputError: a text of another form, a file that is no payload, or a body that cannot exist.
+    """
+    parts = text.split(",")
+    if len(parts) == 4:
+        try:
+            mass, x, y, z = map(float, parts)
+        except ValueError:
+            raise InputError(f"the payload {text}", allowed=EXAMPLE) from None
+        if not np.isfinite([mass, x, y, z]).all():
+            raise InputError(f"the payload {text}", allowed="finite numbers")
+        check_body(mass, np.zeros((3, 3)), f"the payload {text}")
+        return Body(point_mass(mass, (x, y, z)))
+    return body_from_dict(read_payload_file(text), text)
+
+
+def read_payload_file(path: str | Path) -> dict[str, Any]:
+    """Reads the data of a `payload.json`, or of the one in a folder.
+
+    Raises:
+        InputError: a missing file, or one that is no payload.
+    """
+    file = Path(path)
+    file = file / "payload.json" if file.is_dir() else file
+    try:
+        data = json.loads(file.read_text(encoding="utf-8"))
+    except (FileNotFoundError, NotADirectoryError):
+        raise InputError(f"the payload {path}: no such file", allowed=EXAMPLE) from None
+    except (OSError, UnicodeDecodeError, json.JSONDecodeError) as error:
+        raise InputError(f"cannot be read as JSON: {error}", file=file) from error
+    if not isinstance(data, dict) or data.get("format") != FORMAT:
+        raise InputError("is not a payload file", file=file, allowed=f'"format": "{FORMAT}"')
+    version = data.get("format_version")
+    if not isinstance(version, int) or version > FORMAT_VERSION:
+        raise InputError(f"format version {version!r}", file=file, allowed=f"up to {FORMAT_VERSION}")
+    return data
+
+
+def body_from_dict(data: dict[str, Any], file: str | Path) -> Body:
+    """Builds the body that a payload file states, in the flange frame.
+
+    Raises:
+        InputError: numbers that are missing, or that no body has.
+    """
+    try:
+        parameters = np.array(data["parameters"], dtype=float)
+    except (KeyError, TypeError, ValueError) as error:
+        raise InputError(f"is damaged ({type(error).__name__}: {error})", file=file) from error
+    if parameters.shape != (SIZE,) or not np.isfinite(parameters).all():
+        raise InputError(f"parameters of shape {parameters.shape}", file=file, allowed=f"{SIZE} finite numbers")
+    if parameters[0] <= 0:
+        raise InputError(f"a mass of {parameters[0]:g} kg", file=file, allowed="a positive number")
+    body = Body(parameters)
+    check_body(body.mass, body.inertia, "the payload", file=str(file))
+    return body

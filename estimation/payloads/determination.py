@@ -1,0 +1,104 @@
+"""What a log does not determine of a payload, and which motion would."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from estimation.payloads.intervals import AXES, Quantity
+from robots.common.errors import InputError, NotIdentifiableError
+from robots.robot import Robot
+
+Array = NDArray[np.float64]
+
+# The mass is determined if its 95 % interval reaches no farther than this share of it to either side, ...
+MASS_SHARE = 0.5
+# ... a coordinate of the centre if its interval reaches no farther than this [m], ...
+CENTRE = 0.1
+# ... and a moment or product of inertia if its interval reaches no farther than this share of the mean moment.
+INERTIA_SHARE = 0.5
+# A wrist joint that moves less than this [rad] is named, of so many last joints.
+LITTLE, WRIST = 0.8, 3
+# A component of gravity's direction in the flange frame that varies by less than this (standard deviation) is named.
+STEADY = 0.2
+# Poses that are looked at.
+POSES = 300
+
+
+def determined(found: Sequence[Quantity]) -> tuple[bool, ...]:
+    """Tells which quantities of a payload a log determines by itself."""
+    values = {item.name: item.value for item in found}
+    moment = (values["Ixx"] + values["Iyy"] + values["Izz"]) / 3
+    limits = {"kg": MASS_SHARE * abs(values["mass"]), "m": CENTRE, "kg m2": INERTIA_SHARE * moment}
+    return tuple(bool(item.half_width <= limits[item.unit]) for item in found)
+
+
+def require_determined(found: Sequence[Quantity], robot: Robot, q: ArrayLike, gravity: Array | None) -> None:
+    """Refuses a payload whose mass or centre the log leaves open.
+
+    Args:
+        found: mass and centre with their intervals.
+        robot: the robot.
+        q: positions (N, n) of the log with the payload [rad or m].
+        gravity: in the base frame (3,) [m/s2]; None as described.
+
+    Raises:
+        InputError: a mass that is significantly negative.
+        NotIdentifiableError: naming what is open, and the motion that would determine it.
+    """
+    known = dict(zip((item.name for item in found), determined(found), strict=True))
+    mass = found[0]
+    free = mass.unconstrained
+    if free < 0 and free + mass.half_width < 0:
+        raise InputError(
+            f"the payload has a mass of {free:.3g} kg: the robot carries less in the log with the payload",
+            remedy="swap --log and --without, or check which log has the payload",
+        )
+    shown = f"{free:.3g} ({free - mass.half_width:.3g} to {free + mass.half_width:.3g}) kg"
+    missing = missing_motion(robot, q, gravity)
+    if not known["mass"]:
+        raise NotIdentifiableError(
+            f"the log does not determine the payload's mass: {shown}",
+            remedy=missing or "check that the payload was on the flange; record a longer log, or a heavier payload",
+        )
+    axes = [axis for axis in AXES if not known[f"centre_{axis}"]]
+    if axes:
+        raise NotIdentifiableError(
+            f"the log does not determine the payload's centre of mass along {', '.join(axes)} of the flange (the mass "
+            f"is {shown})",
+            remedy=missing or "record a longer log, or a heavier payload",
+        )
+
+
+def missing_motion(robot: Robot, q: ArrayLike, gravity: Array | None) -> str:
+    """Says which motion of the wrist a log lacks; empty if gravity acts along all axes of the flange.
+
+    Args:
+        robot: the robot.
+        q: positions (N, n) [rad or m].
+        gravity: in the base frame (3,) [m/s2]; None as described.
+    """
+    positions = np.asarray(q, dtype=float)
+    positions = positions[:: max(1, len(positions) // POSES)]
+    ranges = np.ptp(positions, axis=0)
+    chain = robot.under(gravity).chain
+    field = np.asarray(chain.gravity, dtype=float)
+    field = field / max(float(np.linalg.norm(field)), np.finfo(float).tiny)
+    along = np.einsum("tij,i->tj", chain.flange(positions)[:, :3, :3], field)
+    steady = [axis for axis, spread in zip(AXES, along.std(axis=0), strict=True) if spread < STEADY]
+    wrist = [
+        joint
+        for joint in range(max(0, robot.n - WRIST), robot.n)
+        if chain.kinds[joint] == "revolute" and ranges[joint] < LITTLE
+    ]
+    if not steady and not wrist:
+        return ""
+    names = " and ".join(
+        f"joint {j + 1} ({robot.joint_names[j]}, moved {np.degrees(ranges[j]):.2g} deg)" for j in wrist
+    )
+    move = f"move {names} by 90 deg or more" if wrist else "move the wrist joints farther"
+    goal = f", so that gravity turns along {', '.join(steady)} of the flange" if steady else ""
+    design = f"`oed design --robot {robot.origin or robot.name} --payload-only`"
+    return f"{move}{goal}; {design} designs such a motion"

@@ -1,0 +1,135 @@
+"""Linear equations of a payload and of the arm that carries it, from one log or from two.
+
+With the arm's parameters b = b0 + d, what a log's torque has beyond b0 is ``tau - Y b0 = Y d + Z p``: Y are the arm's
+columns, and Z the ten columns of a body on the flange, which are zero in a log without the payload.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from estimation.payloads.paths import PathMatch
+from estimation.regressions.preparation import Rows
+from robots.geometry.inertia import SIZE
+from robots.regressor import TorqueModel
+from robots.signals import Motion
+from robots.terms.situations.flange_body import last_link
+from robots.terms.situations.sensitivities import moved_body
+
+Array = NDArray[np.float64]
+
+# Rows whose regressor is held at a time.
+CHUNK = 4096
+
+
+@dataclass(frozen=True, eq=False)
+class Arm:
+    """What is known of the arm without the payload.
+
+    Attributes:
+        model: the torque model.
+        columns: indices (b,) of its columns that carry a parameter.
+        values: the parameters b0 (b,).
+        precision: of what is known of them without the logs (b, b), see `weight`.
+        target: what that knowledge says of d (b,).
+        weight: by which the knowledge counts against rows whose noise is correlated: rows count as if they were
+            independent, and carry that many times less information.
+    """
+
+    model: TorqueModel
+    columns: tuple[int, ...]
+    values: Array
+    precision: Array
+    target: Array
+    weight: float
+
+    @property
+    def size(self) -> int:
+        """The number of unknowns: the arm's and the payload's."""
+        return len(self.columns) + SIZE
+
+    def torque(self, motion: Motion, gravity: Array | None) -> Array:
+        """Evaluates the torque of b0 (N, n) [N m or N]."""
+        model = self.model.under(gravity)
+        return model.torque(motion.q, motion.dq, motion.ddq, self.values, columns=self.columns)
+
+    def regressor(self, motion: Motion, at: slice | NDArray[np.intp], gravity: Array | None, carries: bool) -> Array:
+        """Evaluates [Y, Z] (m, n, b + 10) of some rows; Z is zero without the payload."""
+        model = self.model.under(gravity)
+        state = motion.q[at], motion.dq[at], motion.ddq[at]
+        if not carries:
+            Y = model.regressor(*state, columns=self.columns)
+            return np.concatenate([Y, np.zeros((*Y.shape[:2], SIZE))], axis=2)
+        Y = model.regressor(*state, columns=(*self.columns, *last_link(model)))
+        Y[:, :, -SIZE:] = Y[:, :, -SIZE:] @ moved_body(model.robot.chain.tip)
+        return Y
+
+
+@dataclass(frozen=True, eq=False)
+class Source:
+    """The rows of one log, and whether the payload is on the flange."""
+
+    rows: Rows
+    beyond: Array
+    carries: bool
+
+    @staticmethod
+    def of(arm: Arm, rows: Rows, carries: bool, extra: Array | None = None) -> Source:
+        """Takes the arm's torque, and an extra torque (N, n), off the measured one."""
+        beyond = rows.tau - arm.torque(rows.motion, rows.gravity)
+        return Source(rows, beyond if extra is None else beyond - extra, carries)
+
+
+class Equations:
+    """Rows of one log, n channels."""
+
+    def __init__(self, arm: Arm, source: Source) -> None:
+        self.arm, self.source = arm, source
+        self.target, self.mask = source.beyond, source.rows.mask
+
+    @property
+    def rows(self) -> int:
+        """The number of rows N."""
+        return len(self.target)
+
+    def regressor(self, start: int, stop: int) -> Array:
+        """Evaluates the columns of some rows (stop - start, c, b + 10)."""
+        rows = self.source.rows
+        return self.arm.regressor(rows.motion, slice(start, stop), rows.gravity, self.source.carries)
+
+    def chunks(self) -> Iterator[slice]:
+        """Cuts the rows into pieces."""
+        for start in range(0, self.rows, CHUNK):
+            yield slice(start, min(start + CHUNK, self.rows))
+
+
+class PairedEquations(Equations):
+    """Rows of two logs of one path: n channels of their differences, n of their sums, both over the root of two.
+
+    What the model misses alike in both logs is in the sums alone. The differences show the payload, and of the arm
+    only what the motions differ by.
+    """
+
+    def __init__(self, arm: Arm, loaded: Source, free: Source, match: PathMatch) -> None:
+        self.arm, self.loaded, self.free = arm, loaded, free
+        self.first, self.second = match.first, match.second
+        self.target = _turned(loaded.beyond[self.first], free.beyond[self.second])
+        both = loaded.rows.mask[self.first] * free.rows.mask[self.second]
+        self.mask = np.concatenate([both, both], axis=1)
+
+    def regressor(self, start: int, stop: int) -> Array:
+        """Evaluates the columns of some rows (stop - start, 2 n, b + 10)."""
+        own, other = (
+            self.arm.regressor(source.rows.motion, places[start:stop], source.rows.gravity, source.carries)
+            for source, places in ((self.loaded, self.first), (self.free, self.second))
+        )
+        return _turned(own, other)
+
+
+def _turned(own: Array, other: Array) -> Array:
+    """Joins differences and sums along the axis of the joints."""
+    return np.concatenate([own - other, own + other], axis=1) / np.sqrt(2.0)

@@ -1,0 +1,28 @@
+"""Payloads as controllers and descriptions take them, one form a file."""
+
+from estimation.payloads.exports.base import PayloadExport
+from estimation.payloads.exports.franka import Franka
+from estimation.payloads.exports.kuka import Kuka
+from estimation.payloads.exports.ros import RosParameters
+from estimation.payloads.exports.urdf import UrdfLink
+from estimation.payloads.exports.urscript import UrScript
+from robots.common.errors import InputError
+
+EXPORTS: dict[str, PayloadExport] = {
+    export.name: export for export in (UrScript(), Franka(), Kuka(), RosParameters(), UrdfLink())
+}
+"""All forms by their names."""
+
+
+def payload_export(name: str) -> PayloadExport:
+    """Gives the form of a name.
+
+    Raises:
+        InputError: an unknown form.
+    """
+    if name not in EXPORTS:
+        raise InputError(f"--to {name}", allowed=", ".join(EXPORTS))
+    return EXPORTS[name]
+
+
+__all__ = ["EXPORTS", "PayloadExport", "payload_export"]

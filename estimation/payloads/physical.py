@@ -1,0 +1,94 @@
+"""The body that can exist and suits a least-squares payload."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.stats import chi2
+
+from estimation.linear_algebra.conic import ConicProgram
+from estimation.linear_algebra.log_determinant import VARIABLES, add_log_determinant
+from robots.consistency import BASIS, normalised_eigenvalues, pseudo_inertia
+from robots.geometry.inertia import SIZE, inertial_parameters
+
+Array = NDArray[np.float64]
+
+# Smallest eigenvalue of a pseudo-inertia, in units in which the reference body has a unit mass and a unit size.
+EPSILON = 1e-6
+# Mean density of tools and workpieces with their hollows [kg/m3]: the size of a body of which nothing else is known.
+DENSITY = 700.0
+# Weight of the distance to that body: a unit is what its own parameters scatter by.
+WEIGHT = 1.0
+# The probability with which least squares of a real payload lie farther from all bodies.
+UNLIKELY = 1e-3
+
+
+@dataclass(frozen=True, kw_only=True)
+class PhysicalBody:
+    """A body that can exist.
+
+    Attributes:
+        parameters: (10,), the most plausible body.
+        nearest: (10,), the one that fits best.
+        distance: squared distance of least squares from the nearest body, in standard deviations.
+    """
+
+    parameters: Array
+    nearest: Array
+    distance: float
+
+    @property
+    def contradicted(self) -> bool:
+        """Whether least squares lie farther from all bodies than chance explains."""
+        return self.distance > float(chi2.isf(UNLIKELY, SIZE))
+
+
+def physical_body(values: Array, covariance: Array) -> PhysicalBody:
+    """Finds the most plausible body of a payload.
+
+    ``min (p - v)' C^-1 (p - v) / 2 + D(p, p_0)`` over bodies with a positive definite pseudo-inertia. D is the entropic
+    distance (Lee, Wensing, Park 2020, 10.1109/TRO.2019.2926491) to a ball p_0 of the same mass and centre. Where the
+    log determines a parameter, D does not matter; moments of inertia that it leaves open are those of the ball.
+
+    Args:
+        values: least squares v (10,), with a positive mass.
+        covariance: C of the values (10, 10).
+    """
+    reference = ball(values)
+    mass, length = reference[0], _size(reference)
+    scale = mass * np.array([1.0] + [length] * 3 + [length**2] * 6)
+    errors = np.sqrt(np.diag(covariance))
+    inner, vectors = np.linalg.eigh(covariance / errors[:, None] / errors)
+    inner = np.maximum(inner, np.finfo(float).eps * SIZE * inner[-1])
+    precision = (vectors / inner) @ vectors.T / errors[:, None] / errors
+    quadratic = precision * scale[:, None] * scale
+    wanted = -quadratic @ (values / scale)
+
+    program = ConicProgram(SIZE)
+    program.semidefinite(BASIS, -EPSILON * np.eye(4))
+    nearest = values
+    if not (normalised_eigenvalues(values) > EPSILON).all():
+        nearest = scale * program.solve(quadratic, wanted, "payload")
+    off = nearest - values
+
+    full = ConicProgram(SIZE + VARIABLES)
+    weighted, linear = np.zeros((full.size, full.size)), np.zeros(full.size)
+    weighted[:SIZE, :SIZE], linear[:SIZE] = quadratic, wanted
+    linear[:SIZE] += WEIGHT * np.tensordot(BASIS, np.linalg.inv(pseudo_inertia(reference / scale)), axes=2)
+    add_log_determinant(full, linear, range(SIZE), SIZE, WEIGHT)
+    plausible = scale * full.solve(weighted, linear, "payload")[:SIZE]
+    return PhysicalBody(parameters=plausible, nearest=nearest, distance=float(off @ precision @ off))
+
+
+def ball(values: Array) -> Array:
+    """Gives the parameters (10,) of a ball of usual density with the mass and centre of mass of parameters (10,)."""
+    mass = float(values[0])
+    radius = (3 * mass / (4 * np.pi * DENSITY)) ** (1 / 3)
+    return inertial_parameters(mass, values[1:4] / mass, 0.4 * mass * radius**2 * np.eye(3), np.eye(4))
+
+
+def _size(parameters: Array) -> float:
+    """Radius of gyration about the frame's origin [m]."""
+    return float(np.sqrt(np.trace(pseudo_inertia(parameters)[:3, :3]) / parameters[0]))

@@ -1,0 +1,234 @@
+"""Result of a payload identification: the body, its intervals, and the evidence."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from estimation.payloads.body import FORMAT, FORMAT_VERSION, Body, body_from_dict, read_payload_file
+from estimation.payloads.determination import determined
+from estimation.payloads.intervals import Quantity, quantities
+from robots.common.files import write_atomic
+from robots.common.plain import finite
+from robots.terms.situations.sensitivities import moved_body
+
+if TYPE_CHECKING:
+    import pandas as pd
+    from matplotlib.axes import Axes
+
+Array = NDArray[np.float64]
+
+FILE = "payload.json"
+TITLES = {"mass": "mass", **{f"centre_{axis}": f"centre of mass {axis}" for axis in "xyz"}}
+METHODS = {
+    "difference": "the difference of two logs of one path",
+    "joint fit": "a joint fit of logs with and without it",
+    "model": "one log and a model of the robot without it",
+}
+
+
+@dataclass(frozen=True, kw_only=True)
+class JointEvidence:
+    """Torque errors of one joint.
+
+    Attributes:
+        joint: counted from 1.
+        name: the joint's name.
+        torque_rms: of the log with the payload [N m or N].
+        without: RMS error of the best model without payload.
+        residual: RMS error with the payload.
+    """
+
+    joint: int
+    name: str
+    torque_rms: float
+    without: float
+    residual: float
+
+
+@dataclass(frozen=True, kw_only=True)
+class PayloadEstimate:
+    """A payload, rigidly on the flange.
+
+    Attributes:
+        robot: the robot's name.
+        method: ``difference``, ``joint fit`` or ``model``.
+        body: the most plausible body, in the flange frame.
+        nearest: parameters (10,) of the body that fits best.
+        values: least squares without constraints (10,).
+        covariance: of `values` (10, 10).
+        joints: torque errors.
+        rows: number of fitted rows.
+        warnings: about the use of the results.
+        provenance: logs, model, tool version.
+        frame: pose (4, 4) of the frame that `quantities` refer to, in the flange frame.
+    """
+
+    robot: str
+    method: str
+    body: Body
+    nearest: Array
+    values: Array
+    covariance: Array
+    joints: tuple[JointEvidence, ...]
+    rows: int
+    warnings: tuple[str, ...] = ()
+    provenance: Mapping[str, Any] = field(default_factory=dict)
+    frame: Array = field(default_factory=lambda: np.eye(4))
+
+    def __repr__(self) -> str:
+        return f"PayloadEstimate({self.quantities[0].value:.4g} kg at {np.round(self.seen.centre, 4).tolist()} m)"
+
+    @property
+    def success(self) -> bool:
+        """Whether nothing of the result is in doubt: moments of inertia that stay open are not."""
+        return not self.warnings
+
+    @property
+    def seen(self) -> Body:
+        """The body in `frame`."""
+        return self.body.seen_from(self.frame)
+
+    @cached_property
+    def quantities(self) -> tuple[Quantity, ...]:
+        """Mass, centre of mass, and inertia about the centre of mass, in the axes of `frame`."""
+        turn = moved_body(np.asarray(np.linalg.inv(self.frame), dtype=np.float64))
+        return quantities(turn @ self.values, turn @ self.covariance @ turn.T, turn @ self.body.parameters)
+
+    @cached_property
+    def determined(self) -> tuple[bool, ...]:
+        """Which of the quantities the logs determine."""
+        return determined(self.quantities)
+
+    def seen_from(self, pose: ArrayLike) -> PayloadEstimate:
+        """Gives the result in a frame with this pose (4, 4) in the flange frame."""
+        return replace(self, frame=np.asarray(pose, dtype=float))
+
+    def summary(self) -> str:
+        """Lists the quantities with their 95 % intervals, the torque errors, and warnings."""
+        where = "flange frame" if np.array_equal(self.frame, np.eye(4)) else "frame of --frame"
+        lines = [f"{self.robot}: payload by {METHODS[self.method]} ({self.rows} rows); {where}, 95 % intervals"]
+        for item, known in zip(self.quantities, self.determined, strict=True):
+            mark = "" if known else "  not determined; typical of a body of this mass"
+            title = TITLES.get(item.name, f"{item.name} about the centre of mass")
+            value = f"{item.value:.4g} ({item.lower:.4g} to {item.upper:.4g}) {item.unit}"
+            lines.append(f"  {title:28} {value}{mark}")
+        lines.append(
+            "  joint                 torque RMS   without payload   with payload   (errors in % of torque RMS)"
+        )
+        for joint in self.joints:
+            shares = [100 * value / joint.torque_rms if joint.torque_rms else np.nan for value in _errors(joint)]
+            lines.append(
+                f"  {joint.joint} {joint.name[:18]:18} {joint.torque_rms:11.4g} {shares[0]:15.2f} % {shares[1]:12.2f} %"
+            )
+        lines += [f"  {warning}" for warning in self.warnings]
+        return "\n".join(lines)
+
+    def to_frame(self) -> pd.DataFrame:
+        """Gives a row per quantity: value, lower, upper, unit, determined."""
+        import pandas as pd
+
+        rows = [
+            (item.value, item.lower, item.upper, item.unit, known)
+            for item, known in zip(self.quantities, self.determined, strict=True)
+        ]
+        index = pd.Index([item.name for item in self.quantities], name="quantity")
+        return pd.DataFrame(rows, columns=["value", "lower", "upper", "unit", "determined"], index=index)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Writes the result as plain data for `payload.json`."""
+        seen = self.seen
+        moments, axes = seen.principal
+        return {
+            "format": FORMAT,
+            "format_version": FORMAT_VERSION,
+            "robot": self.robot,
+            "method": self.method,
+            "mass": seen.mass,
+            "centre_of_mass": seen.centre.tolist(),
+            "inertia": seen.inertia.tolist(),
+            "principal_moments": moments.tolist(),
+            "principal_axes": axes.tolist(),
+            "frame": self.frame.tolist(),
+            "quantities": [
+                {
+                    "name": item.name,
+                    "value": item.value,
+                    "unit": item.unit,
+                    "ci95": [finite(item.lower), finite(item.upper)],
+                    "determined": known,
+                }
+                for item, known in zip(self.quantities, self.determined, strict=True)
+            ],
+            "parameters": self.body.parameters.tolist(),
+            "nearest": self.nearest.tolist(),
+            "unconstrained": self.values.tolist(),
+            "covariance": self.covariance.tolist(),
+            "joints": [vars(joint) for joint in self.joints],
+            "rows": self.rows,
+            "warnings": list(self.warnings),
+            "provenance": dict(self.provenance),
+        }
+
+    def plot(self, ax: Axes | None = None) -> Axes:
+        """Draws each joint's torque error without and with the payload."""
+        from matplotlib.figure import Figure
+
+        axes = ax if ax is not None else Figure(figsize=(6, 4)).subplots()
+        place = np.arange(len(self.joints))
+        errors = np.array([_errors(joint) for joint in self.joints]).T
+        for shift, values, label in zip((-0.2, 0.2), errors, ("without payload", "with payload"), strict=True):
+            axes.bar(place + shift, values, width=0.4, label=label)
+        axes.set_xticks(place, [str(joint.joint) for joint in self.joints])
+        axes.set_xlabel("joint")
+        axes.set_ylabel("torque error RMS [N m or N]")
+        axes.legend()
+        return axes
+
+    def save(self, folder: str | Path, *, force: bool = False) -> None:
+        """Writes `payload.json` into a folder that is there.
+
+        Raises:
+            InputError: the file is there, and force is not given.
+        """
+        text = json.dumps(self.to_dict(), indent=2, allow_nan=False) + "\n"
+        write_atomic(Path(folder) / FILE, text, force=force)
+
+
+def load_payload(path: str | Path) -> PayloadEstimate:
+    """Reads a `payload.json`, or the one in a folder.
+
+    Raises:
+        InputError: a missing file, or one that is no payload.
+    """
+    from robots.common.errors import InputError
+
+    data = read_payload_file(path)
+    body = body_from_dict(data, path)
+    try:
+        return PayloadEstimate(
+            robot=data["robot"],
+            method=data["method"],
+            body=body,
+            nearest=np.array(data["nearest"], dtype=float),
+            values=np.array(data["unconstrained"], dtype=float),
+            covariance=np.array(data["covariance"], dtype=float),
+            joints=tuple(JointEvidence(**joint) for joint in data["joints"]),
+            rows=data["rows"],
+            warnings=tuple(data["warnings"]),
+            provenance=data["provenance"],
+            frame=np.array(data["frame"], dtype=float),
+        )
+    except (KeyError, TypeError, ValueError) as error:
+        raise InputError(f"is damaged ({type(error).__name__}: {error})", file=path) from error
+
+
+def _errors(joint: JointEvidence) -> tuple[float, float]:
+    return joint.without, joint.residual

@@ -1,0 +1,76 @@
+"""The check of a log whose torques are to be predicted, and the parts of its motion."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+
+import numpy as np
+from scipy.interpolate import CubicSpline
+
+from estimation.gate import GateReport, check_log
+from estimation.gate.measurements.columns import Columns
+from estimation.gate.measurements.outliers import find_outliers
+from estimation.gate.measurements.timing import FEWEST
+from estimation.models.model import Model
+from estimation.preprocessing import LowPass, Smoother, SmoothingSpline
+from robots.robot import Robot
+from robots.signals import Log
+
+JOINED = ("t", "q", "tau", "current", "ambient", "temperature")
+
+
+def checked_motion(robot: Robot, log: Log) -> tuple[GateReport, list[Log]]:
+    """Checks a log whose torques are to be predicted, and repairs its motion.
+
+    Args:
+        robot: of the model.
+        log: with or without torque.
+
+    Returns:
+        The findings, those on torques as warnings at most; and the parts of the log between gaps, with unwrapped
+        angles and interpolated outliers of positions. The whole log, if all parts are too short.
+
+    Raises:
+        InputError: the motion is wrong: units of time or position, wrapped angles, jumps, impossible values.
+    """
+    gate = check_log(robot, log).for_motion()
+    gate.raise_if_refused()
+    log = _without_outliers(gate.corrected(log), set(gate.spikes.tolist()))
+    if gate.motion_parts == ((0, len(log)),):
+        return gate, [log]
+    parts = [log.rows(slice(first, stop)) for first, stop in gate.motion_parts if stop - first >= FEWEST]
+    return gate, parts or [log]
+
+
+def _without_outliers(log: Log, spikes: set[int]) -> Log:
+    """Interpolates isolated outliers of positions."""
+    if not spikes:
+        return log
+    q = np.array(log.q)
+    for (prefix, joint), found in find_outliers(Columns.of(log)).items():
+        rows = [row for row in found.tolist() if row in spikes]
+        if prefix == "q" and rows:
+            known = np.setdiff1d(np.arange(len(log)), rows)
+            q[rows, joint] = CubicSpline(log.t[known], q[known, joint])(log.t[rows])
+    return replace(log, q=q)
+
+
+def joined(parts: Sequence[Log]) -> Log:
+    """Gives one log of several parts of it, with what a prediction needs."""
+    first = parts[0]
+    if len(parts) == 1:
+        return first
+    arrays = {
+        name: np.concatenate([getattr(part, name) for part in parts])
+        for name in JOINED
+        if getattr(first, name) is not None
+    }
+    return Log(**arrays, payload=first.payload, gravity=first.gravity, name=first.name, metadata=first.metadata)
+
+
+def smoother_of(model: Model, cutoff: float) -> Smoother:
+    """Gives the smoother of the model's data for another motion; a low-pass instead of harmonics."""
+    smoothing = model.provenance.get("smoothing")
+    kind = smoothing.get("kind") if isinstance(smoothing, Mapping) else None
+    return SmoothingSpline(cutoff) if kind == SmoothingSpline.name else LowPass(cutoff)

@@ -1,0 +1,144 @@
+"""Torque columns with another meaning, converted to joint torques by the robot's description."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from estimation.logs.known_setup import robot_for_log
+from estimation.logs.torque_source import KEY, parse_meaning
+from estimation.preprocessing import LowPass, resample, smooth
+from robots.common.errors import InputError
+from robots.regressor import TorqueModel
+from robots.robot import Robot
+from robots.signals import Log
+from robots.terms import RigidBody
+
+Array = NDArray[np.float64]
+
+# Rows from which torque constants are estimated, share of the described torque that must remain without friction, rows
+# that count as one independent row, and the share to which a constant must be known.
+MOST, SHOWN, CORRELATED, PRECISE = 20_000, 0.02, 50.0, 0.2
+
+
+def as_joint_torque(robot: Robot, log: Log, meaning: str | None = None) -> Log:
+    """Converts a log whose torque columns mean something else.
+
+    - ``current``: torque is the current [A] times the robot's torque constant. Where the description states none, the
+      constant is estimated from its links: the torques are then as accurate as the description.
+    - ``motor``: torque is that of the motor [N m] times the gear ratio.
+    - ``without-gravity``: the described torque of gravity is added.
+
+    Args:
+        robot: with n joints.
+        log: with torques, or with currents for ``current``.
+        meaning: see `parse_meaning`; None for what the log's metadata state, if anything.
+
+    Returns:
+        The log with joint torques; the same one if there is nothing to convert.
+
+    Raises:
+        InputError: another meaning, no torque column, or a description that lacks what is needed.
+    """
+    stated = meaning or log.metadata.get(KEY)
+    if not stated:
+        return log
+    name, joints = parse_meaning(str(stated), robot.n)
+    values = log.tau if log.tau is not None else log.current if name == "current" else None
+    if values is None:
+        raise InputError(f"torque_is {stated}, but the log has no torque columns", file=_file(log), column="tau1")
+    if log.n != robot.n:
+        raise InputError(f"{log.n} joints", file=_file(log), allowed=f"{robot.n}, as {robot.name} has")
+    tau = np.array(values, dtype=float)
+    if name == "current":
+        tau[:, joints] *= _torque_constants(robot, log, tau, joints)
+    elif name == "motor":
+        tau[:, joints] *= _gear_ratios(robot, log, joints)
+    else:
+        tau[:, joints] += _gravity(robot, log)[:, joints]
+    kept = {key: value for key, value in log.metadata.items() if key != KEY}
+    current = None if name == "current" else log.current
+    return replace(log, tau=tau, current=current, metadata={**kept, "torque_was": str(stated)})
+
+
+def _file(log: Log) -> str | None:
+    return log.metadata.get("file", log.name or None)
+
+
+def _gear_ratios(robot: Robot, log: Log, joints: Sequence[int]) -> Array:
+    ratios = np.asarray(robot.gear_ratio, dtype=float)[list(joints)]
+    if (np.abs(ratios) == 1.0).all():
+        raise InputError(
+            "torque_is motor, but the robot's description states no gear ratio",
+            file=_file(log),
+            joint=joints[0] + 1,
+            remedy="state gear_ratio under drives in the robot YAML, or `side: motor` with gear_ratio in a mapping",
+        )
+    return ratios
+
+
+def _gravity(robot: Robot, log: Log) -> Array:
+    still = np.zeros_like(log.q)
+    return _described(robot, log, "without-gravity")(log.q, still, still)
+
+
+def _described(robot: Robot, log: Log, meaning: str) -> Callable[[Array, Array, Array], Array]:
+    if not robot.has_inertia or not np.any(robot.inertia):
+        raise InputError(
+            f"torque_is {meaning} needs the links of the robot's description",
+            file=_file(log),
+            remedy="use a description with masses, or state torque_constant",
+        )
+    standing = robot_for_log(robot, log)
+    model = TorqueModel(standing, (RigidBody(),))
+
+    def torque(q: Array, dq: Array, ddq: Array) -> Array:
+        return model.torque(q, dq, ddq, model.nominal)
+
+    return torque
+
+
+def _torque_constants(robot: Robot, log: Log, current: Array, joints: Sequence[int]) -> Array:
+    """Gives the torque constants of joints, estimated where the description states none."""
+    constants = np.asarray(robot.torque_constant, dtype=float)[list(joints)]
+    if np.isfinite(constants).all():
+        return constants
+    estimated = _estimated_constants(robot, log, current)[list(joints)]
+    constants = np.where(np.isfinite(constants), constants, estimated)
+    if not np.isfinite(constants).all():
+        raise InputError(
+            "torque_is current, but the description states no torque constant, and its links do not show it",
+            file=_file(log),
+            joint=joints[int(np.argmin(np.isfinite(constants)))] + 1,
+            remedy="state torque_constant [N m/A] in a mapping (--mapping) or in the robot YAML",
+        )
+    return constants
+
+
+def _estimated_constants(robot: Robot, log: Log, current: Array) -> Array:
+    """Regresses the described torque on currents, with free friction and offset (n,); NaN where it is not shown."""
+    grid = resample(log.t, log.q)
+    motion = smooth(grid, LowPass(min(6.0, 0.2 / float(np.median(np.diff(log.t))))))
+    rows = slice(None, None, max(1, len(log) // MOST))
+    q, dq, ddq, i = motion.q[rows], motion.dq[rows], motion.ddq[rows], current[rows]
+    rigid = _described(robot, log, "current")(q, dq, ddq) + np.asarray(robot.rotor_inertia) * ddq
+    constants = np.full(robot.n, np.nan)
+    for joint in range(robot.n):
+        speed = float(np.sqrt(np.mean(dq[:, joint] ** 2)))
+        if not speed > 0:
+            continue
+        sign = np.tanh(dq[:, joint] / (0.05 * speed))
+        own = np.column_stack([sign, dq[:, joint], np.ones(len(q))])
+        if not robot.rotor_inertia[joint]:
+            own = np.column_stack([own, ddq[:, joint]])
+        both = np.column_stack([rigid[:, joint], i[:, joint]])
+        x, y = (both - own @ np.linalg.lstsq(own, both, rcond=None)[0]).T
+        if x.std() > SHOWN * rigid[:, joint].std() and x @ y != 0:
+            factor = float(x @ y / (x @ x))
+            error = float(np.sqrt(np.mean((y - factor * x) ** 2) / (x @ x) * CORRELATED))
+            if error < PRECISE * abs(factor):
+                constants[joint] = 1.0 / factor
+    return constants

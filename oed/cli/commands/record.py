@@ -1,0 +1,66 @@
+"""``oed record``: feedback of a robot controller into a log."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from oed.cli.console import Console
+from oed.cli.links import (
+    ByteOrderOption,
+    HandshakeOption,
+    HostOption,
+    PatienceOption,
+    RealBytesOption,
+    StatePortOption,
+    TransportOption,
+    endpoint,
+)
+from oed.cli.options import (
+    ForceOption,
+    JointsOption,
+    JsonOption,
+    LockOption,
+    QuietOption,
+    RobotOption,
+    TipOption,
+    robot_from,
+)
+
+
+def record(
+    robot: RobotOption,
+    host: HostOption,
+    log: Annotated[Path, typer.Option("--log", help="Log file to write, .csv.")] = Path("log.csv"),
+    duration: Annotated[
+        float | None, typer.Option("--duration", help="Stop after so long [s]. Default: Ctrl-C.", show_default=False)
+    ] = None,
+    transport: TransportOption = "udp",
+    state_port: StatePortOption = 11002,
+    byte_order: ByteOrderOption = "little",
+    real_bytes: RealBytesOption = 4,
+    handshake: HandshakeOption = "0x8E",
+    patience: PatienceOption = 2.0,
+    tip: TipOption = None,
+    joints: JointsOption = None,
+    lock: LockOption = None,
+    force: ForceOption = False,
+    json: JsonOption = False,
+    quiet: QuietOption = False,
+) -> None:
+    """Records the feedback of a robot controller into a log.
+
+    Ctrl-C ends the recording.
+    """
+    console = Console(json=json, quiet=quiet)
+    with console.working() as progress:
+        from oed.controllers import record as listen
+        from oed.controllers.interrupts import terminate_as_interrupt
+
+        place = endpoint(host, transport, 11000, state_port, byte_order, real_bytes, handshake)
+        described = robot_from(robot, tip, joints, lock)
+        with terminate_as_interrupt():
+            result = listen(described, place, log, duration=duration, patience=patience, force=force, progress=progress)
+    console.result(result.summary(), result.to_dict())

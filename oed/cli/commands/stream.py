@@ -1,0 +1,130 @@
+"""``oed stream``: plays a trajectory on a robot controller and records the feedback."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from oed.cli.console import Console
+from oed.cli.links import (
+    ByteOrderOption,
+    HandshakeOption,
+    HostOption,
+    MotionPortOption,
+    PatienceOption,
+    RealBytesOption,
+    StatePortOption,
+    TransportOption,
+    endpoint,
+)
+from oed.cli.options import (
+    ROBOT,
+    ForceOption,
+    JointsOption,
+    JsonOption,
+    LockOption,
+    QuietOption,
+    TipOption,
+    robot_from,
+)
+
+
+def stream(
+    trajectory: Annotated[Path, typer.Argument(help="A trajectory.csv.", show_default=False)],
+    host: HostOption,
+    log: Annotated[Path, typer.Option("--log", help="Log file to write, .csv.")] = Path("log.csv"),
+    robot: Annotated[
+        str | None,
+        typer.Option(
+            "--robot", help=f"The robot: {ROBOT}. Default: the robot named in the trajectory file.", show_default=False
+        ),
+    ] = None,
+    transport: TransportOption = "udp",
+    motion_port: MotionPortOption = 11000,
+    state_port: StatePortOption = 11002,
+    byte_order: ByteOrderOption = "little",
+    real_bytes: RealBytesOption = 4,
+    handshake: HandshakeOption = "0x8E",
+    points: Annotated[str, typer.Option("--points", help="full: JOINT_TRAJ_PT_FULL, short: JOINT_TRAJ_PT.")] = "full",
+    download: Annotated[
+        bool, typer.Option("--download", help="Send all points at once, without replies; the robot starts afterwards.")
+    ] = False,
+    window: Annotated[
+        int, typer.Option("--window", help="Points on their way at once, if the controller's replies repeat the point.")
+    ] = 1,
+    reply_time: Annotated[
+        float, typer.Option("--reply-time", help="UDP: send a point again after so long without a reply [s].")
+    ] = 0.1,
+    patience: PatienceOption = 2.0,
+    start_tolerance: Annotated[
+        float, typer.Option("--start-tolerance", help="Farthest pose from the first point [rad or m].")
+    ] = 0.01,
+    robot_id: Annotated[int, typer.Option("--robot-id", help="Number of the robot at its controller.")] = 0,
+    no_ping: Annotated[bool, typer.Option("--no-ping", help="Send no pings: some controllers know none.")] = False,
+    ignore_status: Annotated[
+        bool, typer.Option("--ignore-status", help="Start in spite of a reported error, e-stop or manual mode.")
+    ] = False,
+    dry_run: Annotated[
+        bool, typer.Option("--dry-run", help="Check trajectory, controller and pose; send no point.")
+    ] = False,
+    tip: TipOption = None,
+    joints: JointsOption = None,
+    lock: LockOption = None,
+    force: ForceOption = False,
+    json: JsonOption = False,
+    quiet: QuietOption = False,
+) -> None:
+    """Plays a trajectory on a robot controller by simple_message.
+
+    Records the feedback into a log.
+    """
+    console = Console(json=json, quiet=quiet)
+    with console.working() as progress:
+        from oed.controllers import StreamOptions
+        from oed.controllers import stream as play
+        from oed.controllers.interrupts import terminate_as_interrupt
+        from oed.exports import read_trajectory
+        from robots.common.errors import InputError
+
+        place = endpoint(host, transport, motion_port, state_port, byte_order, real_bytes, handshake)
+        options = StreamOptions(
+            points=points,  # type: ignore[arg-type]
+            download=download,
+            window=window,
+            reply_time=reply_time,
+            patience=patience,
+            ping=not no_ping,
+            start_tolerance=start_tolerance,
+            ignore_status=ignore_status,
+            robot_id=robot_id,
+        )
+        motion, metadata = read_trajectory(trajectory)
+        named = robot or str(metadata.get("robot") or "")
+        if not named:
+            raise InputError("the file does not name its robot", file=trajectory, remedy="give --robot")
+        described = robot_from(named, tip, joints, lock)
+        try:
+            with terminate_as_interrupt():
+                result = play(
+                    motion,
+                    described,
+                    place,
+                    log=None if dry_run else log,
+                    options=options,
+                    metadata=metadata,
+                    file=trajectory,
+                    dry_run=dry_run,
+                    force=force,
+                    progress=progress,
+                )
+        except KeyboardInterrupt:
+            if log.exists() and not dry_run:
+                text = f"the robot was ordered to stop; the feedback up to here is in {log}"
+            else:
+                text = "no point was sent"
+            print(f"oed: interrupted; {text}", file=sys.stderr)
+            raise SystemExit(130) from None
+    console.result(result.summary(), result.to_dict())

@@ -1,0 +1,71 @@
+"""Options of the way to a controller, shared by the commands that use it."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+if TYPE_CHECKING:
+    from oed.controllers import Endpoint
+    from oed.exports.simple_message import WireFormat
+
+HostOption = Annotated[
+    str, typer.Option("--host", help="Name or IP address of the robot controller.", show_default=False)
+]
+TransportOption = Annotated[str, typer.Option("--transport", help="udp or tcp.")]
+MotionPortOption = Annotated[int, typer.Option("--motion-port", help="Port that takes points.")]
+StatePortOption = Annotated[int, typer.Option("--state-port", help="Port that gives feedback.")]
+ByteOrderOption = Annotated[str, typer.Option("--byte-order", help="Byte order of the controller: little or big.")]
+RealBytesOption = Annotated[int, typer.Option("--real-bytes", help="Bytes of a real number: 4 or 8.")]
+HandshakeOption = Annotated[
+    str, typer.Option("--handshake", help="Byte that opens a link by UDP; 0xFF for old controllers.")
+]
+PatienceOption = Annotated[
+    float, typer.Option("--patience", help="Longest silence of the controller before giving up [s].")
+]
+
+
+def wire_format(byte_order: str, real_bytes: int) -> WireFormat:
+    """Makes the format of messages.
+
+    Raises:
+        InputError: another byte order or size.
+    """
+    from oed.exports.simple_message import WireFormat
+
+    return WireFormat(byte_order=byte_order, real_bytes=real_bytes)  # type: ignore[arg-type]
+
+
+def one_byte(text: str) -> int:
+    """Reads one byte, decimal or as 0x8E.
+
+    Raises:
+        InputError: the text is no number.
+    """
+    from robots.common.errors import InputError
+
+    try:
+        return int(text, 0)
+    except ValueError:
+        raise InputError(f"--handshake {text}", allowed="one byte, such as 0x8E or 0xFF") from None
+
+
+def endpoint(
+    host: str, transport: str, motion_port: int, state_port: int, byte_order: str, real_bytes: int, handshake: str
+) -> Endpoint:
+    """Makes the endpoint that the options name.
+
+    Raises:
+        InputError: an option out of range.
+    """
+    from oed.controllers import Endpoint
+
+    return Endpoint(
+        host=host,
+        transport=transport,  # type: ignore[arg-type]
+        motion_port=motion_port,
+        state_port=state_port,
+        form=wire_format(byte_order, real_bytes),
+        handshake=one_byte(handshake),
+    )

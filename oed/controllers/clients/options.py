@@ -1,0 +1,57 @@
+"""How a trajectory is sent."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from oed.exports.simple_message.points import PointType
+from robots.common.errors import InputError
+
+
+@dataclass(frozen=True, kw_only=True)
+class StreamOptions:
+    """How a trajectory is sent.
+
+    Attributes:
+        points: ``full`` for JOINT_TRAJ_PT_FULL, ``short`` for JOINT_TRAJ_PT.
+        download: send all points at once without replies, instead of one after the other's reply.
+        window: points on their way at once. More than one needs a controller whose replies repeat the point.
+        reply_time: by UDP, a point without reply is sent again after so long [s].
+        patience: longest wait for a reply, for feedback, or for the end of the motion [s].
+        ping: whether to ping; the thesis' program takes a ping for a point.
+        start_tolerance: farthest pose from the first point [rad or m].
+        ignore_status: start in spite of a reported error, emergency stop or manual mode.
+        download_rate: points a second of a download by UDP.
+        robot_id: which robot of the controller.
+    """
+
+    points: PointType = "full"
+    download: bool = False
+    window: int = 1
+    reply_time: float = 0.1
+    patience: float = 2.0
+    ping: bool = True
+    start_tolerance: float = 0.01
+    ignore_status: bool = False
+    download_rate: float = 2000.0
+    robot_id: int = 0
+
+    def __post_init__(self) -> None:
+        """Checks the settings.
+
+        Raises:
+            InputError: an unknown type of points, or a number out of range.
+        """
+        if self.points not in ("full", "short"):
+            raise InputError(f"points of type {self.points!r}", allowed="full or short")
+        if not 1 <= self.window <= 64:
+            raise InputError(f"a window of {self.window} points", allowed="1 to 64")
+        if not 0 < self.reply_time <= self.patience <= 3600:
+            raise InputError(
+                f"a reply time of {self.reply_time} s and a patience of {self.patience} s",
+                allowed="above 0, the reply time not above the patience",
+            )
+        if not 0 < self.start_tolerance < float("inf"):
+            raise InputError(f"a start tolerance of {self.start_tolerance}", allowed="above 0 [rad or m]")
+        if not self.download_rate > 0:
+            raise InputError(f"a download rate of {self.download_rate}", allowed="above 0 points a second")

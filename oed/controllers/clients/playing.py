@@ -1,0 +1,170 @@
+"""The verb `stream`: plays a trajectory on a controller and records the feedback."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Mapping
+from dataclasses import asdict
+from os import PathLike, fspath
+from typing import Any
+
+import numpy as np
+
+from oed.controllers.clients.checks import check_start, check_status, check_trajectory, status_problem
+from oed.controllers.clients.ending import Ending
+from oed.controllers.clients.options import StreamOptions
+from oed.controllers.clients.requests import Requests
+from oed.controllers.clients.result import StreamResult
+from oed.controllers.errors import ControllerError
+from oed.controllers.interrupts import signals_held
+from oed.controllers.links import Endpoint, open_link
+from oed.controllers.recording.log_file import check_log_path
+from oed.controllers.recording.recorder import Recorder
+from oed.exports.simple_message import trajectory_points
+from robots.common.errors import InputError, OedError
+from robots.common.progress import SILENT, Progress
+from robots.robot import Robot
+from robots.signals import Motion
+from robots.version import VERSION
+
+PINGS = 9
+"""Pings from which the delay is measured."""
+
+
+def stream(
+    motion: Motion,
+    robot: Robot,
+    endpoint: Endpoint,
+    *,
+    log: str | PathLike[str] | None = None,
+    options: StreamOptions | None = None,
+    metadata: Mapping[str, Any] | None = None,
+    file: str | PathLike[str] | None = None,
+    dry_run: bool = False,
+    force: bool = False,
+    progress: Progress = SILENT,
+) -> StreamResult:
+    """Plays a trajectory on a controller by simple_message and records the feedback.
+
+    Before anything moves the trajectory is checked against the robot's limits, the controller's state is looked at, and
+    the reported pose is compared with the first point. Whatever ends the motion, Ctrl-C included, a stop is ordered.
+
+    Args:
+        motion: the trajectory, at rest at both ends.
+        robot: the robot.
+        endpoint: its controller.
+        log: CSV file for the feedback; needed but for a dry run.
+        options: how it is sent.
+        metadata: what the trajectory's file says of itself.
+        file: the trajectory's file, for messages.
+        dry_run: check everything, send no point and write nothing.
+        force: whether an existing log may be replaced.
+        progress: listener.
+
+    Returns:
+        What happened.
+
+    Raises:
+        InputError: a trajectory that this robot must not play, another start pose, or a log that cannot be written.
+        LinkError: the controller cannot be reached, or falls silent.
+        ControllerError: the controller is not ready, refuses a point, or the robot does not reach the end.
+    """
+    options = options or StreamOptions()
+    metadata = metadata or {}
+    check_trajectory(motion, robot, metadata, file)
+    if not dry_run:
+        if log is None:
+            raise InputError("no log file for the feedback", remedy="give one")
+        check_log_path(log, force)
+    recorder = Recorder(open_link(endpoint, endpoint.state_port), robot, endpoint.form, options.patience)
+    known = {"robot": robot.name, "source": f"feedback of {endpoint.place(endpoint.state_port)}", "tool": VERSION}
+    requests: Requests | None = None
+    rows, note, begin, ended = 0, "", time.monotonic(), "interrupted"
+    try:
+        pose = recorder.wait_for_feedback()
+        if not options.ignore_status:
+            check_status(recorder.status, endpoint.place(endpoint.state_port))
+        check_start(motion.q[0], pose[: robot.n], options.start_tolerance, pose[robot.n :])
+        with open_link(endpoint, endpoint.motion_port) as link:
+            requests = Requests(link, endpoint.form, options)
+            for _ in range(PINGS if options.ping else 0):
+                requests.ping()
+            if not dry_run:
+                assert log is not None
+                recorder.begin(log, known, force=force)
+                begin = time.monotonic()
+                try:
+                    _play(motion, robot, requests, recorder, options, progress)
+                finally:
+                    with signals_held():
+                        requests.stop()
+        ended = "done"
+    except OedError as error:
+        ended = error.problem
+        if recorder.statistics.rows:
+            stop = "" if requests and requests.traffic.stopped else "the controller did not confirm the stop; "
+            error.remedy = "; ".join(
+                filter(None, [error.remedy, f"{stop}{recorder.statistics.rows} rows are in {log}"])
+            )
+        raise
+    finally:
+        duration = time.monotonic() - begin
+        progress.finish()
+        delay = requests.traffic.delay if requests else None
+        traffic = requests.traffic if requests else None
+        final = {
+            "complete": ended == "done",
+            "ended": ended,
+            "sent_points": traffic.sent if traffic else 0,
+            "resent_points": traffic.resent if traffic else 0,
+            "message_delay": delay,
+        }
+        with signals_held():
+            try:
+                rows = recorder.finish(final)
+            except OedError as error:
+                note = f"the log lacks the measured delay and loss: {error}"
+    return StreamResult(
+        robot=robot.name,
+        place=endpoint.place(endpoint.motion_port),
+        points=len(motion),
+        sent=requests.traffic.sent,
+        resent=requests.traffic.resent,
+        unexpected=requests.traffic.unexpected,
+        duration=duration,
+        delay=delay,
+        stopped=requests.traffic.stopped,
+        log="" if dry_run else fspath(log or ""),
+        rows=rows,
+        feedback=recorder.statistics.summary(),
+        status={} if recorder.status is None else asdict(recorder.status),
+        dry_run=dry_run,
+        note=note,
+    )
+
+
+def _play(
+    motion: Motion, robot: Robot, requests: Requests, recorder: Recorder, options: StreamOptions, progress: Progress
+) -> None:
+    """Sends all points and waits for the end of the motion."""
+    points = trajectory_points(motion, robot.limits, kind=options.points, robot_id=options.robot_id)
+    ending = Ending(motion, recorder, options.start_tolerance, options.patience, options.download)
+
+    def watch() -> None:
+        recorder.check()
+        ending.watch()
+        problem = None if options.ignore_status else status_problem(recorder.status)
+        if problem is not None:
+            raise ControllerError(f"the controller reports {problem} after point {requests.traffic.sent}")
+
+    def turn() -> None:
+        watch()
+        requests.keep_alive()
+
+    progress.start("playing", float(len(motion)))
+    if options.download:
+        requests.download(points, watch, lambda count: progress.update(float(count)))
+    else:
+        longest = float(np.diff(motion.t).max()) if len(motion) > 1 else 0.0
+        requests.stream(points, watch, lambda count: progress.update(float(count)), longest)
+    ending.wait(turn)

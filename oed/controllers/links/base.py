@@ -1,0 +1,98 @@
+"""Where a controller listens, and what a link to it does."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from dataclasses import dataclass
+from typing import Literal
+
+from oed.exports.simple_message import DEFAULT, WireFormat
+from oed.exports.simple_message.kinds import MOTION_PORT, STATE_PORT
+from robots.common.errors import InputError
+
+HANDSHAKE = 0x8E
+"""The one byte that opens a link by UDP; 0xFF in old versions."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Endpoint:
+    """A controller and how it is spoken to.
+
+    Attributes:
+        host: name or address.
+        transport: udp or tcp.
+        motion_port: takes points.
+        state_port: gives feedback.
+        form: byte order and reals.
+        handshake: the byte that opens a link by UDP.
+        connect_time: how long to try [s].
+        handshake_interval: between two handshakes [s].
+    """
+
+    host: str
+    transport: Literal["udp", "tcp"] = "udp"
+    motion_port: int = MOTION_PORT
+    state_port: int = STATE_PORT
+    form: WireFormat = DEFAULT
+    handshake: int = HANDSHAKE
+    connect_time: float = 5.0
+    handshake_interval: float = 1.0
+
+    def __post_init__(self) -> None:
+        """Checks the settings.
+
+        Raises:
+            InputError: another transport, a port or byte out of range, or a time that is not positive.
+        """
+        if self.transport not in ("udp", "tcp"):
+            raise InputError(f"transport {self.transport!r}", allowed="udp or tcp")
+        for name in ("motion_port", "state_port"):
+            if not 0 < getattr(self, name) < 65536:
+                raise InputError(f"{name} {getattr(self, name)}", allowed="1 to 65535")
+        if not 0 <= self.handshake < 256:
+            raise InputError(f"handshake {self.handshake}", allowed="one byte, 0 to 255")
+        if not (self.connect_time > 0 and self.handshake_interval > 0):
+            raise InputError("a time to connect that is not positive", allowed="seconds above zero")
+
+    def place(self, port: int) -> str:
+        """Names a port for messages."""
+        return f"{self.host}:{port} ({self.transport.upper()})"
+
+
+class Link(ABC):
+    """One connection to one port of a controller.
+
+    Attributes:
+        place: host, port and transport, for messages.
+        reliable: whether what is sent arrives once and in order.
+    """
+
+    place: str
+    reliable: bool
+
+    @abstractmethod
+    def send(self, data: bytes) -> None:
+        """Sends one frame.
+
+        Raises:
+            LinkError: the connection is gone.
+        """
+
+    @abstractmethod
+    def receive(self, timeout: float) -> bytes | None:
+        """Waits for bytes that may be one frame; None if there are none within the time [s].
+
+        Raises:
+            LinkError: the connection is gone.
+            MessageError: a stream of another protocol.
+        """
+
+    @abstractmethod
+    def close(self) -> None:
+        """Closes the link; more than once does no harm."""
+
+    def __enter__(self) -> Link:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()

@@ -1,0 +1,21 @@
+"""Opens a link by the transport that an endpoint names."""
+
+from __future__ import annotations
+
+from oed.controllers.links.base import Endpoint, Link
+from oed.controllers.links.tcp import TcpLink
+from oed.controllers.links.udp import UdpLink
+
+
+def open_link(endpoint: Endpoint, port: int) -> Link:
+    """Connects to a port of a controller.
+
+    Args:
+        endpoint: the controller.
+        port: its motion port or its state port.
+
+    Raises:
+        InputError: a host that has no address.
+        LinkError: nothing answers within the time, or the connection is refused.
+    """
+    return (UdpLink if endpoint.transport == "udp" else TcpLink)(endpoint, port)

@@ -1,0 +1,1 @@
+"""Feedback of a controller into a log, written as it comes."""

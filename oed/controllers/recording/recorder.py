@@ -1,0 +1,206 @@
+"""A thread that listens to the state port: it knows pose and state, and writes the log while it is told to."""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections.abc import Mapping
+from os import PathLike
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from oed.controllers.errors import ControllerError, LinkError
+from oed.controllers.links import Link
+from oed.controllers.recording.feedback import RANKS, Layout, is_valid, layout_of, stamp_of
+from oed.controllers.recording.log_file import FeedbackLog
+from oed.controllers.recording.statistics import Statistics
+from oed.exports.simple_message import Comm, Frame, Message, MessageError, Ping, Reply, Status, WireFormat
+from robots.common.errors import OedError
+from robots.robot import Robot
+
+Array = NDArray[np.float64]
+
+LOOK = 0.3
+"""How long kinds of feedback are looked at before the best is chosen [s]."""
+
+BACKWARD = 1.0
+"""A controller whose time goes back by more than this has restarted [s]."""
+
+REST = 1e-5
+"""Positions that change by less are at rest [rad or m]."""
+
+
+class Recorder:
+    """Listens to feedback.
+
+    Args:
+        link: to the state port; it is closed at the end.
+        robot: whose joints report.
+        form: of the messages.
+        patience: longest silence [s].
+    """
+
+    def __init__(self, link: Link, robot: Robot, form: WireFormat, patience: float) -> None:
+        self._link, self._robot, self._form, self._patience = link, robot, form, patience
+        self._lock = threading.Lock()
+        self._end = threading.Event()
+        self._heard = threading.Event()
+        self._layout: Layout | None = None
+        self._log: FeedbackLog | None = None
+        self._last_stamp: float | None = None
+        self._problem: str | None = None
+        self.statistics = Statistics()
+        self.status: Status | None = None
+        self.positions: Array | None = None
+        """All ten reals of the last feedback."""
+        self.stamp: float | None = None
+        """The controller's time of the last feedback, or ours where it sends none [s]."""
+        self.rest_since = self.last_heard = time.monotonic()
+        self.error: OedError | None = None
+        self.received = 0
+        self._thread = threading.Thread(target=self._run, name="feedback", daemon=True)
+        self._thread.start()
+
+    def wait_for_feedback(self) -> Array:
+        """Waits for the first feedback and returns its ten positions.
+
+        Raises:
+            LinkError: none within the patience.
+        """
+        begin = time.monotonic()
+        while time.monotonic() - begin < self._patience and self.error is None and not self._heard.is_set():
+            self._heard.wait(0.05)
+        self.check()
+        if self.positions is None:
+            raise LinkError(
+                f"no feedback from {self._link.place} within {self._patience:g} s"
+                + (f"; what came is no message: {self._problem}" if self._problem else ""),
+                remedy="check the state port and the message format",
+            )
+        # Other kinds, and the status, may come less often.
+        time.sleep(LOOK)
+        self.check()
+        return self.positions
+
+    def check(self) -> None:
+        """Raises what ended the recording.
+
+        Raises:
+            OedError: a closed link, a full disk, a restarted controller, or a silent one.
+        """
+        if self.error is not None:
+            raise self.error
+        silence = time.monotonic() - self.last_heard
+        if silence > self._patience and self._heard.is_set():
+            raise LinkError(
+                f"{self._link.place} is silent for {silence:.1f} s", remedy="check the controller and the network"
+            )
+
+    def begin(self, path: str | PathLike[str], metadata: Mapping[str, Any], *, force: bool = False) -> None:
+        """Begins to write a log.
+
+        Args:
+            path: the file.
+            metadata: what is known at the beginning.
+            force: whether an existing file may be replaced.
+
+        Raises:
+            InputError: a file that cannot be written.
+        """
+        assert self._layout is not None
+        units = ["m" if joint.kind == "prismatic" else "rad" for joint in self._robot.chain.joints]
+        layout = self._layout
+        known = {**metadata, "clock": "controller" if layout.stamped else "arrival", "complete": False}
+        log = FeedbackLog(path, layout.columns, layout.units(units), known, digits=layout.digits, force=force)
+        with self._lock:
+            self.statistics = Statistics()
+            self.statistics.stamped = layout.stamped
+            self._last_stamp = None
+            self._log = log
+
+    def finish(self, metadata: Mapping[str, Any]) -> int:
+        """Ends the log and the thread, and closes the link.
+
+        Args:
+            metadata: what is known at the end; the measured rate, loss and jitter are added.
+
+        Returns:
+            The number of rows.
+
+        Raises:
+            OedError: the disk is full; what was recorded stays.
+        """
+        self._end.set()
+        self._thread.join()
+        self._link.close()
+        with self._lock:
+            log, self._log = self._log, None
+        if log is None:
+            return 0
+        if not log.rows:
+            log.discard()
+            return 0
+        full = self.error if type(self.error) is OedError else None
+        log.close(None if full else {"complete": True, **metadata, "feedback": self.statistics.summary()})
+        return log.rows
+
+    def _run(self) -> None:
+        try:
+            while not self._end.is_set():
+                data = self._link.receive(0.05)
+                if data is None:
+                    if self._log is not None:
+                        self._log.flush()
+                    continue
+                self.received += 1
+                try:
+                    frame = self._form.decode(data)
+                except MessageError as error:
+                    self.statistics.malformed += 1
+                    self._problem = str(error)
+                    continue
+                self._take(frame, time.monotonic())
+        except MessageError as error:
+            self.error = LinkError(f"{self._link.place} speaks another protocol: {error}")
+        except OedError as error:
+            self.error = error
+
+    def _take(self, frame: Frame, now: float) -> None:
+        message = frame.message
+        if frame.comm == Comm.REQUEST:
+            self._link.send(self._form.encode(Frame(_echo(message), Comm.REPLY, Reply.SUCCESS)))
+        self.last_heard = now
+        if isinstance(message, Status):
+            self.status = message
+            return
+        if type(message) not in RANKS:
+            return
+        if self._layout is None or (self._log is None and RANKS[type(message)] > RANKS[self._layout.kind]):
+            self._layout = layout_of(message, self._robot.n, self._form)
+        if self._layout is None or not is_valid(message, self._layout):
+            return
+        stamp = stamp_of(message, self._layout, self._form)
+        if stamp is not None and self._last_stamp is not None and stamp <= self._last_stamp:
+            if self._last_stamp - stamp > BACKWARD:
+                raise ControllerError(
+                    f"the controller's clock went back by {self._last_stamp - stamp:.1f} s: it restarted"
+                )
+            self.statistics.late += 1
+            return
+        self._last_stamp = stamp
+        positions = np.array(message.positions)  # type: ignore[union-attr]
+        if self.positions is None or np.abs(positions - self.positions).max() > REST:
+            self.rest_since = now
+        self.positions, self.stamp = positions, now if stamp is None else stamp
+        self._heard.set()
+        with self._lock:
+            if self._log is not None:
+                t = now if stamp is None else stamp
+                self.statistics.add(t, now)
+                self._log.append(t, self._layout.row(message))  # type: ignore[arg-type]
+
+
+def _echo(message: Message) -> Message:
+    return Ping() if isinstance(message, Ping) else message

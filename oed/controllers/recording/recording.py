@@ -1,0 +1,128 @@
+"""The verb `record`: feedback of a controller into a log, whoever moves the robot."""
+
+from __future__ import annotations
+
+import time
+from dataclasses import asdict, dataclass
+from os import PathLike, fspath
+from typing import Any
+
+from oed.controllers.interrupts import signals_held
+from oed.controllers.links import Endpoint, open_link
+from oed.controllers.recording.log_file import check_log_path
+from oed.controllers.recording.recorder import Recorder
+from robots.common.errors import InputError, OedError
+from robots.common.progress import SILENT, Progress
+from robots.robot import Robot
+from robots.version import VERSION
+
+TURN = 0.05
+
+
+@dataclass(frozen=True, kw_only=True)
+class Recording:
+    """What was recorded.
+
+    Attributes:
+        robot: its name.
+        place: the controller.
+        log: the file.
+        rows: of the log.
+        duration: of the recording [s].
+        interrupted: whether Ctrl-C ended it.
+        feedback: rate, loss and jitter.
+        note: what went wrong without harm.
+    """
+
+    robot: str
+    place: str
+    log: str
+    rows: int
+    duration: float
+    interrupted: bool
+    feedback: dict[str, Any]
+    note: str = ""
+
+    def to_dict(self) -> dict[str, Any]:
+        """Gives all fields as plain data."""
+        return asdict(self)
+
+    def summary(self) -> str:
+        """Says in one line what was recorded."""
+        lost = self.feedback.get("lost")
+        loss = "loss unknown: the feedback carries no time" if lost is None else f"{lost} lost"
+        text = f"{self.rows} rows of {self.robot} in {self.duration:.1f} s written to {self.log}, {loss}"
+        return "\n".join([text, *([self.note] if self.note else [])])
+
+
+def record(
+    robot: Robot,
+    endpoint: Endpoint,
+    log: str | PathLike[str],
+    *,
+    duration: float | None = None,
+    patience: float = 2.0,
+    force: bool = False,
+    progress: Progress = SILENT,
+) -> Recording:
+    """Records the feedback of a controller.
+
+    Args:
+        robot: whose joints report.
+        endpoint: its controller.
+        log: CSV file.
+        duration: of the recording [s]; until Ctrl-C by default.
+        patience: longest silence [s].
+        force: whether an existing log may be replaced.
+        progress: listener.
+
+    Returns:
+        What was recorded; Ctrl-C is a usual end.
+
+    Raises:
+        InputError: a log that cannot be written, or a duration that is not positive.
+        LinkError: the controller cannot be reached, or falls silent; what was recorded stays.
+    """
+    if duration is not None and not duration > 0:
+        raise InputError(f"a duration of {duration} s", allowed="above 0")
+    check_log_path(log, force)
+    place = endpoint.place(endpoint.state_port)
+    recorder = Recorder(open_link(endpoint, endpoint.state_port), robot, endpoint.form, patience)
+    rows, note, begin, ended, interrupted = 0, "", time.monotonic(), "interrupted", False
+    try:
+        recorder.wait_for_feedback()
+        recorder.begin(log, {"robot": robot.name, "source": f"feedback of {place}", "tool": VERSION}, force=force)
+        begin = time.monotonic()
+        progress.start("recording", duration)
+        while duration is None or time.monotonic() - begin < duration:
+            time.sleep(TURN)
+            recorder.check()
+            progress.update(time.monotonic() - begin, f"{recorder.statistics.rows} rows")
+        ended = "done"
+    except KeyboardInterrupt:
+        if not recorder.statistics.rows:
+            raise
+        interrupted = True
+    except OedError as error:
+        ended = error.problem
+        if recorder.statistics.rows:
+            error.remedy = "; ".join(filter(None, [error.remedy, f"{recorder.statistics.rows} rows are in {log}"]))
+        raise
+    finally:
+        length = time.monotonic() - begin
+        progress.finish()
+        with signals_held():
+            try:
+                rows = recorder.finish({"complete": ended in ("done", "interrupted"), "ended": ended})
+            except OedError as error:
+                note = f"the log lacks the measured loss: {error}"
+    return Recording(
+        robot=robot.name,
+        place=place,
+        log=fspath(log),
+        rows=rows,
+        duration=length,
+        interrupted=interrupted,
+        feedback=recorder.statistics.summary(),
+        note=note,
+    )

@@ -1,0 +1,285 @@
+"""The controller to test against: one loop over two ports, a player, and the faults that were ordered."""
+
+from __future__ import annotations
+
+import heapq
+import select
+import threading
+import time
+from collections.abc import Callable
+from functools import partial
+
+import numpy as np
+from numpy.typing import NDArray
+
+from oed.controllers.virtual.faults import Network
+from oed.controllers.virtual.messages import feedback_frame, reply_frame, status_frame
+from oed.controllers.virtual.options import ControllerOptions
+from oed.controllers.virtual.player import REPORTED, Outcome, Player
+from oed.controllers.virtual.ports import Client, Port, TcpPort, UdpPort
+from oed.controllers.virtual.robot import VirtualRobot
+from oed.exports.simple_message import Comm, Frame, FullPoint, MessageError, Ping, Point, Reply, Special
+from robots.common.errors import InputError
+from robots.plants import Plant, nominal_plant
+from robots.robot import Robot
+
+Array = NDArray[np.float64]
+
+STATUS_PERIOD = 0.1
+WAITING = 256
+"""Requests that wait for room in the buffer, at most."""
+
+DELAYED = 100_000
+"""Datagrams on their way, at most."""
+
+LONGEST_WAIT, SHORTEST_WAIT = 0.02, 0.0005
+STALL = 0.15
+"""A delay of this program beyond this [s] is no time of the controller: its clock stands still for so long."""
+
+
+class VirtualController:
+    """Behaves as the thesis' program for the controller does, on this computer.
+
+    Args:
+        robot: what it controls.
+        plant: how that robot really behaves; its description by default. Needed for feedback with torque only.
+        options: ports, buffer, feedback and faults.
+        pose: where the robot stands (n,) [rad or m]; its home by default.
+        seed: of the sensors' noise.
+
+    Raises:
+        InputError: a pose of another size, a robot without nominal dynamics and without plant, or a taken port.
+    """
+
+    def __init__(
+        self,
+        robot: Robot,
+        plant: Plant | None = None,
+        *,
+        options: ControllerOptions | None = None,
+        pose: Array | None = None,
+        seed: int = 0,
+    ) -> None:
+        self.options = options or ControllerOptions()
+        pose = np.asarray(robot.limits.home if pose is None else pose, dtype=float)
+        if pose.shape != (robot.n,):
+            raise InputError(f"a pose of {pose.size} values", allowed=f"{robot.n}, as {robot.name} has joints")
+        virtual = None
+        if self.options.feedback == "torque":
+            virtual = VirtualRobot(plant or nominal_plant(robot), self.options.feedback_period, seed)
+        self._virtual = virtual
+        self._motion, self._state = self._open_ports()
+        self._network = Network(self.options.faults)
+        self._start_over(pose)
+        self._delayed: list[tuple[float, int, Callable[[], None]]] = []
+        self._delayed_count = 0
+        self._stopping = threading.Event()
+        self._thread: threading.Thread | None = None
+        self.received = self.malformed = self.refused = self.restarts = self.points = 0
+        self.stalled = 0.0
+
+    def _open_ports(self) -> tuple[Port, Port]:
+        o = self.options
+        if o.transport == "tcp":
+            motion: Port = TcpPort(o.host, o.motion_port, o.form, 1)
+        else:
+            motion = UdpPort(o.host, o.motion_port, o.handshake, 1, False)
+        try:
+            if o.transport == "tcp":
+                return motion, TcpPort(o.host, o.state_port, o.form, 4)
+            return motion, UdpPort(o.host, o.state_port, o.handshake, 4, True)
+        except BaseException:
+            motion.close()
+            raise
+
+    def _start_over(self, pose: Array) -> None:
+        self._player = Player(pose, self._virtual, self.options)
+        self._waiting: dict[tuple[Client, int], Frame] = {}
+        self._clock_ticks = self._sent = 0
+        self._due_from = time.monotonic()
+        self._silent = False
+        self._state_now = self.options.state
+        self._status_due = 0.0
+
+    @property
+    def motion_port(self) -> int:
+        """The port that takes points."""
+        return self._motion.number
+
+    @property
+    def state_port(self) -> int:
+        """The port that gives feedback."""
+        return self._state.number
+
+    @property
+    def player(self) -> Player:
+        """What it is playing."""
+        return self._player
+
+    def run(self) -> None:
+        """Runs until `stop`."""
+        while not self._stopping.is_set():
+            self._turn()
+
+    def serve(self, duration: float | None = None) -> None:
+        """Runs until Ctrl-C, or for a time [s], and closes the ports."""
+        end = None if duration is None else time.monotonic() + duration
+        try:
+            while end is None or time.monotonic() < end:
+                self._turn()
+        except KeyboardInterrupt:
+            pass
+        finally:
+            self.stop()
+
+    def start(self) -> None:
+        """Runs in a thread."""
+        self._thread = threading.Thread(target=self.run, name="virtual controller", daemon=True)
+        self._thread.start()
+
+    def stop(self) -> None:
+        """Ends `run`, and closes the ports."""
+        self._stopping.set()
+        if self._thread is not None:
+            self._thread.join()
+        self._motion.close()
+        self._state.close()
+
+    def __enter__(self) -> VirtualController:
+        self.start()
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.stop()
+
+    def _turn(self) -> None:
+        now = time.monotonic()
+        wait = min(LONGEST_WAIT, self._due_from + self.options.feedback_period / self.options.speed - now)
+        if self._delayed:
+            wait = min(wait, self._delayed[0][0] - now)
+        ports = {sock: port for port in (self._motion, self._state) for sock in port.sockets()}
+        for sock in select.select(list(ports), [], [], max(wait, SHORTEST_WAIT))[0]:
+            port = ports[sock]
+            for client, data in port.receive(sock, time.monotonic()):
+                self._travel(partial(self._deliver, port, client, data))
+        now = time.monotonic()
+        while self._delayed and self._delayed[0][0] <= now:
+            heapq.heappop(self._delayed)[2]()
+        self._advance(now)
+
+    def _travel(self, arrive: Callable[[], None]) -> None:
+        """Lets a datagram through the network."""
+        now = time.monotonic()
+        for due in self._network.arrivals(now):
+            if due <= now:
+                arrive()
+            elif len(self._delayed) < DELAYED:
+                self._delayed_count += 1
+                heapq.heappush(self._delayed, (due, self._delayed_count, arrive))
+
+    def _send(self, port: Port, client: Client, data: bytes) -> None:
+        if not self._silent:
+            self._travel(lambda: port.send(client, data))
+
+    def _deliver(self, port: Port, client: Client, data: bytes) -> None:
+        self.received += 1
+        known = client in port.clients
+        answer = port.admit(client, data, time.monotonic())
+        if answer is not None:
+            if port is self._motion and not known:
+                self._player.clear_error()
+            self._send(port, client, answer)
+            return
+        if client not in port.clients or len(data) == 1:
+            return
+        try:
+            frame = self.options.form.decode(data)
+        except MessageError:
+            self.malformed += 1
+            return
+        if port is self._motion:
+            self._handle(client, frame)
+        elif isinstance(frame.message, Ping) and frame.comm == Comm.REQUEST:
+            self._send(port, client, self.options.form.encode(reply_frame(frame, Reply.SUCCESS, self.options)))
+
+    def _handle(self, client: Client, frame: Frame) -> None:
+        message = frame.message
+        if isinstance(message, Ping):
+            self._answer(client, frame, Reply.SUCCESS)
+            return
+        if not isinstance(message, FullPoint | Point):
+            self.refused += 1
+            self._answer(client, frame, Reply.FAILURE)
+            return
+        if message.sequence == Special.STOP:
+            self._waiting.clear()
+            self._player.stop()
+            self._answer(client, frame, Reply.SUCCESS)
+            self._motion.release(client)
+            return
+        if message.sequence == Special.START_STREAMING:
+            self._answer(client, frame, Reply.SUCCESS)
+            return
+        if self._state_now != "ready":
+            self._answer(client, frame, Reply.FAILURE)
+            return
+        outcome = self._player.put(message, time.monotonic(), streaming=frame.comm == Comm.REQUEST)
+        if outcome == Outcome.FULL:
+            if len(self._waiting) < WAITING:
+                self._waiting[client, message.sequence] = frame
+            return
+        if outcome == Outcome.ACCEPTED:
+            self.points += 1
+            self._break_as_ordered()
+        self._answer(client, frame, Reply.FAILURE if outcome is None else Reply.SUCCESS)
+
+    def _answer(self, client: Client, frame: Frame, code: Reply) -> None:
+        if frame.comm == Comm.REQUEST:
+            self._send(self._motion, client, self.options.form.encode(reply_frame(frame, code, self.options)))
+
+    def _break_as_ordered(self) -> None:
+        """Has the faults that come after a number of points."""
+        faults, count = self.options.faults, self.points
+        if faults.silent_after is not None and count > faults.silent_after:
+            self._silent = True
+        if faults.error_after is not None and count > faults.error_after:
+            self._player.fail(REPORTED)
+        if faults.e_stop_after is not None and count > faults.e_stop_after and self._state_now == "ready":
+            self._player.stop()
+            self._state_now = "e-stop"
+        if faults.restart_after is not None and count > faults.restart_after and not self.restarts:
+            self.restarts += 1
+            self._motion.forget()
+            self._state.forget()
+            self._delayed.clear()
+            self._start_over(self._player.pose)
+
+    def _advance(self, now: float) -> None:
+        """Goes on with the controller's time, and sends what is due."""
+        step = self.options.feedback_period / self.options.speed
+        if now - self._due_from > max(STALL, 2 * step):
+            self.stalled += now - self._due_from
+            self._due_from = now - step
+        due = int((now - self._due_from) / step + 1e-9)
+        for _ in range(due):
+            clock = self._clock_ticks * self.options.feedback_period
+            sample = self._player.tick(clock, now)
+            if sample is None:
+                self._due_from = now
+                break
+            self._due_from += step
+            self._clock_ticks += 1
+            if self._state.clients:
+                self._sent += 1
+                data = self.options.form.encode(feedback_frame(sample, clock, self._sent, self.options.feedback))
+                for client in list(self._state.clients):
+                    self._send(self._state, client, data)
+                if self.options.status and clock >= self._status_due:
+                    self._status_due = clock + STATUS_PERIOD
+                    data = self.options.form.encode(status_frame(self._player, self._state_now))
+                    for client in list(self._state.clients):
+                        self._send(self._state, client, data)
+        if self._waiting:
+            waiting, self._waiting = self._waiting, {}
+            for (client, _), frame in waiting.items():
+                self._handle(client, frame)

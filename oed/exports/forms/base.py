@@ -1,0 +1,97 @@
+"""What a form of a trajectory is: bytes for a file, and the way back where there is one."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from robots.common.errors import InputError
+from robots.robot import Robot
+from robots.signals import Motion
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, kw_only=True)
+class ExportOptions:
+    """Choices that several forms share.
+
+    Attributes:
+        start_tolerance: of a guard on the start pose [rad or m].
+        name: of the program or module.
+    """
+
+    start_tolerance: float = 0.01
+    name: str = "trajectory"
+
+    def __post_init__(self) -> None:
+        """Checks the choices.
+
+        Raises:
+            InputError: a tolerance that is not positive, or a name that is no identifier.
+        """
+        if not self.start_tolerance > 0:
+            raise InputError(f"a start tolerance of {self.start_tolerance}", allowed="above 0 [rad or m]")
+        if not (self.name.isascii() and self.name.isidentifier()):
+            raise InputError(f"the name {self.name!r}", allowed="ASCII letters, digits and _, not a digit first")
+
+
+class Form(ABC):
+    """One form of a trajectory.
+
+    Attributes:
+        name: as ``--to`` takes it.
+        suffixes: of the file, the usual one first.
+        period: sample period that the controller needs [s]; None for that of the trajectory.
+    """
+
+    name: ClassVar[str]
+    suffixes: ClassVar[tuple[str, ...]]
+    period: ClassVar[float | None] = None
+
+    @abstractmethod
+    def write(self, motion: Motion, robot: Robot, options: ExportOptions, suffix: str) -> bytes:
+        """Gives the content of the file.
+
+        Args:
+            motion: at the controller's period.
+            robot: whose joints move.
+            options: choices of the user.
+            suffix: of the file, one of `suffixes`.
+
+        Raises:
+            InputError: a robot that this controller cannot have.
+        """
+
+    def read(self, content: bytes, robot: Robot, suffix: str) -> tuple[Array, Array]:
+        """Reads times (N,) [s] and positions (N, n) [rad or m] back.
+
+        Raises:
+            InputError: this form holds no points, or the content is not of it.
+        """
+        raise InputError(f"a file of the form {self.name} cannot be read back")
+
+
+def require_joints(robot: Robot, least: int, most: int, what: str) -> None:
+    """Refuses a robot with another number of joints, or with linear axes.
+
+    Raises:
+        InputError: naming the robot.
+    """
+    if not least <= robot.n <= most:
+        allowed = f"{least}" if least == most else f"{least} to {most}"
+        raise InputError(f"{robot.name} has {robot.n} joints", allowed=f"{allowed}, as {what} takes")
+    for joint, item in enumerate(robot.chain.joints, start=1):
+        if item.kind == "prismatic":
+            raise InputError(f"{robot.name} has a linear axis", joint=joint, allowed=f"revolute joints for {what}")
+
+
+def number(value: float, digits: int = 9) -> str:
+    """Writes a number with a decimal point and without exponent."""
+    text = f"{value:.{digits}f}".rstrip("0")
+    text = text + "0" if text.endswith(".") else text
+    return "0.0" if text == "-0.0" else text

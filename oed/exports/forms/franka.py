@@ -1,0 +1,36 @@
+"""Franka: a CSV of joint positions and velocities at 1 kHz, for a motion generator of libfranka."""
+
+from __future__ import annotations
+
+from typing import ClassVar
+
+import numpy as np
+
+from oed.exports.forms.base import Array, ExportOptions, Form, require_joints
+from robots.common.errors import InputError
+from robots.robot import Robot
+from robots.signals import Motion
+
+
+class Franka(Form):
+    """Rows of time, seven positions and seven velocities below one header line."""
+
+    name: ClassVar[str] = "franka"
+    suffixes: ClassVar[tuple[str, ...]] = (".csv",)
+    period: ClassVar[float | None] = 0.001
+
+    def write(self, motion: Motion, robot: Robot, options: ExportOptions, suffix: str) -> bytes:
+        """See `Form.write`."""
+        require_joints(robot, 7, 7, "a Franka arm")
+        names = ["time", *(f"{prefix}{joint}" for prefix in ("q", "dq") for joint in range(1, 8))]
+        rows = np.column_stack([motion.t, motion.q, motion.dq]).tolist()
+        return "\n".join([",".join(names), *(",".join(map(repr, row)) for row in rows), ""]).encode()
+
+    def read(self, content: bytes, robot: Robot, suffix: str) -> tuple[Array, Array]:
+        """See `Form.read`."""
+        lines = content.decode("utf-8", errors="replace").split("\n")
+        try:
+            rows = np.array([[float(cell) for cell in line.split(",")] for line in lines[1:] if line])
+            return rows[:, 0], rows[:, 1 : 1 + robot.n]
+        except (ValueError, IndexError) as error:
+            raise InputError(f"no rows of numbers ({error})", allowed="a file of this form") from error

@@ -1,0 +1,61 @@
+"""URScript: servoj at the controller's period, behind a guard on the start position."""
+
+from __future__ import annotations
+
+import re
+from typing import ClassVar
+
+import numpy as np
+
+from oed.exports.forms.base import Array, ExportOptions, Form, number, require_joints
+from robots.common.errors import InputError
+from robots.robot import Robot
+from robots.signals import Motion
+
+LOOKAHEAD, GAIN = 0.1, 300
+_POINT = re.compile(r"^ +servoj\(\[([^]]*)\], 0, 0, ([\d.]+)", re.MULTILINE)
+
+
+class UrScript(Form):
+    """A program for Universal Robots: 500 Hz by default, as e-series controllers run; older ones need 0.008 s."""
+
+    name: ClassVar[str] = "urscript"
+    suffixes: ClassVar[tuple[str, ...]] = (".script",)
+    period: ClassVar[float | None] = 0.002
+
+    def write(self, motion: Motion, robot: Robot, options: ExportOptions, suffix: str) -> bytes:
+        """See `Form.write`."""
+        require_joints(robot, 6, 6, "a UR controller")
+        period = motion.period or 0.0
+        # The two zeros are an acceleration and a speed that the command does not use.
+        tail = f"0, 0, {number(period)}, {number(LOOKAHEAD)}, {GAIN})"
+        lines = [
+            f"def {options.name}():",
+            f"  start = {_list(motion.q[0])}",
+            "  actual = get_actual_joint_positions()",
+            "  joint = 0",
+            "  while joint < 6:",
+            f"    if norm(actual[joint] - start[joint]) > {number(options.start_tolerance)}:",
+            '      popup("The robot is not at the start of the trajectory.", error=True, blocking=True)',
+            "      halt",
+            "    end",
+            "    joint = joint + 1",
+            "  end",
+            *(f"  servoj({_list(row)}, {tail}" for row in motion.q),
+            "  stopj(2.0)",
+            "end",
+            "",
+        ]
+        return "\n".join(lines).encode()
+
+    def read(self, content: bytes, robot: Robot, suffix: str) -> tuple[Array, Array]:
+        """See `Form.read`."""
+        found = _POINT.findall(content.decode("utf-8", errors="replace"))
+        if not found:
+            raise InputError("no servoj commands", allowed="a program of this form")
+        q = np.array([[float(value) for value in row.split(",")] for row, _ in found])
+        return float(found[0][1]) * np.arange(len(q), dtype=np.float64), q
+
+
+def _list(row: Array) -> str:
+    return "[" + ", ".join(number(float(value)) for value in row) + "]"

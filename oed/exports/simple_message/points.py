@@ -1,0 +1,56 @@
+"""A trajectory as messages: one point a sample."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Literal
+
+import numpy as np
+
+from oed.exports.simple_message.kinds import JOINTS
+from oed.exports.simple_message.messages import FullPoint, Point
+from robots.common.errors import InputError
+from robots.limits import Limits
+from robots.signals import Motion
+
+PointType = Literal["full", "short"]
+
+
+def trajectory_points(
+    motion: Motion, limits: Limits | None = None, *, kind: PointType = "full", robot_id: int = 0
+) -> Iterator[FullPoint | Point]:
+    """Makes the points of a motion, numbered from 0.
+
+    Args:
+        motion: with up to ten joints; its first sample is at time zero for the controller.
+        limits: velocity limits, for the share of points of the short type.
+        kind: ``full`` for JOINT_TRAJ_PT_FULL, ``short`` for JOINT_TRAJ_PT.
+        robot_id: which robot of the controller.
+
+    Raises:
+        InputError: too many joints, another type, or the short type without limits.
+    """
+    if motion.n > JOINTS:
+        raise InputError(f"{motion.n} joints", allowed=f"up to {JOINTS}, as simple_message has")
+    if kind not in ("full", "short"):
+        raise InputError(f"points of type {kind!r}", allowed="full or short")
+    t = motion.t - motion.t[0]
+    q, dq, ddq = motion.q.tolist(), motion.dq.tolist(), motion.ddq.tolist()
+    if kind == "full":
+        for k, time in enumerate(t.tolist()):
+            yield FullPoint(
+                robot_id=robot_id,
+                sequence=k,
+                time=time,
+                positions=tuple(q[k]),
+                velocities=tuple(dq[k]),
+                accelerations=tuple(ddq[k]),
+            )
+        return
+    if limits is None:
+        raise InputError("points of type short need velocity limits", remedy="give the robot, or send full points")
+    with np.errstate(divide="ignore", invalid="ignore"):
+        share = np.nan_to_num(np.abs(motion.dq) / limits.velocity).max(axis=1).clip(0.0, 1.0).tolist()
+    durations = np.diff(t, prepend=0.0).tolist()
+    for k in range(len(motion)):
+        yield Point(sequence=k, positions=tuple(q[k]), velocity=share[k], duration=durations[k])

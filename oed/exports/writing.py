@@ -1,0 +1,62 @@
+"""The verb `export_trajectory`: one entry for all forms but the trajectory file itself."""
+
+from __future__ import annotations
+
+from os import PathLike
+from pathlib import Path
+
+from oed.exports.forms import FORMS, ExportOptions
+from oed.exports.forms.sampling import at_period
+from robots.common.errors import InputError
+from robots.common.files import write_atomic
+from robots.robot import Robot
+from robots.signals import Motion
+
+
+def export_trajectory(
+    path: str | PathLike[str],
+    motion: Motion,
+    robot: Robot,
+    form: str,
+    *,
+    period: float | None = None,
+    options: ExportOptions | None = None,
+    force: bool = False,
+) -> Motion:
+    """Writes a motion in a form of a controller or simulator.
+
+    Args:
+        path: the file.
+        motion: the trajectory.
+        robot: whose joints move.
+        form: a name of `FORMS`.
+        period: sample period [s]; that of the form or of the trajectory by default.
+        options: choices that several forms share.
+        force: whether an existing file may be replaced.
+
+    Returns:
+        The motion as it was written: sampled at the period, from time zero.
+
+    Raises:
+        InputError: another form or suffix, a trajectory of another robot, a robot that the controller cannot have, an
+            uneven trajectory without a period, or a file that cannot be written.
+    """
+    if form not in FORMS:
+        raise InputError(f"form {form!r}", allowed=", ".join(FORMS))
+    chosen, path = FORMS[form], Path(path)
+    suffix = path.suffix.lower()
+    if suffix not in chosen.suffixes:
+        raise InputError(
+            f"a file of type {path.suffix or '(none)'!r}",
+            file=path,
+            allowed=" or ".join(chosen.suffixes),
+            remedy="rename it",
+        )
+    if motion.n != robot.n:
+        raise InputError(f"the trajectory has {motion.n} joints, {robot.name} has {robot.n}")
+    step = period if period is not None else chosen.period if chosen.period is not None else motion.period
+    if step is None:
+        raise InputError("the motion is not uniform in time", remedy="give a period (--period)")
+    sampled = at_period(motion, step)
+    write_atomic(path, chosen.write(sampled, robot, options or ExportOptions(), suffix), force=force)
+    return sampled

@@ -1,0 +1,90 @@
+"""The page of a payload."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from estimation.payloads import PayloadEstimate, Quantity
+from estimation.payloads.result import METHODS
+from oed.reports.pictures.parameter_pictures import error_bars_picture
+from oed.reports.rendering.page import Cell, Fact, Page, Section, Table
+from oed.reports.rendering.saving import footer, save_page
+from oed.reports.rendering.significant import NORMAL_95, significant
+from robots.common.files import ResultFolder
+
+NAMES = {"mass": "mass", **{f"centre_{axis}": f"centre of mass, {axis}" for axis in "xyz"}}
+
+
+def save_payload_report(payload: PayloadEstimate, folder: ResultFolder, *, png: bool = False) -> None:
+    """Writes the page of a payload, and its picture as PNG on request."""
+    save_page(payload_page(payload), folder, png=png)
+
+
+def payload_page(payload: PayloadEstimate) -> Page:
+    """Builds the page: the quantities with their intervals, and the torque errors without and with the payload."""
+    mass, *rest = payload.quantities
+    centre = rest[:3]
+    errors = {
+        label: np.array(
+            [getattr(joint, key) / joint.torque_rms if joint.torque_rms else np.nan for joint in payload.joints]
+        )
+        for label, key in (("without payload", "without"), ("with payload", "residual"))
+    }
+    widest = max(centre, key=lambda item: item.half_width)
+    return Page(
+        title=f"Payload of {payload.robot}",
+        verdict=(
+            f"The payload has {_value(mass)} kg ({_interval(mass)}), by {METHODS[payload.method]}. Its centre of mass "
+            f"is known to {1000 * widest.half_width:.2g} mm or better."
+        ),
+        status="good" if payload.success else "warning",
+        facts=(
+            Fact(label="Mass", value=f"{_value(mass)} kg"),
+            Fact(label="Centre of mass", value=f"{', '.join(_value(item) for item in centre)} m"),
+            Fact(label="Rows", value=payload.rows),
+        ),
+        warnings=payload.warnings,
+        sections=(
+            Section(
+                title="Mass, centre and inertia",
+                paragraphs=(
+                    "The intervals hold the truth with 95 %. They allow for correlated noise and for what is not known "
+                    "of the arm. The values are those of a body that can exist. Moments of inertia that the log does "
+                    "not determine are those of a typical body of this mass.",
+                ),
+                tables=(_table(payload),),
+            ),
+            Section(
+                title="Torque", pictures=(error_bars_picture(errors, joint_names=[j.name for j in payload.joints]),)
+            ),
+        ),
+        footer=footer(),
+    )
+
+
+def _table(payload: PayloadEstimate) -> Table:
+    rows: list[tuple[Cell, ...]] = [
+        (
+            NAMES.get(item.name, f"{item.name} about the centre"),
+            _value(item),
+            _interval(item),
+            item.unit,
+            "yes" if known else "no",
+        )
+        for item, known in zip(payload.quantities, payload.determined, strict=True)
+    ]
+    frame = "in the flange frame" if np.array_equal(payload.frame, np.eye(4)) else "in the frame of --frame"
+    return Table(
+        headings=("quantity", "value", "95 % interval", "unit", "determined"),
+        rows=tuple(rows),
+        caption=f"Centre of mass and axes {frame}.",
+    )
+
+
+def _value(item: Quantity) -> str:
+    return significant(item.value, item.half_width / NORMAL_95)
+
+
+def _interval(item: Quantity) -> str:
+    error = item.half_width / NORMAL_95
+    return f"{significant(item.lower, error)} to {significant(item.upper, error)}"

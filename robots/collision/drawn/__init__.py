@@ -1,0 +1,1 @@
+"""Collision bodies from the shapes that a URDF draws."""

@@ -1,0 +1,101 @@
+"""What a URDF leaves open, or states in vain: the notes of its robot."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from robots.common.errors import InputError
+from robots.geometry.chain import Kind
+from robots.geometry.urdf import UrdfChain
+from robots.limits import ACCELERATION_PER_VELOCITY, JERK_PER_ACCELERATION
+
+Array = NDArray[np.float64]
+
+
+def require_stops(names: Sequence[str], accepted: bool, file: str | Path) -> None:
+    """Refuses joints with stops whose positions are not stated.
+
+    Args:
+        names: of these joints.
+        accepted: whether they may be unlimited.
+        file: that they are in.
+
+    Raises:
+        InputError: naming them.
+    """
+    if names and not accepted:
+        others = f" (nor do {', '.join(names[1:])})" if len(names) > 1 else ""
+        raise InputError(
+            f"<limit> states no position limits{others}: without lower and upper, or with 0, there is no range",
+            file=file,
+            joint=names[0],
+            allowed="lower below upper",
+            remedy="state them there or under limits.position of a robot YAML, make the joint continuous, "
+            "or accept unlimited positions (--unlimited; in Python unlimited=True)",
+        )
+
+
+def urdf_notes(taken: UrdfChain, unused: Sequence[str]) -> tuple[str, ...]:
+    """Lists what a reader of the URDF may not expect.
+
+    Args:
+        taken: the chain.
+        unused: elements and attributes that are not read.
+
+    Returns:
+        One sentence each.
+    """
+    notes = list(taken.notes)
+    if taken.unlimited:
+        word = "joint" if len(taken.unlimited) == 1 else "joints"
+        notes.append(f"{word} {', '.join(taken.unlimited)}: no position limits stated; positions are unlimited")
+    if unused:
+        notes.append(f"not used from the URDF: {'; '.join(unused)}")
+    return tuple(notes)
+
+
+def assumed_in_urdf(taken: UrdfChain, friction: Array, root: str) -> tuple[str, ...]:
+    """Lists what a URDF does not state and what is taken instead, in one sentence.
+
+    Args:
+        taken: the chain.
+        friction: (n, 4) as the file states it.
+        root: name of the root link.
+
+    Returns:
+        The sentence, alone in a tuple.
+    """
+    limits, kinds = taken.limits, taken.chain.kinds
+    acceleration = np.where(
+        np.isfinite(limits.acceleration), limits.acceleration, ACCELERATION_PER_VELOCITY * limits.velocity
+    )
+    parts = []
+    if not np.isfinite(limits.acceleration).all():
+        values = _values(acceleration, ~np.isfinite(limits.acceleration), kinds, "s2")
+        parts.append(f"acceleration limits {values} (full speed in {1 / ACCELERATION_PER_VELOCITY:g} s)")
+    if not np.isfinite(limits.jerk).all():
+        values = _values(JERK_PER_ACCELERATION * acceleration, ~np.isfinite(limits.jerk), kinds, "s3")
+        parts.append(f"jerk limits {values} (full acceleration in {1 / JERK_PER_ACCELERATION:g} s)")
+    still = [name for name, row in zip(taken.names, friction, strict=True) if not row.any()]
+    if still:
+        parts.append("no friction" if len(still) == len(taken.names) else f"no friction at {', '.join(still)}")
+    parts += ["no rotor inertia", "a controller period of 4 ms", f"gravity 9.81 m/s2 along -z of link {root}"]
+    return (f"assumed, because the URDF does not state it: {', '.join(parts)}",)
+
+
+def _values(values: Array, wanted: NDArray[np.bool_], kinds: Sequence[Kind], rate: str) -> str:
+    """Values of the wanted joints with their units; one for all where they are equal."""
+    texts = [
+        f"{value:.3g} {'m' if kind == 'prismatic' else 'rad'}/{rate}" if np.isfinite(value) else "none"
+        for value, kind, asked in zip(values, kinds, wanted, strict=True)
+        if asked
+    ]
+    if len(set(texts)) == 1:
+        return texts[0]
+    unit = texts[0].partition(" ")[2]
+    same = all(text.partition(" ")[2] == unit for text in texts)
+    return f"{', '.join(text.partition(' ')[0] for text in texts)} {unit}" if same else ", ".join(texts)

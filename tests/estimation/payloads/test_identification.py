@@ -1,0 +1,126 @@
+"""A payload from logs with and without it, or from one log and a model."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from estimation.payloads import PayloadEstimate, identify_payload, load_payload
+from estimation.preprocessing import LowPass, resample, smooth
+from robots.common.errors import InputError, NotIdentifiableError
+from robots.signals import Log
+from robots.terms.situations.flange_body import point_mass
+from tests.estimation.payloads.conftest import CENTRE, INERTIA, MASS, Experiment
+
+pytestmark = pytest.mark.slow
+# Two logs of 20 s tell the mass to some 1 %, the centre to some 2 mm: four standard errors of eleven quantities are
+# missed by chance once in 1000 draws, and the draw is fixed.
+SIGMAS = 4.0
+
+
+def agrees(found: PayloadEstimate) -> None:
+    """Mass, centre and inertia are within four standard errors, and the errors are as small as they should be."""
+    truth = [MASS, *CENTRE, *INERTIA[np.triu_indices(3)]]
+    for item, value in zip(found.quantities, truth, strict=True):
+        middle = item.unconstrained
+        assert abs(middle - value) < SIGMAS * max(item.half_width, 1e-6) / 1.96 + 1e-9, item.name
+    assert found.quantities[0].half_width < 0.05 * MASS
+    assert max(item.half_width for item in found.quantities[1:4]) < 0.01
+    assert found.body.possible
+    assert all(joint.residual < 0.05 * joint.torque_rms for joint in found.joints)
+
+
+@pytest.fixture(scope="module")
+def difference(experiment: Experiment) -> PayloadEstimate:
+    """The payload by two logs of one path, which need geometry only."""
+    return identify_payload(
+        experiment.loaded, robot=experiment.robot, without=experiment.free, model=experiment.estimate
+    )
+
+
+def test_the_difference_of_two_logs_of_one_path_shows_the_payload(difference: PayloadEstimate) -> None:
+    """The logs are paired although their clocks are 100 s apart and the loaded arm sags."""
+    assert difference.method == "difference"
+    assert difference.warnings == ()
+    assert difference.provenance["shift"] == pytest.approx(-100.0, abs=0.01)
+    agrees(difference)
+
+
+def test_one_log_and_a_model_show_the_payload(experiment: Experiment) -> None:
+    """On a path that the model has not seen."""
+    found = identify_payload(experiment.other, model=experiment.estimate.model)
+    assert found.method == "model"
+    agrees(found)
+
+
+def test_logs_of_different_paths_are_fitted_jointly_and_the_distance_is_said(experiment: Experiment) -> None:
+    """The warning names the joint and the distance."""
+    found = identify_payload(
+        experiment.other, robot=experiment.robot, without=experiment.free, model=experiment.estimate
+    )
+    assert found.method == "joint fit"
+    assert any("different paths" in warning and "joint" in warning for warning in found.warnings)
+    agrees(found)
+
+
+def test_a_result_survives_its_file_and_a_change_of_frame(difference: PayloadEstimate, tmp_path: Path) -> None:
+    """`save` and `load_payload`; in a frame 0.1 m in front of the flange the centre is nearer, the inertia the same."""
+    pose = np.eye(4)
+    pose[2, 3] = 0.1
+    moved = difference.seen_from(pose)
+    moved.save(tmp_path)
+    again = load_payload(tmp_path)
+    assert again.summary() == moved.summary()
+    for a, b in zip(difference.quantities, moved.quantities, strict=True):
+        shift = 0.1 if a.name == "centre_z" else 0.0
+        assert (b.value, b.lower, b.upper) == pytest.approx(
+            (a.value - shift, a.lower - shift, a.upper - shift), abs=1e-6
+        )
+    assert "frame of --frame" in moved.summary()
+    assert list(again.to_frame().index) == [item.name for item in difference.quantities]
+    with pytest.raises(InputError, match="overwrite"):
+        moved.save(tmp_path)
+
+
+def test_a_known_part_of_the_payload_is_not_counted(experiment: Experiment) -> None:
+    """With 1.5 kg of it stated in the log the other .5 kg are found."""
+    part = replace(experiment.other, payload=point_mass(1.5, tuple(CENTRE)))
+    found = identify_payload(part, model=experiment.estimate.model)
+    mass = found.quantities[0]
+    assert abs(mass.value - 0.5) < SIGMAS * mass.half_width / 1.96
+
+
+def test_a_log_without_wrist_motion_is_refused_with_the_motion_that_it_lacks(experiment: Experiment) -> None:
+    """Joints 4 to 6 stand: the message names what is open, the wrist joints, and the design."""
+    q = experiment.other.q.copy()
+    q[:, 1:] = q[0, 1:]
+    rng = np.random.default_rng(0)
+    model = experiment.estimate.model
+    # Only the vertical axis turns: gravity never shows the mass.
+    motion = smooth(resample(experiment.other.t, q), LowPass(5.0))
+    tau = model.torque(motion.q, motion.dq, motion.ddq)
+    log = Log(t=motion.t, q=q, tau=tau + 0.3 * rng.normal(size=tau.shape))
+    with pytest.raises(NotIdentifiableError, match=r"does not determine|joint 6") as caught:
+        identify_payload(log, model=model)
+    assert "--payload-only" in str(caught.value)
+    assert "joint 6" in str(caught.value)
+
+
+@pytest.mark.parametrize("options", [{}, {"model": None, "without": ()}])
+def test_one_log_alone_is_refused(experiment: Experiment, options: dict) -> None:
+    """Without a model and without a second log nothing tells the payload from the arm."""
+    with pytest.raises(InputError, match="no reference for the payload"):
+        identify_payload(experiment.loaded, robot=experiment.robot, **options)
+
+
+def test_the_log_of_another_robot_is_refused(experiment: Experiment) -> None:
+    """Of another number of joints by the number; of as many joints because no payload explains the torque."""
+    short = Log(t=experiment.free.t, q=experiment.free.q[:, :5], tau=experiment.free.tau[:, :5])
+    with pytest.raises(InputError, match="joints"):
+        identify_payload(short, model=experiment.estimate.model)
+    tau = experiment.other.tau[:, [2, 0, 1, 5, 3, 4]]
+    with pytest.raises((InputError, NotIdentifiableError)):
+        identify_payload(replace(experiment.other, tau=tau), model=experiment.estimate.model)

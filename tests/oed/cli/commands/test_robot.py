@@ -1,0 +1,68 @@
+"""``oed robot show`` and ``oed robots``."""
+
+from __future__ import annotations
+
+import pytest
+
+from robots.loading import catalogue
+from tests.robots.robot_files import URDF
+
+
+def test_show(run, tmp_path):
+    """A file is shown with its notes on standard output, and nothing on standard error; --json has the same."""
+    path = tmp_path / "two.urdf"
+    path.write_text(URDF.replace("</robot>", '<gazebo reference="l1"/></robot>'))
+    done = run("robot", "show", path)
+    assert (done.code, done.err) == (0, "")
+    assert "not used from the URDF: <gazebo> (1 times)" in done.out
+    data = run("robot", "show", path, "--json").data
+    assert [joint["name"] for joint in data["joints"]] == ["j1", "j2"]
+    assert any("not used" in note for note in data["notes"])
+    assert run("robot", "show", path, "--quiet").out == ""
+
+
+def test_joints_without_stops_are_shown(run, tmp_path):
+    """A robot that cannot be designed for is shown all the same, and a note names what is missing."""
+    path = tmp_path / "two.urdf"
+    path.write_text(URDF.replace('lower="-1" upper="1" ', ""))
+    done = run("robot", "show", path)
+    assert done.code == 0
+    assert "joint j1: no position limits stated" in done.out
+
+
+def test_a_choice_of_joints(run, tmp_path):
+    """--tip, --joints and --lock choose the chain."""
+    path = tmp_path / "two.urdf"
+    path.write_text(URDF)
+    data = run("robot", "show", path, "--lock", "j2=0.05", "--json").data
+    assert [joint["name"] for joint in data["joints"]] == ["j1"]
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (("ur11",), "unknown robot 'ur11'"),
+        (("none.urdf",), "none.urdf: no such file"),
+        (("ur10", "--tip", "nose"), "there is no link 'nose'"),
+    ],
+)
+def test_bad_input(arguments, message, run):
+    """What cannot be read ends with exit code 2 and one message."""
+    done = run("robot", "show", *arguments)
+    assert done.code == 2
+    assert message in done.err
+    assert done.out == ""
+
+
+def test_another_action(run):
+    """An unknown action ends with exit code 2 and the known one."""
+    done = run("robot", "draw", "ur10")
+    assert done.code == 2
+    assert "allowed: show" in done.err
+
+
+def test_robots(run):
+    """The catalogue is listed by name, as text and as data."""
+    assert [row["name"] for row in run("robots", "--json").data["robots"]] == list(catalogue())
+    text = run("robots").out
+    assert all(name in text for name in catalogue())
