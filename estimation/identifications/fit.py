@@ -46,6 +46,8 @@ class Fit:
         nominal: sum of each joint's squared errors (n,) by the robot's description, over all rows; NaN without one.
         covariance: of the parameters (b, b).
         white: standard errors (b,) that white noise would have.
+        prior_share: share of each parameter's variance (b,) that the prior's scatter makes; None where the estimator
+            states its covariance itself.
     """
 
     base: BaseParameters
@@ -58,6 +60,7 @@ class Fit:
     nominal: Array
     covariance: Array
     white: Array
+    prior_share: Array | None
 
 
 def fit(base: BaseParameters, logs: Sequence[Prepared], estimator: Estimator, choice: Choice, seed: int) -> Fit:
@@ -102,7 +105,7 @@ def fit(base: BaseParameters, logs: Sequence[Prepared], estimator: Estimator, ch
         fitted = [_Fitted(*some) for some in zip(rows, predicted, factors, strict=True)]
         scores = _scores(regressor, fitted, solution.weights) if long else scores
     averaged = round(AVERAGED / float(np.median([log.positions.period for log in logs])))
-    full, white = _covariances(regressor, fitted, scores, moments, solution, choice.ridge, averaged, seed)
+    full, white, prior_share = _covariances(regressor, fitted, scores, moments, solution, choice.ridge, averaged, seed)
     return Fit(
         base=base,
         choice=choice,
@@ -114,6 +117,7 @@ def fit(base: BaseParameters, logs: Sequence[Prepared], estimator: Estimator, ch
         nominal=np.sum([found.nominal for found in passes], axis=0),
         covariance=full,
         white=white,
+        prior_share=prior_share,
     )
 
 
@@ -185,8 +189,11 @@ def _covariances(
     ridge: float,
     averaged: int,
     seed: int,
-) -> tuple[Array, Array]:
-    """Covariance (b, b) by the noise and by the prior's own scatter; and standard errors (b,) under white noise."""
+) -> tuple[Array, Array, Array | None]:
+    """Covariance (b, b) by the noise and by the prior's own scatter.
+
+    Besides it, standard errors (b,) under white noise, and the share (b,) of the variance that the prior makes.
+    """
     weights = solution.weights
     inverse = moments.inverse(weights, ridge)
     assert moments.pull is not None
@@ -196,7 +203,7 @@ def _covariances(
     textbook = inverse @ np.tensordot(weights**2 * variance, moments.gram, axes=1) @ inverse + scatter
     white = np.sqrt(np.maximum(np.diag(textbook), 0.0))
     if solution.covariance is not None:
-        return solution.covariance, white
+        return solution.covariance, white, None
     parts = _parts(regressor, fitted)
     total = sum(len(some.torque) for some in fitted)
     seen = sum(part.rows for part in parts)
@@ -205,7 +212,8 @@ def _covariances(
     if share < 1:
         factors = batch_factors(scores, inverse, full)
         full = full * factors[:, None] * factors
-    return full + scatter, white
+    total_variance = np.maximum(np.diag(full + scatter), np.finfo(float).tiny)
+    return full + scatter, white, np.clip(np.diag(scatter) / total_variance, 0.0, 1.0)
 
 
 def _parts(regressor: JointRegressor, fitted: Sequence[_Fitted]) -> list[Part]:

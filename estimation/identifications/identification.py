@@ -139,6 +139,7 @@ def identify(
     base, rows = found.base, found.rows
     provenance = {**_provenance(data, chosen, found.choice, joints, seed), "colour": colour}
     provenance["recorded"] = _recorded(found)
+    provenance |= {} if found.prior_share is None else {"prior_share": found.prior_share.tolist()}
     provenance["gravities"] = [list(gravity) for gravity in base.gravities]
     if "standard" in found.solution.extras:
         provenance["standard_parameters"] = np.asarray(found.solution.extras["standard"], dtype=float).tolist()

@@ -8,7 +8,10 @@ from os import PathLike
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from robots.common.files import sha256
+from robots.common.plain import all_finite, finite
 from robots.signals import Log
 
 BAG_FILES = (".db3", ".mcap")
@@ -16,7 +19,10 @@ BAG_FILES = (".db3", ".mcap")
 
 
 def describe_logs(logs: Sequence[Log]) -> list[dict[str, object]]:
-    """Lists name, hash of the file where there is one, number of samples, start and duration [s] of each log."""
+    """Lists name, hash of the file where there is one, number of samples, start and duration [s] of each log.
+
+    A log with temperatures also gives the mean of each joint and of the ambient [degC], null where a sensor was silent.
+    """
     described: list[dict[str, object]] = []
     for log in logs:
         file = log.metadata.get("file")
@@ -27,9 +33,21 @@ def describe_logs(logs: Sequence[Log]) -> list[dict[str, object]]:
                 "samples": len(log),
                 "start": float(log.t[0]),
                 "duration": log.duration,
+                **_temperatures(log),
             }
         )
     return described
+
+
+def _temperatures(log: Log) -> dict[str, object]:
+    """Mean temperatures [degC] of the joints (n,) and of the ambient, as far as the log has them."""
+    found: dict[str, object] = {}
+    for key, values in (("temperature", log.temperature), ("ambient", log.ambient)):
+        if values is not None:
+            known = np.isfinite(values)
+            mean = np.where(known, values, 0.0).sum(axis=0) / np.where(known.any(axis=0), known.sum(axis=0), np.nan)
+            found[key] = all_finite(mean) if values.ndim == 2 else finite(float(mean))
+    return found
 
 
 def log_hash(path: str | PathLike[str]) -> str:

@@ -9,6 +9,7 @@ import typer
 from oed.cli.command import HELP
 from oed.cli.commands.campaign import campaign
 from oed.cli.commands.check import check
+from oed.cli.commands.compare import compare
 from oed.cli.commands.controller import controller
 from oed.cli.commands.design import design
 from oed.cli.commands.diagnose import diagnose
@@ -43,6 +44,7 @@ FUNCTIONS = (
     thermal,
     diagnose,
     predict,
+    compare,
     payload,
     example,
     robot,

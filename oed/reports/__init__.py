@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from oed.reports.pages.campaign_report import campaign_page, save_campaign_report
+from oed.reports.pages.comparisons.comparison_report import comparison_page, save_comparison_report
 from oed.reports.pages.design_report import design_page, save_design_report
 from oed.reports.pages.diagnosis_limits import limits_page, save_limits_report
 from oed.reports.pages.diagnosis_report import diagnosis_page, save_diagnosis_report
@@ -33,6 +34,7 @@ __all__ = [
     "Span",
     "Table",
     "campaign_page",
+    "comparison_page",
     "design_page",
     "diagnosis_page",
     "error_bars_picture",
@@ -49,6 +51,7 @@ __all__ = [
     "residual_picture",
     "retime_page",
     "save_campaign_report",
+    "save_comparison_report",
     "save_design_report",
     "save_diagnosis_report",
     "save_estimate_report",

@@ -7,7 +7,7 @@ COMMANDS = {
     "Experiments": ("design", "pareto", "retime", "campaign", "export"),
     "Robot and virtual robot": ("stream", "record", "controller", "simulate"),
     "Models": ("check", "identify", "thermal", "predict", "payload"),
-    "Diagnosis": ("diagnose", "monitor"),
+    "Diagnosis": ("diagnose", "compare", "monitor"),
 }
 """Commands by purpose; those that are not listed come last."""
 
@@ -76,6 +76,10 @@ EXAMPLES = {
     "thermal": ("oed thermal --robot er3a --log logs --order auto --out thermal",),
     "diagnose": ("oed diagnose --robot er3a --log log.csv --held-out held_out.csv --out diagnosed",),
     "predict": ("oed predict --model model --log other.csv --out predicted.csv",),
+    "compare": (
+        "oed compare monday/model.json friday/model.json --out compared",
+        "oed compare logs/day1.csv logs/day2.csv logs/day3.csv --robot er3a --out compared",
+    ),
     "payload": (
         "oed payload --robot ur10 --log with.csv --without without.csv --to urscript --out payload",
         "oed payload --model model --log with.csv --to franka kuka --out payload",

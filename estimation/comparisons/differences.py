@@ -1,0 +1,155 @@
+"""Differences between runs: of the whole model, of each joint's parts, and of each parameter."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from estimation.comparisons.common_parameters import CommonParameters
+from estimation.comparisons.hypothesis_tests import adjust_holm, agreement_test
+from robots.common.plain import finite
+from robots.terms import Column
+
+Array = NDArray[np.float64]
+Level = Literal["whole", "part", "parameter"]
+
+PARTS = {"rigid_body": "rigid body", "rotor_inertia": "rotor inertia", "torque_offset": "torque offset"}
+FRICTION = "friction"
+LEVELS = 3
+"""Families of tests; each has a third of the family-wise rate."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Difference:
+    """One test of agreement.
+
+    Attributes:
+        level: whole model, one part of a joint, or one parameter.
+        name: what is compared.
+        joint: counted from 1; None for the whole model.
+        run: index of the run that is compared with the first; None for all runs together.
+        statistic: chi-square.
+        dof: its degrees of freedom.
+        p_value: of this test alone.
+        adjusted: p-value that allows for all tests of the comparison.
+        change: difference of a parameter from the first run; NaN otherwise.
+        error: its standard error.
+        percent: change in per cent of the first run's value.
+        unit: of the change.
+    """
+
+    level: Level
+    name: str
+    joint: int | None
+    run: int | None
+    statistic: float
+    dof: int
+    p_value: float
+    adjusted: float = 1.0
+    change: float = np.nan
+    error: float = np.nan
+    percent: float = np.nan
+    unit: str = ""
+
+    def to_dict(self, labels: Sequence[str], alpha: float) -> dict[str, Any]:
+        """Gives plain data."""
+        return {
+            "level": self.level,
+            "name": self.name,
+            "joint": self.joint,
+            "run": None if self.run is None else labels[self.run],
+            "reference": None if self.run is None else labels[0],
+            "chi_square": self.statistic,
+            "dof": self.dof,
+            "p_value": self.p_value,
+            "adjusted_p_value": self.adjusted,
+            "significant": self.adjusted < alpha,
+            "change": finite(self.change),
+            "standard_error": finite(self.error),
+            "percent": finite(self.percent),
+            "unit": self.unit or None,
+        }
+
+
+def part_of(column: Column) -> str:
+    """Names the part of a joint that a parameter belongs to."""
+    return FRICTION if column.friction else PARTS.get(column.term, column.term.replace("_", " "))
+
+
+def parts_of(common: CommonParameters) -> dict[tuple[str, int], list[int]]:
+    """Groups the parameters by part and joint.
+
+    Of a friction curve all coefficients count: together they are determined where one alone is not. Of other parts
+    those that all runs determine.
+    """
+    groups: dict[tuple[str, int], list[int]] = {}
+    for i, column in enumerate(common.columns):
+        groups.setdefault((part_of(column), column.joint), []).append(i)
+    found = {}
+    for (part, joint), members in groups.items():
+        known = [i for i in members if common.determined[i]]
+        if known:
+            found[part, joint] = members if part == FRICTION else known
+    return dict(sorted(found.items(), key=lambda item: (item[0][1], item[0][0])))
+
+
+def find_differences(common: CommonParameters) -> tuple[Difference, ...]:
+    """Tests each run against the first, and more than two runs together.
+
+    Each of the three levels is a family with a third of the family-wise rate (Bonferroni); within a family Holm's
+    method adjusts. The chance of any false alarm is thus at most the rate that adjusted p-values are compared with.
+
+    The covariances hold the scatter of the prior. Runs share the prior, whose pull is alike in all of them: their
+    estimates then differ by less than the covariances say. Tests become conservative by this, never too eager.
+    """
+    families: list[list[Difference]] = [list(_tests(common, level)) for level in ("whole", "part", "parameter")]
+    found: list[Difference] = []
+    for family in families:
+        adjusted = np.minimum(LEVELS * adjust_holm([item.p_value for item in family]), 1.0)
+        found += [replace(item, adjusted=float(p)) for item, p in zip(family, adjusted, strict=True)]
+    return tuple(found)
+
+
+def _tests(common: CommonParameters, level: Level) -> Iterator[Difference]:
+    parts, count = parts_of(common), len(common.values)
+    runs: list[int | None] = [*range(1, count), *([None] if count > 2 else [])]
+    items: list[tuple[str, int | None, list[int]]]
+    if level == "whole":
+        items = [("whole model", None, sorted(i for members in parts.values() for i in members))]
+    elif level == "part":
+        items = [(f"{part} of joint {joint}", joint, members) for (part, joint), members in parts.items()]
+    else:
+        items = [(c.name, c.joint, [i]) for i, c in enumerate(common.columns) if common.determined[i]]
+    for name, joint, members in items:
+        if not members:
+            continue
+        for run in runs:
+            chosen = [0, run] if run is not None else list(range(count))
+            at = np.ix_(chosen, members)
+            test = agreement_test(common.values[at], common.covariances[chosen][:, members][:, :, members])
+            single: dict[str, Any] = {}
+            if level == "parameter" and run is not None:
+                i = members[0]
+                change = float(common.values[run, i] - common.values[0, i])
+                base = abs(float(common.values[0, i]))
+                variance = common.covariances[run, i, i] + common.covariances[0, i, i]
+                single = {
+                    "change": change,
+                    "error": float(np.sqrt(variance)),
+                    "percent": 100 * change / base if base else np.nan,
+                    "unit": common.columns[i].unit,
+                }
+            yield Difference(
+                level=level,
+                name=name,
+                joint=joint,
+                run=run,
+                statistic=test.statistic,
+                dof=test.dof,
+                p_value=test.p_value,
+                **single,
+            )

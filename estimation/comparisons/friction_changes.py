@@ -1,0 +1,202 @@
+"""Changes of friction split into what all joints share, as by heat, and what one joint has alone, as by damage."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.stats import norm
+
+from estimation.comparisons.common_parameters import CommonParameters
+from estimation.comparisons.friction_curves import FrictionCurves
+from robots.common.plain import finite
+
+Array = NDArray[np.float64]
+Kind = Literal["unchanged", "common", "own", "unequal", "changed"]
+
+# Joints warm unequally: their relative changes scatter about the common one by this share of it (one sigma).
+HEAT_SCATTER = 0.3
+# A split needs a majority of joints that share a change.
+FEWEST_JOINTS = 3
+ROUNDS = 20
+
+
+@dataclass(frozen=True, kw_only=True)
+class FrictionChange:
+    """Change of one joint's friction between two runs, mean over the speeds.
+
+    Attributes:
+        joint: counted from 1.
+        run: index of the run that is compared with the first.
+        total: log of the ratio of mean frictions.
+        total_error: its standard error.
+        common: log ratio that the other joints share; NaN where they cannot tell.
+        own: what this joint has beyond it.
+        own_error: standard error of `own` by the noise.
+        own_scatter: the same with the scatter that unequal heating makes.
+        kind: unchanged; common to all joints; own; unequal: beyond the noise, but not beyond unequal heating; changed:
+            too few joints to tell.
+    """
+
+    joint: int
+    run: int
+    total: float
+    total_error: float
+    common: float
+    own: float
+    own_error: float
+    own_scatter: float
+    kind: Kind
+
+    def sentence(self) -> str:
+        """Says how much changed, how much of it all joints share, and how much this joint has alone."""
+        head = f"Joint {self.joint}: friction {percent_of(self.total)} ({interval_of(self.total, self.total_error)})"
+        if self.kind == "unchanged":
+            return f"{head}, not significant."
+        if self.kind == "changed":
+            return f"{head}, significant; too few joints to separate heat from damage."
+        common = f"{percent_of(self.common)} common to all joints"
+        own = f"{percent_of(self.own)} ({interval_of(self.own, self.own_scatter)}) of this joint alone"
+        if self.kind == "own":
+            return f"{head}: {common}, {own}, significant: inspect this joint."
+        if self.kind == "unequal":
+            return f"{head}: {common}, {own}, which unequal heating may explain: compare runs of one temperature."
+        return f"{head}: {common}, {own}, not significant."
+
+    def to_dict(self, labels: Sequence[str]) -> dict[str, Any]:
+        """Gives plain data; changes in per cent."""
+
+        def shown(value: float, error: float) -> dict[str, Any]:
+            return {
+                "percent": finite(_percent(value)),
+                "ci95": [finite(_percent(value + sign * 1.96 * error)) for sign in (-1, 1)],
+            }
+
+        return {
+            "joint": self.joint,
+            "run": labels[self.run],
+            "reference": labels[0],
+            "kind": self.kind,
+            "total": shown(self.total, self.total_error),
+            "common": finite(_percent(self.common)),
+            "own": shown(self.own, self.own_scatter),
+            "sentence": self.sentence(),
+        }
+
+
+def friction_changes(
+    common: CommonParameters, curves: Sequence[FrictionCurves], alpha: float
+) -> tuple[FrictionChange, ...]:
+    """Splits the friction change of each run against the first.
+
+    The relative change of a joint is the log ratio of its mean friction over the common speeds; its covariance follows
+    from those of both runs (delta method), with correlations between joints. Joints whose change departs from that of
+    the others are set aside one by one; a majority remains and gives the common change.
+
+    Args:
+        common: parameters in one basis.
+        curves: friction of the joints.
+        alpha: family-wise false-alarm rate over all joints and runs.
+    """
+    rows = np.array([curve.mean_row for curve in curves]).reshape(len(curves), -1)
+    found: list[FrictionChange] = []
+    tests = max(1, len(curves) * (len(common.values) - 1))
+    limit = float(norm.isf(alpha / tests / 2))
+    first, slope = _log_level(rows, common.values[0])
+    for run in range(1, len(common.values)):
+        last, other = _log_level(rows, common.values[run])
+        used = np.flatnonzero(np.isfinite(first + last))
+        if not len(used):
+            continue
+        covariance = slope[used] @ common.covariances[0] @ slope[used].T
+        covariance = covariance + other[used] @ common.covariances[run] @ other[used].T
+        joints = [curves[i].joint for i in used.tolist()]
+        found += _split((last - first)[used], covariance, joints, run, limit)
+    return tuple(found)
+
+
+def _log_level(rows: Array, values: Array) -> tuple[Array, Array]:
+    """Logs of mean frictions (j,), NaN where one is not positive, and their gradients (j, b)."""
+    level = rows @ values
+    good = level > 0
+    safe = np.where(good, level, 1.0)
+    return np.where(good, np.log(safe), np.nan), rows / safe[:, None]
+
+
+def _split(change: Array, S: Array, joints: Sequence[int], run: int, limit: float) -> list[FrictionChange]:
+    n, aside = len(change), [False] * len(change)
+    for _ in range((n - 1) // 2 if n >= FEWEST_JOINTS else 0):
+        rest = [j for j in range(n) if not aside[j]]
+        z = np.zeros(n)
+        for j in rest:
+            own, noise, scatter, _ = _against(change, S, j, [i for i in rest if i != j])
+            # A joint that departs pulls the common change of the others along: they depart by less than it does.
+            z[j] = abs(own) / noise if abs(own) > limit * scatter else 0.0
+        worst = int(np.argmax(z))
+        if z[worst] == 0:
+            break
+        aside[worst] = True
+    found = []
+    for j in range(n):
+        error = float(np.sqrt(S[j, j]))
+        significant = abs(change[j]) > limit * error
+        shared, own, noise, scatter = np.nan, np.nan, np.nan, np.nan
+        kind: Kind = "changed" if significant else "unchanged"
+        if n >= FEWEST_JOINTS:
+            own, noise, scatter, shared = _against(change, S, j, [i for i in range(n) if i != j and not aside[i]])
+            if abs(own) > limit * scatter:
+                kind = "own"
+            elif significant:
+                kind = "unequal" if abs(own) > limit * noise else "common"
+        found.append(
+            FrictionChange(
+                joint=joints[j],
+                run=run,
+                total=float(change[j]),
+                total_error=error,
+                common=shared,
+                own=own,
+                own_error=noise,
+                own_scatter=scatter,
+                kind=kind,
+            )
+        )
+    return found
+
+
+def _against(change: Array, S: Array, j: int, rest: Sequence[int]) -> tuple[float, float, float, float]:
+    """What a joint has beyond the others: own change, its error by noise, the same with unequal heating, the common."""
+    among = list(rest)
+    shared = float(np.median(change[among]))
+    weights = np.full(len(among), 1 / len(among))
+    for _ in range(ROUNDS):
+        V = S[np.ix_(among, among)] + (HEAT_SCATTER * shared) ** 2 * np.eye(len(among))
+        solved = np.linalg.solve(V, np.ones(len(among)))
+        weights, before = solved / solved.sum(), shared
+        shared = float(weights @ change[among])
+        if abs(shared - before) < 1e-9:
+            break
+    row = np.zeros(len(change))
+    row[j], row[among] = 1.0, -weights
+    noise = float(row @ S @ row)
+    heat = (HEAT_SCATTER * shared) ** 2 * (1 + float(weights @ weights))
+    own = float(change[j] - shared)
+    return own, float(np.sqrt(max(noise, np.finfo(float).tiny))), float(np.sqrt(max(noise + heat, 1e-300))), shared
+
+
+def percent_of(log_ratio: float) -> str:
+    """Writes a log ratio as a signed percentage, such as ``+12.3 %``."""
+    return "unknown" if not np.isfinite(log_ratio) else f"{_percent(log_ratio):+.1f} %"
+
+
+def interval_of(log_ratio: float, error: float) -> str:
+    """Writes the 95 % interval of a log ratio in per cent, such as ``10.2 to 14.4 %``."""
+    low, high = (_percent(log_ratio + sign * 1.96 * error) for sign in (-1, 1))
+    return f"{low:+.1f} to {high:+.1f} %"
+
+
+def _percent(log_ratio: float) -> float:
+    return float(100 * np.expm1(min(log_ratio, 50.0)))

@@ -1,0 +1,263 @@
+"""Result of a comparison: differences, friction changes, drift, and the merged model."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from estimation.comparisons.common_parameters import CommonParameters
+from estimation.comparisons.differences import Difference
+from estimation.comparisons.drift import Drift
+from estimation.comparisons.friction_changes import FrictionChange, interval_of, percent_of
+from estimation.comparisons.friction_curves import FrictionCurves
+from estimation.comparisons.merging import MergedModel
+from estimation.comparisons.runs import Run
+from robots.common.files import write_atomic
+from robots.common.plain import all_finite
+
+if TYPE_CHECKING:
+    import pandas as pd
+    from matplotlib.axes import Axes
+
+Array = NDArray[np.float64]
+
+COMPARISON, MODEL = "compare.json", "model.json"
+FORMAT, FORMAT_VERSION = "robot-oed comparison", 1
+# Parts and parameters that the summary lists of each run.
+LISTED = 8
+
+
+@dataclass(frozen=True, kw_only=True)
+class ModelComparison:
+    """Runs against each other.
+
+    Attributes:
+        runs: in order; the first is the baseline.
+        order: what the order is by: date, clock of the logs, or as given.
+        hours: of each run since the first (k,); None without a common clock.
+        alpha: chance of any false alarm among all tests.
+        common: parameters of all runs in one basis.
+        differences: tests, each run against the first and all together.
+        curves: friction of the joints.
+        friction: change of each joint's friction, split into common and own.
+        drifts: course of each quantity; empty for fewer than four runs.
+        merged: the merged estimate.
+        warnings: limitations.
+    """
+
+    runs: tuple[Run, ...]
+    order: str
+    hours: Array | None
+    alpha: float
+    common: CommonParameters
+    differences: tuple[Difference, ...]
+    curves: tuple[FrictionCurves, ...]
+    friction: tuple[FrictionChange, ...]
+    drifts: tuple[Drift, ...]
+    merged: MergedModel
+    warnings: tuple[str, ...]
+
+    def __repr__(self) -> str:
+        return f"ModelComparison({len(self.runs)} runs of {self.robot_name!r}, {len(self.significant)} significant)"
+
+    @property
+    def robot_name(self) -> str:
+        """Name of the first model's robot."""
+        return self.runs[0].model.robot.name
+
+    @property
+    def labels(self) -> tuple[str, ...]:
+        """Labels of the runs (k,)."""
+        return tuple(run.label for run in self.runs)
+
+    @property
+    def significant(self) -> tuple[Difference, ...]:
+        """Differences that are real at the stated rate of false alarms."""
+        return tuple(item for item in self.differences if item.adjusted < self.alpha)
+
+    @property
+    def damaged(self) -> tuple[FrictionChange, ...]:
+        """Changes of friction that one joint has alone."""
+        return tuple(item for item in self.friction if item.kind == "own")
+
+    def of_run(self, run: int | None, level: str) -> tuple[Difference, ...]:
+        """Gives the tests of one level of one run against the first, or of all runs together (None)."""
+        return tuple(item for item in self.differences if item.run == run and item.level == level)
+
+    def verdict(self) -> str:
+        """Says in one or two sentences what differs."""
+        if not self.significant:
+            text = "No difference is significant: the runs agree within their errors."
+        else:
+            parts = {item.name for item in self.significant if item.level == "part"}
+            text = (
+                f"The runs differ significantly in {len(parts)} parts: {_listed(sorted(parts))}."
+                if parts
+                else "The runs differ significantly, but no single part of a joint does."
+            )
+        joints = sorted({item.joint for item in self.damaged})
+        if joints:
+            text += f" Friction changed on joint {_listed([str(j) for j in joints])} alone: inspect it."
+        shared = self.shared_change(len(self.runs) - 1)
+        if shared is not None:
+            mean, error = shared
+            warmer = "fell: the robot was warmer" if mean < 0 else "rose: the robot was colder"
+            text += (
+                f" In {self.labels[-1]} friction common to all joints {warmer} "
+                f"({percent_of(mean)}, {interval_of(mean, error)})."
+            )
+        return text
+
+    def shared_change(self, run: int) -> tuple[float, float] | None:
+        """Log ratio of the friction that joints share in a run, with its error; None where no joint changed so."""
+        items = [item for item in self.friction if item.run == run and item.kind in ("common", "unequal")]
+        others = [item for item in self.friction if item.run == run and item.kind == "unchanged"]
+        if len(items) <= len(others) or not items:
+            return None
+        values = np.array([item.total for item in items])
+        scatter = float(values.std(ddof=1)) if len(values) > 1 else items[0].total_error
+        return float(values.mean()), scatter / np.sqrt(len(values))
+
+    def summary(self) -> str:
+        """Lists runs, differences, friction changes and drift."""
+        return "\n".join(self._lines())
+
+    def _lines(self) -> Iterator[str]:
+        yield f"{self.robot_name}: {len(self.runs)} runs, order: {self.order}; baseline {self.labels[0]}"
+        for run in self.runs:
+            warm = "" if run.temperature is None else f"  joints {np.nanmean(run.temperature):.1f} degC"
+            yield f"  {run.label:24} {run.date_text}{warm}".rstrip()
+        yield self.verdict()
+        yield f"  family-wise false-alarm rate {100 * self.alpha:g} % (Holm)"
+        yield "  run                      chi-square    dof   adjusted p   parts that differ"
+        for run in (*range(1, len(self.runs)), *([None] if len(self.runs) > 2 else [])):
+            (whole, *_) = self.of_run(run, "whole") or (None,)
+            if whole is None:
+                continue
+            parts = [item.name for item in self.of_run(run, "part") if item.adjusted < self.alpha]
+            label = "all together" if run is None else self.labels[run]
+            yield (
+                f"  {label[:24]:24} {whole.statistic:10.1f} {whole.dof:6d} {whole.adjusted:12.2g}   "
+                f"{_listed(parts) if parts else 'none'}"
+            )
+        last = len(self.runs) - 1
+        yield f"  friction, {self.labels[last]} against {self.labels[0]}:"
+        for change in self.friction:
+            if change.run == last:
+                yield f"    {change.sentence()}"
+        yield from self._parameter_lines(last)
+        yield from self._drift_lines()
+        yield from (f"  {warning}" for warning in self.warnings)
+
+    def _parameter_lines(self, run: int) -> Iterator[str]:
+        found = sorted(
+            (item for item in self.of_run(run, "parameter") if item.adjusted < self.alpha), key=lambda i: -i.statistic
+        )
+        if found:
+            yield f"  parameters that differ, {self.labels[run]} against {self.labels[0]}:"
+        for item in found[:LISTED]:
+            yield (
+                f"    {item.name:12} {item.change:+11.4g} ± {item.error:<9.2g} {item.unit:12} "
+                f"{item.percent:+8.2f} %   adjusted p {item.adjusted:.2g}"
+            )
+        if len(found) > LISTED:
+            yield f"    and {len(found) - LISTED} more"
+
+    def _drift_lines(self) -> Iterator[str]:
+        if not self.drifts:
+            return
+        moving = [item for item in self.drifts if item.adjusted < self.alpha]
+        per = "hour" if self.hours is not None else "run"
+        yield f"  drift: {len(moving)} of {len(self.drifts)} quantities have a significant trend"
+        for item in moving[:LISTED]:
+            settled = "not settled" if item.settled is None else f"settled from {self.labels[item.settled]}"
+            yield (
+                f"    {item.name:32} {item.slope:+.3g} ± {item.slope_error:.2g} {item.unit} per {per}; {settled}; "
+                f"first {item.percent:+.1f} % off the last"
+            )
+
+    def to_frame(self) -> pd.DataFrame:
+        """Gives a row per test."""
+        import pandas as pd
+
+        return pd.DataFrame([item.to_dict(self.labels, self.alpha) for item in self.differences])
+
+    def to_dict(self) -> dict[str, Any]:
+        """Gives the whole comparison as plain data."""
+        labels = self.labels
+        return {
+            "format": FORMAT,
+            "format_version": FORMAT_VERSION,
+            "robot": self.robot_name,
+            "verdict": self.verdict(),
+            "alpha": self.alpha,
+            "correction": "Holm within each of three families, Bonferroni between them",
+            "order": self.order,
+            "hours": None if self.hours is None else self.hours.tolist(),
+            "runs": [run.to_dict() for run in self.runs],
+            "differences": [item.to_dict(labels, self.alpha) for item in self.differences],
+            "friction": [item.to_dict(labels) for item in self.friction],
+            "friction_curves": [
+                {
+                    "joint": curve.joint,
+                    "speed": curve.speed.tolist(),
+                    "runs": [
+                        {
+                            "run": label,
+                            "torque": curve.torque[k].tolist(),
+                            "standard_error": curve.error[k].tolist(),
+                            "difference": curve.difference[k].tolist(),
+                            "difference_standard_error": all_finite(curve.difference_error[k]),
+                            "simultaneous_factor95": all_finite(curve.simultaneous[k : k + 1])[0],
+                        }
+                        for k, label in enumerate(labels)
+                    ],
+                }
+                for curve in self.curves
+            ],
+            "drift": [item.to_dict(labels, self.alpha) for item in self.drifts],
+            "merged": {
+                "model": MODEL,
+                "scatter_between_runs": dict(
+                    zip((column.name for column in self.common.columns), self.merged.scatter.tolist(), strict=True)
+                ),
+            },
+            "warnings": list(self.warnings),
+        }
+
+    def plot(self, ax: Axes | None = None) -> Axes:
+        """Draws each run's friction at 0.6 of the largest speed, relative to the first run."""
+        from matplotlib.figure import Figure
+
+        axes = ax if ax is not None else Figure(figsize=(7, 4)).subplots()
+        x = np.arange(len(self.runs)) if self.hours is None else self.hours
+        for curve in self.curves:
+            base = abs(curve.level[0]) or 1.0
+            axes.errorbar(
+                x, 100 * (curve.level / base - 1), 196 * curve.level_error / base, label=f"joint {curve.joint}"
+            )
+        axes.set_xlabel("run" if self.hours is None else "time [h]")
+        axes.set_ylabel("change of friction [%]")
+        axes.legend()
+        return axes
+
+    def save(self, folder: str | Path, *, force: bool = False) -> None:
+        """Writes `compare.json` and the merged `model.json` into a folder that is there.
+
+        Raises:
+            InputError: a file is there, and force is not given.
+        """
+        text = json.dumps(self.to_dict(), indent=2, allow_nan=False) + "\n"
+        write_atomic(Path(folder) / COMPARISON, text, force=force)
+        self.merged.model.save(Path(folder) / MODEL, force=force)
+
+
+def _listed(names: list[str], most: int = 6) -> str:
+    shown = ", ".join(names[:most])
+    return shown if len(names) <= most else f"{shown} and {len(names) - most} more"

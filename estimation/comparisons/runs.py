@@ -1,0 +1,193 @@
+"""Runs: identified models with what tells them apart, such as file, date and temperature."""
+
+from __future__ import annotations
+
+import json
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from estimation.models.model import Model, load_model
+from robots.common.errors import InputError
+from robots.common.plain import all_finite, finite, number
+
+Array = NDArray[np.float64]
+
+# Times from here on [s] are counted from 1970: the year 2000.
+ABSOLUTE = 946_684_800.0
+_DATE = re.compile(r"(?<!\d)(20\d\d)[-_.]?([01]\d)[-_.]?([0-3]\d)(?:[T_ -]?([0-2]\d)[-:_h]?([0-5]\d))?(?!\d)")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Run:
+    """One identified model among those compared.
+
+    Attributes:
+        label: its name in tables and pictures.
+        model: parameters and covariance.
+        date: seconds since 1970 at which its first log began; None where neither logs nor names state it.
+        start: time of the first sample on the log's own clock [s]; None where the model does not state it.
+        temperature: mean of each joint (n,) [degC], NaN where unknown; None without any.
+        ambient: mean ambient temperature [degC], NaN where unknown.
+        file: where the model or log was read from.
+    """
+
+    label: str
+    model: Model
+    date: float | None = None
+    start: float | None = None
+    temperature: Array | None = None
+    ambient: float = np.nan
+    file: str = ""
+
+    @property
+    def date_text(self) -> str:
+        """The date as text, empty where it is unknown."""
+        return "" if self.date is None else f"{datetime.fromtimestamp(self.date, UTC):%Y-%m-%d %H:%M}"
+
+    def to_dict(self) -> dict[str, Any]:
+        """Gives label, file, date and temperatures as plain data."""
+        return {
+            "label": self.label,
+            "file": self.file,
+            "date": self.date_text or None,
+            "start": self.start,
+            "temperature": None if self.temperature is None else all_finite(self.temperature),
+            "ambient": finite(self.ambient),
+            "logs": [log.get("name") for log in self.model.provenance.get("logs", ())],
+        }
+
+
+def run_of(model: Model, label: str, file: str | Path = "") -> Run:
+    """Makes a run of a model, with date and temperatures as far as its logs or its name state them.
+
+    Args:
+        model: the model.
+        label: its name.
+        file: where it comes from; a date in the name of the file or its folder counts.
+    """
+    logs: Sequence[Mapping[str, Any]] = model.provenance.get("logs", ())
+    start = float(logs[0]["start"]) if logs and logs[0].get("start") is not None else None
+    names = [*reversed(Path(file).parts[-2:]), label, *(str(log.get("name", "")) for log in logs[:1])]
+    date = start if start is not None and start >= ABSOLUTE else _date_in(names)
+    n, weights = model.robot.n, np.array([float(log.get("samples", 1)) for log in logs])
+    rows = [
+        [number(value, np.nan) for value in log["temperature"]] if log.get("temperature") else [np.nan] * n
+        for log in logs
+    ]
+    temperature = _mean(np.array(rows, dtype=float), weights) if any(log.get("temperature") for log in logs) else None
+    outside = np.array([[number(log.get("ambient"), np.nan)] for log in logs], dtype=float)
+    return Run(
+        label=label,
+        model=model,
+        date=date,
+        start=start,
+        temperature=temperature,
+        ambient=float(_mean(outside, weights)[0]) if logs else np.nan,
+        file=str(file),
+    )
+
+
+def read_model_runs(paths: Sequence[str | Path]) -> list[Run]:
+    """Reads model files, each a run, labelled by what tells their paths apart.
+
+    Args:
+        paths: of ``model.json`` files, or their folders.
+
+    Raises:
+        InputError: a missing file, one that is no model, or a model without covariance.
+    """
+    models = []
+    for path in paths:
+        file = Path(path) / "model.json" if Path(path).is_dir() else Path(path)
+        _require_covariance(file)
+        models.append((load_model(file), file))
+    labels = distinct_labels([file for _, file in models])
+    return [run_of(model, label, file) for (model, file), label in zip(models, labels, strict=True)]
+
+
+def distinct_labels(files: Sequence[Path]) -> list[str]:
+    """Shortens paths to what tells them apart: the folder's name for ``model.json``, the file's name otherwise."""
+    stems = [file.parent if file.stem == "model" and file.parent.name else file.with_suffix("") for file in files]
+    parts = [list(stem.resolve().parts) for stem in stems]
+    labels: list[str] = []
+    for own in parts:
+        candidates = ["/".join(own[-length:]) for length in range(1, len(own))]
+        alone = [c for i, c in enumerate(candidates, start=1) if sum("/".join(o[-i:]) == c for o in parts) == 1]
+        # A file that is given twice has no label of its own.
+        labels.append(alone[0] if alone else own[-1])
+    return unique_labels(labels)
+
+
+def unique_labels(labels: Sequence[str]) -> list[str]:
+    """Numbers labels that occur more than once."""
+    found: list[str] = []
+    for label in labels:
+        number_, name = 2, label
+        while name in found:
+            name, number_ = f"{label} ({number_})", number_ + 1
+        found.append(name)
+    return found
+
+
+def in_time_order(runs: Sequence[Run]) -> tuple[list[Run], Array | None, str]:
+    """Puts runs in order of time.
+
+    Returns:
+        The runs, hours (k,) since the first (None where no common clock is known), and what the order is by.
+    """
+    dates = [run.date for run in runs]
+    if all(date is not None for date in dates) and len(set(dates)) == len(dates):
+        order = np.argsort(np.array(dates, dtype=float), kind="stable")
+        known = np.array(dates, dtype=float)[order]
+        return [runs[i] for i in order], (known - known[0]) / 3600, "date"
+    starts = np.array([np.nan if run.start is None else run.start for run in runs])
+    if len(runs) > 1 and np.all(np.diff(starts) > 0):
+        # Logs that all begin at zero have clocks of their own.
+        return list(runs), (starts - starts[0]) / 3600, "clock of the logs"
+    return list(runs), None, "as given"
+
+
+def relabelled(runs: Sequence[Run]) -> list[Run]:
+    """Gives runs whose labels are unique."""
+    labels = unique_labels([run.label for run in runs])
+    return [run if run.label == label else replace(run, label=label) for run, label in zip(runs, labels, strict=True)]
+
+
+def _require_covariance(file: Path) -> None:
+    try:
+        data = json.loads(file.read_text(encoding="utf-8"))
+    except (OSError, ValueError):
+        return  # `load_model` says what is wrong with it
+    if isinstance(data, dict) and "parameters" in data and data.get("covariance") is None:
+        raise InputError(
+            "the model has no covariance, so its differences from others cannot be tested",
+            file=file,
+            remedy="identify the robot again with oed identify",
+        )
+
+
+def _date_in(names: Sequence[str]) -> float | None:
+    for name in names:
+        for found in _DATE.finditer(name):
+            year, month, day, hour, minute = (int(part or 0) for part in found.groups())
+            try:
+                return datetime(year, month, day, hour, minute, tzinfo=UTC).timestamp()
+            except ValueError:
+                continue
+    return None
+
+
+def _mean(rows: Array, weights: Array) -> Array:
+    """Weighted mean of each column (c,), NaN without any known value."""
+    known = np.isfinite(rows) * weights[:, None]
+    total = known.sum(axis=0)
+    return np.asarray(
+        np.where(total > 0, (np.nan_to_num(rows) * known).sum(axis=0), np.nan) / np.where(total > 0, total, 1)
+    )

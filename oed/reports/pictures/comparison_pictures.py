@@ -1,0 +1,168 @@
+"""Pictures of a comparison: parameters over runs, friction curves of all runs, and differences in per cent."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from oed.reports.rendering.joint_units import joint_titles, joint_units
+from oed.reports.rendering.palette import joint_role, sequence_role
+from oed.reports.rendering.picture import Line, Panel, Picture, Series
+from oed.reports.rendering.significant import NORMAL_95
+from robots.signals import FloatArray
+
+
+def course_picture(
+    names: Sequence[str],
+    units: Sequence[str],
+    values: ArrayLike,
+    errors: ArrayLike,
+    *,
+    x: ArrayLike,
+    x_label: str,
+    labels: Sequence[str],
+    title: str,
+    name: str,
+    caption: str = "",
+) -> Picture:
+    """Shows quantities over the runs, a panel each, with 95 % intervals (thesis Figs. 38, 40 and 42).
+
+    Args:
+        names: of the quantities (p,).
+        units: of the quantities (p,).
+        values: (p, k).
+        errors: standard errors (p, k).
+        x: hours or numbers of the runs (k,).
+        x_label: what x is.
+        labels: of the runs (k,).
+        title: of the picture.
+        name: the stem of the file name.
+        caption: how to read it.
+    """
+    table, spread = np.asarray(values, dtype=float), np.asarray(errors, dtype=float)
+    panels = tuple(
+        Panel(
+            title=names[i],
+            x_label=x_label,
+            y_label=f"[{units[i]}]",
+            series=(
+                Series(
+                    x=np.asarray(x, dtype=float),
+                    y=table[i],
+                    error=NORMAL_95 * spread[i],
+                    kind="markers",
+                    texts=tuple(labels),
+                ),
+            ),
+        )
+        for i in range(len(names))
+    )
+    return Picture(title=title, name=name, panels=panels, columns=3, panel_height=180, caption=caption)
+
+
+def friction_runs_picture(
+    speeds: Sequence[FloatArray],
+    torques: Sequence[FloatArray],
+    errors: Sequence[FloatArray],
+    *,
+    joints: Sequence[int],
+    labels: Sequence[str],
+    kinds: Sequence[str],
+    joint_names: Sequence[str],
+    name: str = "friction_runs",
+) -> Picture:
+    """Shows the friction curves of some runs, with 95 % pointwise bands (thesis Fig. 8, cold and warm).
+
+    Args:
+        speeds: of each joint (m,) [rad/s or m/s].
+        torques: of each joint (k, m) [N m or N].
+        errors: standard errors, alike.
+        joints: numbers of the joints, from 1.
+        labels: of the runs (k,).
+        kinds: "revolute" or "prismatic" of all joints (n,).
+        joint_names: of all joints (n,).
+        name: the stem of the file name.
+    """
+    titles, units = joint_titles(joint_names, len(joint_names)), joint_units(kinds, len(kinds))
+    panels = []
+    for speed, torque, error, joint in zip(speeds, torques, errors, joints, strict=True):
+        panels.append(
+            Panel(
+                title=titles[joint - 1],
+                x_label=f"velocity [{units[joint - 1].velocity}]",
+                y_label=f"[{units[joint - 1].torque}]",
+                series=tuple(
+                    Series(x=speed, y=torque[k], error=NORMAL_95 * error[k], name=label, role=sequence_role(k))
+                    for k, label in enumerate(labels)
+                ),
+            )
+        )
+    return Picture(
+        title="Friction of the runs",
+        name=name,
+        panels=tuple(panels),
+        columns=min(3, len(panels)),
+        panel_height=210,
+        caption="The shaded bands are 95 % intervals at each speed.",
+    )
+
+
+def friction_difference_picture(
+    speeds: Sequence[FloatArray],
+    percents: Sequence[FloatArray],
+    pointwise: Sequence[FloatArray],
+    simultaneous: Sequence[FloatArray],
+    *,
+    joints: Sequence[int],
+    kinds: Sequence[str],
+    joint_names: Sequence[str],
+    name: str = "friction_difference",
+) -> Picture:
+    """Shows the change of each friction curve in per cent, with pointwise and simultaneous 95 % bands.
+
+    Args:
+        speeds: of each joint (m,).
+        percents: change (m,) [%].
+        pointwise: half widths (m,) [%].
+        simultaneous: half widths (m,) [%] of the band that holds the whole curve.
+        joints: numbers of the joints, from 1.
+        kinds: of all joints (n,).
+        joint_names: of all joints (n,).
+        name: the stem of the file name.
+    """
+    titles, units = joint_titles(joint_names, len(joint_names)), joint_units(kinds, len(kinds))
+    panels = []
+    for speed, percent, narrow, wide, joint in zip(speeds, percents, pointwise, simultaneous, joints, strict=True):
+        role = joint_role(joint)
+        edges = [
+            Series(
+                x=speed,
+                y=percent + sign * wide,
+                name="simultaneous 95 % band",
+                role="neutral",
+                dash="dot",
+            )
+            for sign in (-1, 1)
+        ]
+        panels.append(
+            Panel(
+                title=titles[joint - 1],
+                x_label=f"velocity [{units[joint - 1].velocity}]",
+                y_label="change [%]",
+                series=(Series(x=speed, y=percent, error=narrow, role=role), *edges),
+                lines=(Line(value=0.0, role="neutral", dash="solid"),),
+            )
+        )
+    return Picture(
+        title="Change of friction",
+        name=name,
+        panels=tuple(panels),
+        columns=min(3, len(panels)),
+        panel_height=210,
+        caption=(
+            "Shaded: 95 % interval at each speed. Dotted: band that holds the whole curve in 95 %. A curve differs "
+            "where zero lies outside the dotted band."
+        ),
+    )
