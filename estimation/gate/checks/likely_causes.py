@@ -215,7 +215,7 @@ def _finding(context: Context, cause: _Cause, better: float, error: float) -> Fi
             severity=severity,  # type: ignore[arg-type]
             text="the base seems to be mounted otherwise than described: errors are "
             f"{smaller:.3g} % smaller with gravity along ({values}) m/s2 in the base frame",
-            action=f"state it with --gravity K={values}, K the number of the log from 1",
+            action=f"state it with --gravity K={values} (K: the number of the log, from 1)",
             value=smaller,
             unit="%",
         )

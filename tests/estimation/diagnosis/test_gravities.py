@@ -150,7 +150,7 @@ def test_a_tilt_that_was_not_told_is_not_taken_for_nothing(upright: Robot, build
     unstated = [logs[0], replace(logs[1], gravity=None)]
     with pytest.raises(InputError, match="--gravity") as refused:
         diagnose(upright, unstated, candidates=SOME, friction=SIMPLE)
-    stated = [float(v) for v in re.search(r"--gravity K=([-.0-9,]+),", str(refused.value))[1].split(",")]
+    stated = [float(v) for v in re.search(r"--gravity K=([-.0-9,]+) ", str(refused.value))[1].split(",")]
     # The arm's own parameters are 20 % off, so the direction is known to some degrees.
     assert stated == pytest.approx(TILTED, abs=0.7)
     untold = diagnose(upright, unstated, candidates=SOME, friction=SIMPLE, check=False)
