@@ -15,7 +15,7 @@ from oed.criteria import CRITERIA
 from oed.experiments.quality import Quality, design_model
 from oed.experiments.results.design_file import DESIGN, TRAJECTORY
 from oed.experiments.results.views import motion_frame, plot_velocities
-from oed.experiments.safety_checks.margins import margin_data, measured_margins
+from oed.experiments.safety_checks.margins import margin_data, margin_from, measured_margins
 from oed.exports import read_trajectory, write_trajectory
 from oed.retiming import Retimed
 from robots.base_parameters import BaseParameters, find_base_parameters
@@ -220,10 +220,7 @@ class RetimedExperiment:
                 ),
                 torque_before=TorqueUse.from_dict(retiming["torque_before"]),
                 torque_after=TorqueUse.from_dict(retiming["torque_after"]),
-                margins=tuple(
-                    Margin(**{**margin, "limit": np.inf if margin["limit"] is None else margin["limit"]})
-                    for margin in data["smallest_margins"]
-                ),
+                margins=tuple(margin_from(margin) for margin in data["smallest_margins"]),
                 settings=data["settings"],
             )
         except (OSError, UnicodeDecodeError, json.JSONDecodeError, KeyError, TypeError, ValueError) as error:
