@@ -27,7 +27,8 @@ from scipy.stats import kstest
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
 
-from estimation import compare, fit_campaign, identify, identify_runs
+from estimation import compare, fit_campaign, identify
+from estimation.comparisons import identify_runs
 from estimation.comparisons import ModelComparison
 from estimation.preprocessing import resample, smooth
 from estimation.thermal import start_temperatures

@@ -28,7 +28,6 @@ _EXPORTS = {
     "identify": "estimation.identifications.identification",
     "identify_drive_gains": "estimation.identifications.drive_gains",
     "identify_payload": "estimation.payloads",
-    "identify_runs": "estimation.comparisons",
     "load_model": "estimation.models.model",
     "load_payload": "estimation.payloads",
     "on_one_clock": "estimation.logs.clocks",
