@@ -28,8 +28,7 @@ from scipy.stats import kstest
 sys.path.insert(0, str(Path(__file__).parents[1]))
 
 from estimation import compare, fit_campaign, identify
-from estimation.comparisons import identify_runs
-from estimation.comparisons import ModelComparison
+from estimation.comparisons import ModelComparison, identify_runs
 from estimation.preprocessing import resample, smooth
 from estimation.thermal import start_temperatures
 from robots import load_robot
