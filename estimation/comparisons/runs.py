@@ -1,4 +1,4 @@
-"""Runs: identified models with what tells them apart, such as file, date and temperature."""
+"""Runs: identified models with what distinguishes them, such as file, date and temperature."""
 
 from __future__ import annotations
 
@@ -95,7 +95,7 @@ def run_of(model: Model, label: str, file: str | Path = "") -> Run:
 
 
 def read_model_runs(paths: Sequence[str | Path]) -> list[Run]:
-    """Reads model files, each a run, labelled by what tells their paths apart.
+    """Reads model files, each a run, labelled by what distinguishes their paths.
 
     Args:
         paths: of ``model.json`` files, or their folders.
@@ -113,7 +113,7 @@ def read_model_runs(paths: Sequence[str | Path]) -> list[Run]:
 
 
 def distinct_labels(files: Sequence[Path]) -> list[str]:
-    """Shortens paths to what tells them apart: the folder's name for ``model.json``, the file's name otherwise."""
+    """Shortens paths to what distinguishes them: the folder's name for ``model.json``, the file's name otherwise."""
     stems = [file.parent if file.stem == "model" and file.parent.name else file.with_suffix("") for file in files]
     parts = [list(stem.resolve().parts) for stem in stems]
     labels: list[str] = []

@@ -17,7 +17,7 @@ Array = NDArray[np.float64]
 
 # Smallest eigenvalue of a pseudo-inertia, in units in which the reference body has a unit mass and a unit size.
 EPSILON = 1e-6
-# Mean density of tools and workpieces with their hollows [kg/m3]: the size of a body of which nothing else is known.
+# Mean density of tools and workpieces with their hollows [kg/m3]: the size of a body whose shape is unknown.
 DENSITY = 700.0
 # Weight of the distance to that body: a unit is what its own parameters scatter by.
 WEIGHT = 1.0

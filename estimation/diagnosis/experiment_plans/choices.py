@@ -118,20 +118,7 @@ def combined(grams: Grams, best: Choice, others: Sequence[Choice]) -> Choice:
     """Adds the motions of other kinds, the most useful first, as long as they separate the causes better."""
     left = list(others)
     while left:
-        trials = [
-            Choice(
-                kind=best.kind,
-                stages=(*repeat_stages(best.stages, best.times), *repeat_stages(other.stages, other.times)),
-                grams=(
-                    both := tuple(
-                        a * best.times + b * other.times for a, b in zip(best.grams, other.grams, strict=True)
-                    )
-                ),
-                chances=grams.chances_of(both),
-                more=(*best.more, other.kind),
-            )
-            for other in left
-        ]
+        trials = [_both(grams, best, other) for other in left]
         at = min(range(len(left)), key=lambda k: trials[k].rank)
         if trials[at].chance < best.chance + WORTH:
             break
@@ -154,6 +141,7 @@ def repeated(grams: Grams, choice: Choice) -> Choice:
 
 
 def _both(grams: Grams, first: Choice, second: Choice) -> Choice:
+    """Evaluates the motions of two experiments together: their information adds up."""
     new = tuple(a * first.times + b * second.times for a, b in zip(first.grams, second.grams, strict=True))
     stages = (*repeat_stages(first.stages, first.times), *repeat_stages(second.stages, second.times))
     return Choice(first.kind, stages, new, grams.chances_of(new), more=(*first.more, second.kind))

@@ -159,7 +159,7 @@ def _multiples(columns: Array, tau: Array, block: NDArray[np.intp], least: float
     alone = [float(np.std(_without(columns[:, i], np.delete(columns, i, axis=1)))) for i in range(columns.shape[1])]
     used = np.flatnonzero(np.array(alone) > least)
     found = [Multiple(np.nan, np.inf)] * columns.shape[1]
-    # A column that cannot be told from the others stays in the fit as one of them, if it is not zero.
+    # A column that cannot be distinguished from the others stays in the fit as one of them, if it is not zero.
     kept = np.flatnonzero(np.abs(columns).max(axis=0) > 0)
     if not len(used):
         return found

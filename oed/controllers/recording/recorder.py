@@ -1,4 +1,4 @@
-"""A thread that listens to the state port: it knows pose and state, and writes the log while it is told to."""
+"""A thread that listens to the state port: it knows pose and state, and writes the log while recording is on."""
 
 from __future__ import annotations
 

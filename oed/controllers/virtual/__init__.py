@@ -1,4 +1,4 @@
-"""A controller to test against: it takes points, plays them on the virtual robot, and can be told to be bad."""
+"""A controller to test against: it takes points, plays them on the virtual robot, and makes faults on request."""
 
 from oed.controllers.virtual.controller import VirtualController
 from oed.controllers.virtual.options import ControllerOptions, Faults

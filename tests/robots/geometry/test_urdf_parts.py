@@ -146,7 +146,7 @@ def test_a_yaml_states_the_stops_that_the_urdf_lacks(write_urdf, tmp_path):
 
 
 def test_one_missing_stop_is_zero_and_said(write_urdf):
-    """A range of which one end is missing ends at 0, as the specification says, and a note says so."""
+    """A range with one missing end ends at 0, as the specification says, and a note says so."""
     taken = read_urdf(write_urdf(limited(lower=None))).chain()
     assert (taken.limits.lower[0], taken.limits.upper[0]) == (0.0, 1.0)
     assert taken.notes == ("joint j1: <limit> states no lower; it is 0 by the URDF specification",)

@@ -39,7 +39,7 @@ def test_a_bad_file_is_one_message(tmp_path, change, words):
 
 
 def test_other_roots_are_refused(tmp_path):
-    """A URDF named .xml is told from an MJCF, and other XML is refused."""
+    """A URDF named .xml is distinguished from an MJCF, and other XML is refused."""
     assert ".urdf" in message(tmp_path, "<robot name='r'/>")
     assert "<mujoco>" in message(tmp_path, "<html/>")
 

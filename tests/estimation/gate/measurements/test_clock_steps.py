@@ -1,4 +1,4 @@
-"""Specification of steps of the clock: found by the motion's continuity, and told from rows that are missing."""
+"""Specification of steps of the clock: found by the motion's continuity, and distinguished from missing rows."""
 
 import numpy as np
 import pytest

@@ -140,7 +140,7 @@ def test_mapping_completes_a_recording(tmp_path):
 
 
 def test_recording_without_torque_says_what_to_record(tmp_path):
-    """UR's recorder writes what it is told; without currents the message names them."""
+    """UR's recorder writes the chosen columns; without currents the message names them."""
     q, dq, tau = motion(6)
     path = ur_rtde(tmp_path / "a.csv", T, q, dq, tau, torque=())
     error = refused(path)
