@@ -1,0 +1,32 @@
+"""Progress of one stage as a part of the campaign's."""
+
+from __future__ import annotations
+
+from robots.common.progress import Progress
+
+
+class StageProgress:
+    """Turns points of a stream into seconds of the timetable.
+
+    Args:
+        whole: listener to the campaign.
+        start: of the stage [s].
+        duration: of the stage [s].
+        note: what is played.
+    """
+
+    def __init__(self, whole: Progress, start: float, duration: float, note: str) -> None:
+        self._whole, self._start, self._duration, self._note = whole, start, duration, note
+        self._total = 1.0
+
+    def start(self, task: str, total: float | None = None) -> None:
+        """Notes the number of points."""
+        self._total = total or 1.0
+        self.update(0.0)
+
+    def update(self, done: float, note: str = "") -> None:
+        """Reports the time of the points so far."""
+        self._whole.update(self._start + self._duration * done / self._total, self._note)
+
+    def finish(self) -> None:
+        """Leaves the campaign's progress as it is."""
