@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, field
 from functools import cached_property
 from os import PathLike
 from pathlib import Path
@@ -50,6 +50,7 @@ class Campaign:
         cold_friction: friction of the cold robot over that of the description, for the expected temperatures.
         torque_margin: share of the torque limits that friction and warm-up stages leave free.
         notes: what a user should know: what was shortened, what could not be checked.
+        settings: options of the planning that show nowhere else, as plain data.
     """
 
     robot: Robot
@@ -62,6 +63,7 @@ class Campaign:
     cold_friction: float
     torque_margin: float
     notes: tuple[str, ...] = ()
+    settings: Mapping[str, Any] = field(default_factory=dict)
 
     @property
     def stages_by_name(self) -> dict[str, Stage]:
@@ -194,6 +196,7 @@ class Campaign:
             "home": self.home.tolist(),
             "programme": self.programme.to_dict(),
             "torque_margin": self.torque_margin,
+            "settings": dict(self.settings),
             "stages": [
                 {
                     **stage.to_dict(self.robot.limits),
@@ -271,6 +274,8 @@ class Campaign:
                 cold_friction=expected["cold_friction"],
                 torque_margin=data["torque_margin"],
                 notes=tuple(data["notes"]),
+                # Older files lack this entry.
+                settings=data.get("settings", {}),
             )
         except (OSError, UnicodeDecodeError, json.JSONDecodeError, KeyError, TypeError) as error:
             raise InputError(f"is damaged, or no campaign: {type(error).__name__} {error}", file=file) from error

@@ -5,10 +5,8 @@ from __future__ import annotations
 import os
 import shutil
 import time
-from collections.abc import Mapping
 from os import PathLike
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -38,7 +36,6 @@ def run_campaign(
     *,
     robot: Robot | None = None,
     options: StreamOptions | None = None,
-    settings: Mapping[str, Any] | None = None,
     speed: float = 1.0,
     collision: bool = True,
     progress: Progress = SILENT,
@@ -55,7 +52,6 @@ def run_campaign(
         endpoint: the controller.
         robot: of the campaign; by default the one that it names.
         options: of the streams.
-        settings: options with which the campaign was planned, kept in ``run.json``.
         speed: how many times faster than real time the controller plays, for controllers to test against.
         collision: whether moves home are checked for collisions.
         progress: listener; its unit is the second of the timetable.
@@ -77,7 +73,7 @@ def run_campaign(
         digest = sha256(place / CAMPAIGN)
         state = RunState.load(place)
         if state is None:
-            state = RunState(campaign=digest, settings=dict(settings or {}))
+            state = RunState(campaign=digest)
         elif state.campaign != digest:
             raise InputError(
                 "the campaign was planned again after its run had begun",
@@ -111,7 +107,9 @@ class _Run:
         begin = time.monotonic()
         first = len(self.state.recorded)
         if not self.state.starts and any((self.folder / LOGS).glob("*")):
-            raise InputError("holds logs of something else", file=self.folder / LOGS, remedy="move them elsewhere first")
+            raise InputError(
+                "holds logs of something else", file=self.folder / LOGS, remedy="move them elsewhere first"
+            )
         if first < len(self.played):
             self._require_room(first)
             for name in (LOGS, INTERRUPTED):

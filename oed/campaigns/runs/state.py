@@ -53,13 +53,11 @@ class RunState:
 
     Attributes:
         campaign: SHA-256 of its campaign.json.
-        settings: options with which the campaign was planned, where it was planned for this run.
         recorded: stages in the order in which they were played.
         starts: how often the run was started.
     """
 
     campaign: str
-    settings: dict[str, Any] = field(default_factory=dict)
     recorded: list[RecordedStage] = field(default_factory=list)
     starts: int = 0
 
@@ -89,7 +87,6 @@ class RunState:
                 raise InputError(f"found the format {data['format']!r}", file=file, allowed=FORMAT)
             return cls(
                 campaign=data["campaign"],
-                settings=data["settings"],
                 recorded=[RecordedStage(**{**row, "end": ClockAnchor(**row["end"])}) for row in data["recorded"]],
                 starts=data["starts"],
             )
