@@ -8,16 +8,14 @@ import time
 from os import PathLike
 from pathlib import Path
 
-import numpy as np
-
 from oed.campaigns.result import CAMPAIGN, Campaign
-from oed.campaigns.runs.homing import move_home
+from oed.campaigns.runs.player import INTERRUPTED, Player
 from oed.campaigns.runs.result import CampaignRun
 from oed.campaigns.runs.stage_progress import StageProgress
-from oed.campaigns.runs.state import INTERRUPTED, LOGS, RUN, RecordedStage, RunState, run_lock
+from oed.campaigns.runs.state import LOGS, RUN, RecordedStage, RunState, run_lock
 from oed.campaigns.timetable import Slot
-from oed.controllers import Endpoint, StreamOptions, stream
-from oed.controllers.recording.pose import read_pose
+from oed.controllers import Endpoint, StreamOptions
+from oed.controllers.recording.clock import ClockAnchor
 from robots.common.errors import InputError, OedError
 from robots.common.files import sha256
 from robots.common.progress import SILENT, Progress
@@ -98,8 +96,16 @@ class _Run:
         collision: bool,
         progress: Progress,
     ) -> None:
-        self.campaign, self.folder, self.endpoint, self.options = campaign, folder, endpoint, options
-        self.state, self.speed, self.collision, self.progress = state, speed, collision, progress
+        self.campaign, self.folder, self.state = campaign, folder, state
+        self.speed, self.progress = speed, progress
+        self.player = Player(
+            robot=campaign.robot,
+            home=campaign.home,
+            endpoint=endpoint,
+            options=options,
+            folder=folder,
+            collision=collision,
+        )
         self.played = [slot for slot in campaign.slots if slot.stage is not None]
         self.width = max(3, len(str(len(self.played))))
 
@@ -112,12 +118,11 @@ class _Run:
             )
         if first < len(self.played):
             self._require_room(first)
-            for name in (LOGS, INTERRUPTED):
-                (self.folder / name).mkdir(exist_ok=True)
+            (self.folder / LOGS).mkdir(exist_ok=True)
             self._play_from(first)
         return CampaignRun(
             robot=self.campaign.robot.name,
-            place=self.endpoint.place(self.endpoint.motion_port),
+            place=self.player.endpoint.place(self.player.endpoint.motion_port),
             folder=os.fspath(self.folder / LOGS),
             stages=tuple(self.state.recorded),
             starts=self.state.starts,
@@ -166,7 +171,6 @@ class _Run:
         assert slot.stage is not None
         stage = self.campaign.stages_by_name[slot.stage]
         name = f"{number:0{self.width}d}_{stage.name}"
-        recording = self._free_name(name)
         header = {
             "campaign_stage": number,
             "stage": stage.name,
@@ -175,21 +179,16 @@ class _Run:
             "run": slot.run,
             "duty": slot.duty,
         }
-        last = self.state.last
         note = f"stage {number} of {len(self.played)}: {stage.name} of cycle {slot.cycle}"
         try:
-            result = stream(
+            result, end, recording = self.player.play(
                 stage.motion,
-                self.campaign.robot,
-                self.endpoint,
-                log=recording,
-                options=self.options,
-                header=header,
-                anchor=None if last is None else last.end,
+                name,
+                header,
+                anchor=self._anchor,
                 file=self.folder / stage.file,
                 progress=StageProgress(self.progress, slot.start - self.origin, stage.duration, note),
             )
-            assert result.anchor is not None
             self.state.recorded.append(
                 RecordedStage(
                     number=number,
@@ -200,7 +199,7 @@ class _Run:
                     rows=result.rows,
                     lost=result.feedback["lost"],
                     delay=result.delay,
-                    end=result.anchor,
+                    end=end,
                 )
             )
             self.state.save(self.folder)
@@ -216,32 +215,15 @@ class _Run:
 
     def _go_home(self, number: int) -> None:
         """Moves the robot to where stages begin, if it was stopped elsewhere."""
-        robot, home = self.campaign.robot, self.campaign.home
+        listener = StageProgress(self.progress, 0.0, 0.0, "moving home slowly")
         try:
-            pose = read_pose(robot, self.endpoint, self.options.patience)
-            if np.abs(pose - home).max() <= self.options.start_tolerance:
-                return
-            motion = move_home(robot, pose, home, collision=self.collision)
-            if motion is None:
-                return
-            stream(
-                motion,
-                robot,
-                self.endpoint,
-                log=self._free_name(f"{number:0{self.width}d}_home"),
-                options=self.options,
-                header={"stage": "home"},
-                progress=StageProgress(self.progress, 0.0, 0.0, "moving home slowly"),
-            )
+            self.player.go_home(f"{number:0{self.width}d}_home", self._anchor, listener)
         except OedError as error:
             raise self._goes_on(error) from None
 
-    def _free_name(self, name: str) -> Path:
-        """Gives the file of a recording that may be cut short; earlier ones are kept."""
-        folder, attempt = self.folder / INTERRUPTED, 1
-        while (folder / f"{name}_{attempt}.csv").exists():
-            attempt += 1
-        return folder / f"{name}_{attempt}.csv"
+    @property
+    def _anchor(self) -> ClockAnchor | None:
+        return None if self.state.last is None else self.state.last.end
 
     def _goes_on(self, error: OedError) -> OedError:
         """Says how to go on after an error."""

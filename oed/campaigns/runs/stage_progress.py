@@ -1,4 +1,4 @@
-"""Progress of one stage as a part of the campaign's."""
+"""Progress of a part of a longer work."""
 
 from __future__ import annotations
 
@@ -30,3 +30,27 @@ class StageProgress:
 
     def finish(self) -> None:
         """Leaves the campaign's progress as it is."""
+
+
+class TitledProgress:
+    """Says at the front of each task what it is a part of.
+
+    Args:
+        listener: to the whole.
+        title: in a few words.
+    """
+
+    def __init__(self, listener: Progress, title: str) -> None:
+        self._listener, self._title = listener, title
+
+    def start(self, task: str, total: float | None = None) -> None:
+        """Announces a task."""
+        self._listener.start(f"{self._title}: {task}", total)
+
+    def update(self, done: float, note: str = "") -> None:
+        """Reports the advance."""
+        self._listener.update(done, note)
+
+    def finish(self) -> None:
+        """Announces the end of the task."""
+        self._listener.finish()

@@ -16,7 +16,7 @@ from robots.common.errors import InputError
 from robots.common.files import write_atomic
 
 RUN, LOCK = "run.json", ".run.lock"
-LOGS, INTERRUPTED = "logs", "interrupted"
+LOGS = "logs"
 FORMAT = "robot-oed campaign run"
 
 
