@@ -18,6 +18,7 @@ from oed.cli.commands.effects import effects
 from oed.cli.commands.example import example
 from oed.cli.commands.export import export
 from oed.cli.commands.identify import identify
+from oed.cli.commands.loop import loop
 from oed.cli.commands.pareto import pareto
 from oed.cli.commands.payload import payload
 from oed.cli.commands.predict import predict
@@ -38,6 +39,7 @@ FUNCTIONS = (
     record,
     controller,
     campaign,
+    loop,
     simulate,
     check,
     identify,

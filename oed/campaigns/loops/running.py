@@ -4,22 +4,21 @@ from __future__ import annotations
 
 import os
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from os import PathLike
 from pathlib import Path
 
 import numpy as np
 
 from estimation.diagnosis.experiment_plans.next_experiment import NextExperiment
-from estimation.diagnosis.pipeline import diagnose
-from estimation.identifications.identification import identify
-from estimation.logs import read_log
+from estimation.diagnosis.results.diagnosis import Diagnosis
 from oed.campaigns.checking import TorqueCheck, checked
 from oed.campaigns.excitation import excitation_stage
+from oed.campaigns.loops.diagnosing import diagnose_logs
 from oed.campaigns.loops.options import LoopOptions
 from oed.campaigns.loops.proposals import PlannedExperiment, PlannedRun, plan_experiment
 from oed.campaigns.loops.result import LoopResult
-from oed.campaigns.loops.state import Experiment, LoopRun, LoopState, Recorded, Verdict, identity
+from oed.campaigns.loops.state import Experiment, LoopRun, LoopState, Recorded, identity
 from oed.campaigns.runs.player import Player
 from oed.campaigns.runs.stage_progress import TitledProgress
 from oed.campaigns.runs.state import run_lock
@@ -29,7 +28,7 @@ from oed.experiments import design as design_experiment
 from oed.exports import read_trajectory, write_trajectory
 from robots.collision import collision_model
 from robots.common.errors import InputError, OedError
-from robots.common.files import ResultFolder, write_atomic
+from robots.common.files import ResultFolder
 from robots.common.progress import SILENT, Progress
 from robots.robot import Robot
 from robots.signals import Motion
@@ -51,6 +50,7 @@ def run_loop(
     stream_options: StreamOptions | None = None,
     speed: float = 1.0,
     workers: int | None = None,
+    report: Callable[[Diagnosis, ResultFolder], None] | None = None,
     progress: Progress = SILENT,
 ) -> LoopResult:
     """Designs an experiment, plays it, identifies and diagnoses the robot, and plays the next experiment.
@@ -69,6 +69,7 @@ def run_loop(
         stream_options: how trajectories are sent.
         speed: how many times faster than real time the controller plays, for controllers to test against.
         workers: processes of the design.
+        report: writes a page into the folder of each diagnosis, such as `oed.reports.save_diagnosis_report`.
         progress: listener.
 
     Returns:
@@ -95,7 +96,7 @@ def run_loop(
             state = LoopState(robot=identity(robot), settings=settings)
         else:
             state.require_same(robot, settings, place)
-        loop = _Loop(robot, endpoint, place, chosen, stream_options or StreamOptions(), state, speed, progress)
+        loop = _Loop(robot, endpoint, place, chosen, stream_options or StreamOptions(), state, speed, report, progress)
         return loop.run(design, workers)
 
 
@@ -111,10 +112,12 @@ class _Loop:
         stream_options: StreamOptions,
         state: LoopState,
         speed: float,
+        report: Callable[[Diagnosis, ResultFolder], None] | None,
         progress: Progress,
     ) -> None:
         self.robot, self.endpoint, self.folder, self.options = robot, endpoint, folder, options
-        self.stream_options, self.state, self.speed, self.progress = stream_options, state, speed, progress
+        self.stream_options, self.state, self.speed = stream_options, state, speed
+        self.report, self.progress = report, progress
 
     def run(self, design: str | PathLike[str] | None, workers: int | None) -> LoopResult:
         begin, state = time.monotonic(), self.state
@@ -243,38 +246,19 @@ class _Loop:
 
     def _diagnose(self, number: int) -> NextExperiment | None:
         """Identifies and diagnoses the robot from all logs so far."""
-        options, experiment = self.options, self.state.experiments[number - 1]
-        logs = [
-            read_log(self.folder / run.recorded.log, self.robot.n, kinds=self.robot.chain.kinds)
-            for run in self.state.runs
-            if run.recorded is not None
-        ]
-        name = f"experiment_{number}"
-        estimate = identify(self.robot, logs, friction=options.friction, seed=options.seed)
-        found = diagnose(
+        logs = [self.folder / run.recorded.log for run in self.state.runs if run.recorded is not None]
+        verdict, following = diagnose_logs(
             self.robot,
             logs,
-            friction=options.friction,
-            seed=options.seed,
+            self.folder,
+            f"experiment_{number}",
+            friction=self.options.friction,
+            seed=self.options.seed,
+            report=self.report,
             progress=TitledProgress(self.progress, f"diagnosis after experiment {number}"),
         )
-        for part, result in (("identified", estimate), ("diagnosed", found)):
-            with ResultFolder(self.folder / name / part, True) as out:
-                result.save(out.path("model.json").parent)
-        data = found.to_dict()
-        experiment.diagnosis = Verdict(
-            folder=f"{name}/diagnosed",
-            verdict=found.verdict,
-            findings=data["findings"],
-            before=data["baseline"]["nrmse"],
-            after=data["extended"]["nrmse"],
-            summary=found.summary(),
-        )
-        write_atomic(self.folder / name / "diagnosed" / "summary.txt", found.summary() + "\n", force=True)
-        for file in ("diagnosis.json", "model.json"):
-            content = (self.folder / name / "diagnosed" / file).read_bytes()
-            write_atomic(self.folder / file, content, force=True)
-        return found.next_experiment
+        self.state.experiments[number - 1].diagnosis = verdict
+        return following
 
     def _continue(self, number: int, following: NextExperiment | None) -> None:
         """Plans the next experiment, or ends the loop with its reason."""
