@@ -37,6 +37,7 @@ class VirtualRobot:
         self._pieces: list[HeatPiece] = []
         self._coloured = self._rng.standard_normal(plant.robot.n)
         self._squares, self._count = np.zeros(plant.robot.n), 0
+        self._standing: tuple[Array, Array] | None = None
         self.begin(0.0)
 
     def begin(self, clock: float) -> None:
@@ -74,10 +75,11 @@ class VirtualRobot:
         return self._measured(tau)
 
     def stand(self, q: Array) -> Array:
-        """Gives the measured torque (n,) of a robot that stands at positions (n,)."""
-        motion = Motion(np.zeros(1), q[None], np.zeros((1, len(q))), np.zeros((1, len(q))))
-        model = self._plant.model
-        return self._measured(model.torque(motion.q, motion.dq, motion.ddq, self._plant.parameters))[0]
+        """Gives the measured torque (n,) of a robot that stands at positions (n,); its noise differs each time."""
+        if self._standing is None or not np.array_equal(self._standing[0], q):
+            zero = np.zeros((1, len(q)))
+            self._standing = (q, self._plant.model.torque(q[None], zero, zero, self._plant.parameters))
+        return self._measured(self._standing[1])[0]
 
     def _measured(self, tau: Array) -> Array:
         """Adds noise that is coloured across pieces; its level follows the torque's RMS so far."""
