@@ -113,9 +113,7 @@ class _Run:
         begin = time.monotonic()
         first = len(self.state.recorded)
         if not self.state.starts and any((self.folder / LOGS).glob("*")):
-            raise InputError(
-                "holds logs of something else", file=self.folder / LOGS, remedy="move them elsewhere first"
-            )
+            raise InputError("holds other logs", file=self.folder / LOGS, remedy="move them elsewhere first")
         if first < len(self.played):
             self._require_room(first)
             (self.folder / LOGS).mkdir(exist_ok=True)

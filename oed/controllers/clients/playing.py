@@ -93,6 +93,8 @@ def stream(
             if not options.ignore_status and status_problem(recorder.status) is not None:
                 # The error of an interrupted motion ends with the link of the next client.
                 check_status(recorder.renewed_status(), endpoint.place(endpoint.state_port))
+            if not options.ignore_status and recorder.status is not None and recorder.status.in_motion == 1:
+                raise ControllerError("the robot is moving", remedy="wait for the end of its motion")
             requests = Requests(link, endpoint.form, options)
             for _ in range(PINGS if options.ping else 0):
                 requests.ping()

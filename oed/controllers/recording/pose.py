@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import time
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -12,9 +14,15 @@ from robots.robot import Robot
 
 Array = NDArray[np.float64]
 
+RESTS = 0.3
+"""How long the robot must stand [s]."""
+TURN = 0.02
+
 
 def read_pose(robot: Robot, endpoint: Endpoint, patience: float = 2.0) -> Array:
-    """Reads the pose (n,) [rad or m] of a robot.
+    """Waits until a robot stands, and reads its pose (n,) [rad or m].
+
+    A controller whose client was killed may go on with the points that it holds.
 
     Args:
         robot: the robot.
@@ -26,7 +34,12 @@ def read_pose(robot: Robot, endpoint: Endpoint, patience: float = 2.0) -> Array:
     """
     recorder = Recorder(open_link(endpoint, endpoint.state_port), robot, endpoint.form, patience)
     try:
-        return recorder.wait_for_feedback()[: robot.n]
+        recorder.wait_for_feedback()
+        while time.monotonic() - recorder.rest_since < RESTS:
+            time.sleep(TURN)
+            recorder.check()
+        assert recorder.positions is not None
+        return recorder.positions[: robot.n]
     finally:
         with signals_held():
             recorder.finish({})
