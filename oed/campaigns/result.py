@@ -128,20 +128,14 @@ class Campaign:
 
     def summary(self) -> str:
         """Lists the stages, the expected heating, and notes."""
-        programme = self.programme
         lines = [f"{self.robot.name}: {self.duration / 60:.1f} min, {self.cycles} cycles, {self.samples} samples"]
         for stage in self.stages:
-            tightest = stage.tightest
-            left = (
-                ""
-                if tightest is None
-                else (
-                    f", tightest limit: {tightest.quantity} of joint {tightest.joint}, "
-                    f"{100 * tightest.slack_fraction:.2f} % left"
-                )
-            )
+            left, tightest = "", stage.tightest
+            if tightest is not None:
+                share = 100 * tightest.slack_fraction
+                left = f", tightest limit: {tightest.quantity} of joint {tightest.joint}, {share:.2f} % left"
             lines.append(f"  {stage.file:18} {stage.duration:8.3f} s{left}")
-        if programme.cycles:
+        if self.programme.cycles:
             heating = next(slot.cycle for slot in self.slots if slot.phase == "heating")
             joules = ", ".join(f"{value / 1e3:.1f}" for value in self.cycle_heat[heating - 1])
             lines.append(f"  friction heat of the first heating cycle, kJ per joint: {joules}")

@@ -15,6 +15,7 @@ class LoopOptions:
     Attributes:
         experiments: how many experiments are made at most, the first one included.
         least_probability: a proposed experiment that separates the causes with a lower probability is not made.
+        longest: repetitions beyond this time of an experiment, rests included, are left to the next one [s].
         friction: of the base model: ``auto``, ``polynomial`` or ``coulomb-viscous``.
         velocity_fraction: of the velocity limits that may be used.
         effort: of the design's search.
@@ -24,6 +25,7 @@ class LoopOptions:
 
     experiments: int = 4
     least_probability: float = 0.5
+    longest: float = 600.0
     friction: str = "auto"
     velocity_fraction: float = 1.0
     effort: str = "standard"
@@ -40,6 +42,8 @@ class LoopOptions:
             raise InputError(f"{self.experiments} experiments", allowed="a whole number, at least 1")
         if not 0.0 <= self.least_probability <= 1.0:
             raise InputError(f"a least probability of {self.least_probability}", allowed="0 to 1")
+        if not self.longest > 0.0:
+            raise InputError(f"experiments of at most {self.longest} s", allowed="above 0")
         if not 0.0 < self.velocity_fraction <= 1.0:
             raise InputError(f"a velocity fraction of {self.velocity_fraction}", allowed="above 0, up to 1")
 
@@ -47,5 +51,5 @@ class LoopOptions:
         """Writes what must stay the same when the loop goes on as plain data."""
         data = asdict(self)
         # The budget may be raised later.
-        del data["experiments"], data["least_probability"]
+        del data["experiments"], data["least_probability"], data["longest"]
         return data

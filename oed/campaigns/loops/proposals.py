@@ -65,6 +65,7 @@ def plan_experiment(
     played: Sequence[Motion],
     *,
     least_probability: float = 0.5,
+    longest: float = np.inf,
     velocity_fraction: float = 1.0,
     collision: bool = True,
     seed: int = 0,
@@ -77,6 +78,7 @@ def plan_experiment(
         home: pose (n,) at which motions begin and end [rad or m].
         played: motions of the logs; one that is to be repeated is played as it was.
         least_probability: of an experiment that is made.
+        longest: repetitions beyond this time are left out [s].
         velocity_fraction: of the velocity limits that may be used.
         collision: whether motions are checked for collisions.
         seed: of a random reference motion.
@@ -105,7 +107,7 @@ def plan_experiment(
             reasons.append(f"{kind.replace('_', ' ')}: {hand}")
             continue
         try:
-            runs = tuple(_playable(stage, kind, builder, played) for stage in stages)
+            runs = tuple(_playable(stage, kind, builder, played) for stage in within(stages, longest))
             if collision:
                 _require_free(robot, runs)
         except InfeasibleError as error:
@@ -113,6 +115,25 @@ def plan_experiment(
             continue
         return PlannedExperiment(kind=kind, why=why, resolves=resolves, runs=runs)
     return f"no proposed experiment can be played unattended ({'; '.join(reasons)}). {following.why}"
+
+
+def within(stages: Sequence[Stage], longest: float) -> tuple[Stage, ...]:
+    """Leaves out repetitions of stages beyond a time; each different stage is made once at least.
+
+    Args:
+        stages: in order, repetitions one after the other.
+        longest: with rests [s].
+    """
+    groups: list[list[Stage]] = []
+    for stage in stages:
+        before = groups[-1][-1] if groups else None
+        if before is None or (stage.motion, stage.payload) != (before.motion, before.payload):
+            groups.append([])
+        groups[-1].append(stage)
+    times = max(map(len, groups))
+    while times > 1 and sum(s.pause + s.motion.duration for g in groups for s in g[:times]) > longest:
+        times -= 1
+    return tuple(stage for group in groups for stage in group[:times])
 
 
 def by_hand(stages: Sequence[Stage]) -> str:

@@ -18,9 +18,9 @@ from oed.campaigns.loops.diagnosing import diagnose_logs
 from oed.campaigns.loops.options import LoopOptions
 from oed.campaigns.loops.proposals import PlannedExperiment, PlannedRun, plan_experiment
 from oed.campaigns.loops.result import LoopResult
-from oed.campaigns.loops.state import Experiment, LoopRun, LoopState, Recorded, identity
+from oed.campaigns.loops.state import Experiment, LoopRun, LoopState, Recorded, identity, remove_loop
 from oed.campaigns.runs.player import Player
-from oed.campaigns.runs.stage_progress import TitledProgress
+from oed.campaigns.runs.stage_progress import TitledProgress, rest
 from oed.campaigns.runs.state import run_lock
 from oed.controllers import Endpoint, StreamOptions
 from oed.experiments import LimitOptions, SearchOptions
@@ -33,9 +33,6 @@ from robots.common.progress import SILENT, Progress
 from robots.robot import Robot
 from robots.signals import Motion
 from robots.version import VERSION
-
-TURN = 0.5
-"""While the robot rests, the progress is updated so often [s]."""
 
 CONCLUSIVE = ("none", "named")
 
@@ -50,6 +47,7 @@ def run_loop(
     stream_options: StreamOptions | None = None,
     speed: float = 1.0,
     workers: int | None = None,
+    force: bool = False,
     report: Callable[[Diagnosis, ResultFolder], None] | None = None,
     progress: Progress = SILENT,
 ) -> LoopResult:
@@ -69,6 +67,7 @@ def run_loop(
         stream_options: how trajectories are sent.
         speed: how many times faster than real time the controller plays, for controllers to test against.
         workers: processes of the design.
+        force: begin again, and remove what an earlier loop left in the folder.
         report: writes a page into the folder of each diagnosis, such as `oed.reports.save_diagnosis_report`.
         progress: listener.
 
@@ -90,6 +89,8 @@ def run_loop(
     except OSError as error:
         raise InputError(f"cannot be created ({error.strerror})", file=place, remedy="choose another folder") from error
     with run_lock(place, "runs a loop"):
+        if force:
+            remove_loop(place)
         state = LoopState.load(place)
         settings = {**chosen.settings(), "design": None if design is None else os.path.abspath(design)}
         if state is None:
@@ -208,7 +209,7 @@ class _Loop:
                 player.go_home(f"{number}_{index}_home", anchor, TitledProgress(self.progress, "moving home"))
                 resumed = False
             if last is not None:
-                self._rest(last.end.unix + run.pause / self.speed, title)
+                rest(last.end.unix + run.pause / self.speed, self.progress, title)
             motion, _ = read_trajectory(self.folder / run.trajectory, n=self.robot.n)
             header = {"experiment": number, "run": index, "kind": experiment.kind}
             result, end, recording = player.play(
@@ -230,19 +231,6 @@ class _Loop:
             )
             state.save(self.folder)
             os.replace(recording, self.folder / log)
-
-    def _rest(self, until: float, title: str) -> None:
-        """Waits until a time in seconds since 1970."""
-        whole = until - time.time()
-        if whole <= 0:
-            return
-        self.progress.start(f"{title}: rest", whole)
-        try:
-            while (left := until - time.time()) > 0:
-                self.progress.update(whole - left)
-                time.sleep(min(left, TURN))
-        finally:
-            self.progress.finish()
 
     def _diagnose(self, number: int) -> NextExperiment | None:
         """Identifies and diagnoses the robot from all logs so far."""
@@ -286,6 +274,7 @@ class _Loop:
                 np.array(state.home),
                 self._motions(),
                 least_probability=options.least_probability,
+                longest=options.longest,
                 velocity_fraction=options.velocity_fraction,
                 collision=options.collision,
                 seed=options.seed,

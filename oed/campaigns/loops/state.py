@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import shutil
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
@@ -209,3 +210,11 @@ def _experiment(data: Mapping[str, Any]) -> Experiment:
         runs=runs,
         diagnosis=None if diagnosis is None else Verdict(**diagnosis),
     )
+
+
+def remove_loop(folder: Path) -> None:
+    """Removes what a loop wrote into a folder, and nothing else."""
+    for path in (*folder.glob("experiment_*"), folder / "interrupted"):
+        shutil.rmtree(path, ignore_errors=True)
+    for name in (LOOP, "diagnosis.json", "model.json", "report.html"):
+        (folder / name).unlink(missing_ok=True)

@@ -11,7 +11,7 @@ from pathlib import Path
 from oed.campaigns.result import CAMPAIGN, Campaign
 from oed.campaigns.runs.player import INTERRUPTED, Player
 from oed.campaigns.runs.result import CampaignRun
-from oed.campaigns.runs.stage_progress import StageProgress
+from oed.campaigns.runs.stage_progress import TURN, StageProgress
 from oed.campaigns.runs.state import LOGS, RUN, RecordedStage, RunState, run_lock
 from oed.campaigns.timetable import Slot
 from oed.controllers import Endpoint, StreamOptions
@@ -20,9 +20,6 @@ from robots.common.errors import InputError, OedError
 from robots.common.files import sha256
 from robots.common.progress import SILENT, Progress
 from robots.robot import Robot
-
-TURN = 0.5
-"""While the robot rests, the progress is updated so often [s]."""
 
 CELL = 20
 """Bytes of a number in a log, at most."""

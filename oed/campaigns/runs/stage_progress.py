@@ -2,7 +2,12 @@
 
 from __future__ import annotations
 
+import time
+
 from robots.common.progress import Progress
+
+TURN = 0.5
+"""While the robot rests, the progress is updated so often [s]."""
 
 
 class StageProgress:
@@ -54,3 +59,23 @@ class TitledProgress:
     def finish(self) -> None:
         """Announces the end of the task."""
         self._listener.finish()
+
+
+def rest(until: float, progress: Progress, title: str) -> None:
+    """Waits, and shows how long.
+
+    Args:
+        until: seconds since 1970.
+        progress: listener.
+        title: of the work, in a few words.
+    """
+    whole = until - time.time()
+    if whole <= 0:
+        return
+    progress.start(f"{title}: rest", whole)
+    try:
+        while (left := until - time.time()) > 0:
+            progress.update(whole - left)
+            time.sleep(min(left, TURN))
+    finally:
+        progress.finish()

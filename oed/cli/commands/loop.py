@@ -28,6 +28,7 @@ from oed.cli.links import (
 )
 from oed.cli.options import (
     FittedFrictionOption,
+    ForceOption,
     JointsOption,
     JsonOption,
     LockOption,
@@ -56,6 +57,10 @@ def loop(
             "--least-probability", help="An experiment that separates the causes with less probability is not made."
         ),
     ] = 0.5,
+    longest: Annotated[
+        float,
+        typer.Option("--longest", help="Repetitions beyond this time of an experiment are left to the next one [s]."),
+    ] = 600.0,
     design: Annotated[
         Path | None,
         typer.Option(
@@ -91,6 +96,7 @@ def loop(
     lock: LockOption = None,
     unlimited: UnlimitedOption = False,
     png: PngOption = False,
+    force: ForceOption = False,
     json: JsonOption = False,
     quiet: QuietOption = False,
 ) -> None:
@@ -120,6 +126,7 @@ def loop(
                     options=LoopOptions(
                         experiments=experiments,
                         least_probability=least_probability,
+                        longest=longest,
                         friction=friction,
                         velocity_fraction=velocity_fraction,
                         effort=effort,
@@ -136,6 +143,7 @@ def loop(
                     ),
                     speed=speed,
                     workers=workers,
+                    force=force,
                     report=save_diagnosis_report,
                     progress=progress,
                 )
