@@ -81,7 +81,9 @@ def stream(
         if log is None:
             raise InputError("no log file for the feedback", remedy="give one")
         check_log_path(log, force)
-    recorder = Recorder(open_link(endpoint, endpoint.state_port), robot, endpoint.form, options.patience)
+    recorder = Recorder(
+        open_link(endpoint, endpoint.state_port), robot, endpoint.form, options.patience, endpoint.connect_time
+    )
     source = f"feedback of {endpoint.place(endpoint.state_port)}"
     known = {"robot": robot.name, "source": source, "tool": VERSION, **(header or {})}
     requests: Requests | None = None
@@ -90,14 +92,14 @@ def stream(
         pose = recorder.wait_for_feedback()
         check_start(motion.q[0], pose[: robot.n], options.start_tolerance, pose[robot.n :])
         with open_link(endpoint, endpoint.motion_port) as link:
+            requests = Requests(link, endpoint.form, options)
+            for number in range(PINGS if options.ping else 0):
+                requests.ping(None if number else max(options.patience, endpoint.connect_time))
             if not options.ignore_status and status_problem(recorder.status) is not None:
                 # The error of an interrupted motion ends with the link of the next client.
                 check_status(recorder.renewed_status(), endpoint.place(endpoint.state_port))
             if not options.ignore_status and recorder.status is not None and recorder.status.in_motion == 1:
                 raise ControllerError("the robot is moving", remedy="wait for the end of its motion")
-            requests = Requests(link, endpoint.form, options)
-            for _ in range(PINGS if options.ping else 0):
-                requests.ping()
             if not dry_run:
                 assert log is not None
                 recorder.begin(log, known, anchor=anchor, force=force)

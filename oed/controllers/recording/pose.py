@@ -32,7 +32,7 @@ def read_pose(robot: Robot, endpoint: Endpoint, patience: float = 2.0) -> Array:
     Raises:
         LinkError: the controller cannot be reached, or is silent.
     """
-    recorder = Recorder(open_link(endpoint, endpoint.state_port), robot, endpoint.form, patience)
+    recorder = Recorder(open_link(endpoint, endpoint.state_port), robot, endpoint.form, patience, endpoint.connect_time)
     try:
         recorder.wait_for_feedback()
         while time.monotonic() - recorder.rest_since < RESTS:

@@ -44,10 +44,12 @@ class Recorder:
         robot: whose joints report.
         form: of the messages.
         patience: longest silence [s].
+        connect_time: how long the first feedback is waited for [s].
     """
 
-    def __init__(self, link: Link, robot: Robot, form: WireFormat, patience: float) -> None:
-        self._link, self._robot, self._form, self._patience = link, robot, form, patience
+    def __init__(self, link: Link, robot: Robot, form: WireFormat, patience: float, connect_time: float) -> None:
+        self._link, self._robot, self._form = link, robot, form
+        self._patience, self._connect_time = patience, connect_time
         self._lock = threading.Lock()
         self._end = threading.Event()
         self._heard = threading.Event()
@@ -73,15 +75,15 @@ class Recorder:
         """Waits for the first feedback and returns its ten positions.
 
         Raises:
-            LinkError: none within the patience.
+            LinkError: none within the time to connect.
         """
         begin = time.monotonic()
-        while time.monotonic() - begin < self._patience and self.error is None and not self._heard.is_set():
+        while time.monotonic() - begin < self._connect_time and self.error is None and not self._heard.is_set():
             self._heard.wait(0.05)
         self.check()
         if self.positions is None:
             raise LinkError(
-                f"no feedback from {self._link.place} within {self._patience:g} s"
+                f"no feedback from {self._link.place} within {self._connect_time:g} s"
                 + (f"; what came is no message: {self._problem}" if self._problem else ""),
                 remedy="check the state port and the message format",
             )
