@@ -136,6 +136,7 @@ class _Loop:
             options=self.stream_options,
             folder=self.folder,
             collision=self.options.collision,
+            needs_torque=True,
         )
         while not state.ended:
             number = len(state.experiments)

@@ -35,6 +35,7 @@ class Player:
         options: of the streams.
         folder: recordings go to its folder ``interrupted`` until they are complete.
         collision: whether a move home is checked for collisions.
+        needs_torque: whether a controller without torque in its feedback is refused.
     """
 
     robot: Robot
@@ -43,6 +44,7 @@ class Player:
     options: StreamOptions
     folder: Path
     collision: bool = True
+    needs_torque: bool = False
 
     def play(
         self,
@@ -81,6 +83,7 @@ class Player:
             options=self.options,
             header=header,
             anchor=anchor,
+            needs_torque=self.needs_torque,
             file=file,
             progress=progress,
         )

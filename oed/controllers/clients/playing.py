@@ -42,6 +42,7 @@ def stream(
     metadata: Mapping[str, Any] | None = None,
     header: Mapping[str, Any] | None = None,
     anchor: ClockAnchor | None = None,
+    needs_torque: bool = False,
     file: str | PathLike[str] | None = None,
     dry_run: bool = False,
     force: bool = False,
@@ -61,6 +62,7 @@ def stream(
         metadata: what the trajectory's file says of itself.
         header: further entries of the log's header.
         anchor: the end of the log whose clock this one continues.
+        needs_torque: refuse a controller whose feedback carries neither torque nor current.
         file: the trajectory's file, for messages.
         dry_run: check everything, send no point and write nothing.
         force: whether an existing log may be replaced.
@@ -92,6 +94,11 @@ def stream(
         pose = recorder.wait_for_feedback()
         check_start(motion.q[0], pose[: robot.n], options.start_tolerance, pose[robot.n :])
         with open_link(endpoint, endpoint.motion_port) as link:
+            if needs_torque and not recorder.has_torque:
+                raise ControllerError(
+                    f"the feedback of {endpoint.place(endpoint.state_port)} carries neither torque nor current",
+                    remedy="a controller program must send them (message type 9015)",
+                )
             requests = Requests(link, endpoint.form, options)
             for number in range(PINGS if options.ping else 0):
                 requests.ping(None if number else max(options.patience, endpoint.connect_time))

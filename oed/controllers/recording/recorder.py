@@ -106,6 +106,11 @@ class Recorder:
                 f"{self._link.place} is silent for {silence:.1f} s", remedy="check the controller and the network"
             )
 
+    @property
+    def has_torque(self) -> bool:
+        """Whether the feedback carries torque or current."""
+        return self._layout is not None and bool(self._layout.effort)
+
     def renewed_status(self) -> Status | None:
         """Waits for a state that is reported from now on; gives the last one where none comes in time."""
         count, end = self._status_count, time.monotonic() + RENEWED
