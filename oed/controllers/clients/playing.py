@@ -109,7 +109,7 @@ def stream(
                 raise ControllerError("the robot is moving", remedy="wait for the end of its motion")
             if not dry_run:
                 assert log is not None
-                recorder.begin(log, known, anchor=anchor, force=force)
+                recorder.begin(log, known, anchor=anchor, delay=requests.traffic.delay, force=force)
                 begin = time.monotonic()
                 try:
                     _play(motion, robot, requests, recorder, options, progress)

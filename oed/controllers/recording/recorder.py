@@ -125,6 +125,7 @@ class Recorder:
         metadata: Mapping[str, Any],
         *,
         anchor: ClockAnchor | None = None,
+        delay: float | None = None,
         force: bool = False,
     ) -> None:
         """Begins to write a log.
@@ -133,6 +134,7 @@ class Recorder:
             path: the file.
             metadata: what is known at the beginning.
             anchor: the end of the log whose clock this one continues.
+            delay: of a message [s]. Where feedback carries no time, a row's time is that of its arrival less this.
             force: whether an existing file may be replaced.
 
         Raises:
@@ -142,10 +144,13 @@ class Recorder:
         units = ["m" if joint.kind == "prismatic" else "rad" for joint in self._robot.chain.joints]
         layout = self._layout
         assert self.stamp is not None
-        offset = 0.0 if anchor is None else anchor.offset_of(self.stamp, time.time())
+        late = 0.0 if layout.stamped else delay or 0.0
+        offset = -late if anchor is None else anchor.offset_of(self.stamp, time.time())
         known = {**metadata, "clock": "controller" if layout.stamped else "arrival", "complete": False}
-        if offset:
-            known["clock_offset"] = offset
+        if late:
+            known["delay_removed"] = late
+        if offset != -late:
+            known["clock_offset"] = offset + late
         log = FeedbackLog(path, layout.columns, layout.units(units), known, digits=layout.digits, force=force)
         with self._lock:
             self.statistics = Statistics()

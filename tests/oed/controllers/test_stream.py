@@ -110,6 +110,9 @@ def test_thesis_feedback(robot, controllers, log: Path) -> None:
     _, endpoint = controllers(feedback="position", status=False, handshake=0xFF, speed=2.0)
     stream(motion, robot, endpoint, log=log, options=PATIENT)
     read = read_log(log, robot.n, torque=False)
+    # Times are those of the measurement: of the arrival less half the round trip of a ping.
+    assert 0 < read.metadata["delay_removed"] < 1.0
+    assert "clock_offset" not in read.metadata
     assert (read.tau, read.dq, read.metadata["clock"], read.metadata["feedback"]["lost"]) == (
         None,
         None,
