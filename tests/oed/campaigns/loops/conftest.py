@@ -40,7 +40,7 @@ def two(robot_file: Path) -> Robot:
 
 @pytest.fixture(scope="session")
 def designed(two: Robot, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A design of one period, 15 s long."""
+    """A design of one period, 8 s long."""
     folder = tmp_path_factory.mktemp("design")
-    flat.design(two, effort=TINY, workers=1, periods=1).save(folder)
+    flat.design(two, effort=TINY, workers=1, periods=1, base_frequency=0.25).save(folder)
     return folder
