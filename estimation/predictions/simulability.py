@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,6 +18,7 @@ from estimation.exports.feasible import nearest_feasible
 from estimation.models.model import Model
 from robots.base_parameters import BaseParameters, find_base_parameters
 from robots.common.errors import InputError
+from robots.common.plain import finite
 from robots.signals import Motion
 
 Array = NDArray[np.float64]
@@ -63,6 +65,21 @@ class UnfitDirection:
         speed = np.abs(self.direction)
         return tuple(int(j) + 1 for j in np.argsort(-speed) if speed[j] >= ALONG * speed.max())
 
+    def to_dict(self) -> dict[str, Any]:
+        """Gives everything but the nearest model as plain data; null where the logs do not determine the parameter."""
+        return {
+            "q": self.q.tolist(),
+            "direction": self.direction.tolist(),
+            "inertia": self.inertia,
+            "inertia_of_nearest": self.expected,
+            "link": self.body,
+            "parameter": self.parameter,
+            "value": self.value,
+            "value_of_nearest": self.needed,
+            "shift_in_standard_errors": finite(self.shift),
+            "largest_change_in_standard_errors": self.change,
+        }
+
     def summary(self) -> str:
         """Names body, direction and remedy in a few sentences."""
         first, *others = self.joints
@@ -74,8 +91,8 @@ class UnfitDirection:
         return (
             f"The model cannot be simulated: moving {way} has an inertia of {self.inertia:.3g} kg m2. Link {self.body} "
             f"makes it so: {self.parameter} is {self.value:.3g}, and {self.needed:.3g} in the nearest model of bodies "
-            f"that can exist ({shift}). That model simulates, with an inertia of {self.expected:.3g} kg m2. The largest "
-            f"change of a determined parameter in it is {self.change:.2g} standard errors."
+            f"that can exist ({shift}). That model simulates, with an inertia of {self.expected:.3g} kg m2. The "
+            f"largest change of a determined parameter in it is {self.change:.2g} standard errors."
         )
 
 
