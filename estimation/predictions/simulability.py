@@ -14,8 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from estimation.closed_loops.closed_loop import inertia_matrices
-from estimation.exports.feasible import nearest_feasible
 from estimation.models.model import Model
+from estimation.predictions.simulable_models import nearest_simulable
 from robots.base_parameters import BaseParameters, find_base_parameters
 from robots.common.errors import InputError
 from robots.common.plain import finite
@@ -38,7 +38,8 @@ class UnfitDirection:
         direction: joint velocities (n,) of the motion without inertia, the fastest 1.
         inertia: of this motion, v' M v [kg m2, or kg of prismatic joints].
         expected: the same of the nearest model.
-        body: the link whose parameters take most inertia away, from 1.
+        body: the link, from 1, whose parameters bring most inertia back in the nearest model.
+        rotor: whether its rotor does most.
         parameter: the base parameter of that link that does most.
         value: identified.
         needed: of the nearest model.
@@ -52,6 +53,7 @@ class UnfitDirection:
     inertia: float
     expected: float
     body: int
+    rotor: bool
     parameter: str
     value: float
     needed: float
@@ -73,6 +75,7 @@ class UnfitDirection:
             "inertia": self.inertia,
             "inertia_of_nearest": self.expected,
             "link": self.body,
+            "rotor": self.rotor,
             "parameter": self.parameter,
             "value": self.value,
             "value_of_nearest": self.needed,
@@ -88,19 +91,20 @@ class UnfitDirection:
             signs = ["" if self.direction[j - 1] * self.direction[first - 1] > 0 else "against it " for j in others]
             way += " with " + " and ".join(f"joint {j} {sign}".strip() for j, sign in zip(others, signs, strict=True))
         shift = f"{self.shift:.2g} standard errors" if np.isfinite(self.shift) else "which the logs do not determine"
+        part = f"The rotor of joint {self.body}" if self.rotor else f"Link {self.body}"
         return (
-            f"The model cannot be simulated: moving {way} has an inertia of {self.inertia:.3g} kg m2. Link {self.body} "
-            f"makes it so: {self.parameter} is {self.value:.3g}, and {self.needed:.3g} in the nearest model of bodies "
-            f"that can exist ({shift}). That model simulates, with an inertia of {self.expected:.3g} kg m2. The "
-            f"largest change of a determined parameter in it is {self.change:.2g} standard errors."
+            f"The model cannot be simulated: moving {way} has an inertia of {self.inertia:.3g} kg m2. {part} makes it "
+            f"so: {self.parameter} is {self.value:.3g}, and {self.needed:.3g} in the nearest model that simulates "
+            f"({shift}). There the inertia is {self.expected:.3g} kg m2. The largest change of a determined parameter in "
+            f"it is {self.change:.2g} standard errors."
         )
 
 
 def find_unfit_direction(model: Model, motions: Motion | Sequence[Motion]) -> UnfitDirection | None:
     """Finds the motion to which a model gives no inertia, if there is one.
 
-    A model is unfit where its inertia matrix is not positive definite. It is compared with the nearest model whose
-    links are bodies that can exist.
+    A model is unfit where its inertia matrix is not positive definite. It is compared with the nearest model that can
+    be simulated, see `nearest_simulable`.
 
     Args:
         model: an identified model.
@@ -123,7 +127,7 @@ def find_unfit_direction(model: Model, motions: Motion | Sequence[Motion]) -> Un
         raise InputError("the model's parameters are not the robot's base parameters", remedy="identify it again")
     if all(_definite(inertia_matrices(base, model.values, motion, POSES)) for motion in listed):
         return None
-    nearest, change = nearest_feasible(model, np.asarray(robot.inertia), np.asarray(robot.rotor_inertia))
+    nearest, change = nearest_simulable(model)
     worst: tuple[float, Array, Array] | None = None
     for motion in listed:
         at = np.linspace(0, len(motion) - 1, min(len(motion), POSES)).astype(int)
@@ -148,6 +152,7 @@ def find_unfit_direction(model: Model, motions: Motion | Sequence[Motion]) -> Un
         inertia=_along(base, model.values, at_pose, direction),
         expected=_along(base, nearest.values, at_pose, direction),
         body=body,
+        rotor=model.parameters[most].term == "rotor_inertia",
         parameter=model.names[most],
         value=float(model.values[most]),
         needed=float(nearest.values[most]),
