@@ -1,0 +1,9 @@
+"""External forces from the drives' torques: observer, contacts, and the link that was touched."""
+
+from estimation.external_forces.calibrations import Calibration
+from estimation.external_forces.contacts import Contact
+from estimation.external_forces.force_estimation import estimate_forces
+from estimation.external_forces.localisation import Place
+from estimation.external_forces.result import ForceEstimate
+
+__all__ = ["Calibration", "Contact", "ForceEstimate", "Place", "estimate_forces"]
