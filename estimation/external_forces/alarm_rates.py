@@ -12,8 +12,9 @@ from robots.common.errors import InputError
 Array = NDArray[np.float64]
 
 HOUR = 3600.0
-# Share of the samples below the level above which peaks count.
-BASE = 0.95
+# Shares of the samples below the level above which peaks count: the first that leaves enough independent peaks.
+BASES = (0.98, 0.95, 0.9, 0.8, 0.7, 0.6, 0.5)
+ENOUGH_PEAKS = 30
 # Fewer independent peaks than this say too little of a tail.
 LEAST_PEAKS = 8
 
@@ -68,9 +69,12 @@ def alarm_threshold(statistic: Array, period: float, rate: float, *, robust: boo
     """
     if not (np.isfinite(rate) and rate > 0):
         raise InputError(f"{rate} false alarms per hour", allowed="a positive number")
-    base = float(np.quantile(statistic, BASE)) if len(statistic) else 0.0
-    places = np.flatnonzero(statistic > base)
-    index, clusters, run = _grouped(places)
+    for share in BASES:
+        base = float(np.quantile(statistic, share)) if len(statistic) else 0.0
+        places = np.flatnonzero(statistic > base)
+        index, clusters, run = _grouped(places)
+        if clusters >= ENOUGH_PEAKS:
+            break
     if clusters < LEAST_PEAKS:
         raise InputError(
             f"the healthy log of {period * len(statistic):.3g} s has {clusters} independent peaks of the residual",
@@ -109,6 +113,7 @@ def _grouped(places: NDArray[np.intp]) -> tuple[float, int, int]:
         index = 2 * (gaps - 1).sum() ** 2 / (len(gaps) * ((gaps - 1) * (gaps - 2)).sum())
     index = min(float(index), 1.0)
     clusters = min(int(index * len(places)) + 1, len(places))
-    # The largest gaps separate clusters; equal ones are not split.
+    # The largest gaps separate clusters. Samples that follow each other never do.
     run = int(np.sort(gaps)[::-1][min(clusters - 1, len(gaps)) - 1]) if clusters > 1 else int(gaps.max()) + 1
+    run = max(run, 2)
     return index, 1 + int((gaps >= run).sum()), run

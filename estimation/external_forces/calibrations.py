@@ -15,7 +15,7 @@ from estimation.external_forces.alarm_rates import AlarmThreshold, alarm_thresho
 from estimation.external_forces.error_models import ErrorModel, fit_error_model
 from estimation.external_forces.filters import filtered, time_constant
 from estimation.external_forces.localisation import Localiser, fit_localiser
-from estimation.external_forces.signals import Signals, Velocity
+from estimation.external_forces.signals import SETTLING, Signals, Velocity
 from estimation.models.model import Model
 from robots.common.errors import InputError
 from robots.common.files import existing_file
@@ -155,6 +155,7 @@ def calibrate_signals(
     velocity: Velocity,
     false_alarms: float,
     own: bool = False,
+    in_fit: bool = False,
 ) -> Calibration:
     """Learns the settings from logs of a healthy robot.
 
@@ -165,6 +166,7 @@ def calibrate_signals(
         velocity: what velocities the signals have.
         false_alarms: an hour.
         own: whether the logs may contain contacts: those are left out, until nothing changes any more.
+        in_fit: whether the model was fitted to these logs, so that the parameters' errors hardly show in them.
 
     Raises:
         InputError: too little data.
@@ -172,15 +174,16 @@ def calibrate_signals(
     whole = _joined(healthy)
     lag = _lag(whole, bandwidth)
     residual = lag(whole.external, from_zero=True)
-    # The filter's first moments know nothing of the residual.
-    settled = _since(whole) > 3.0 * time_constant(bandwidth)
+    # The filter begins with zero, and its first moments know little of the residual.
+    settled = _since(whole) > SETTLING * time_constant(bandwidth)
     counts = settled.copy()
     for number in range(ROUNDS if own else 1):
         first = own and number == 0
         # At first nobody knows what is a contact: it must not decide how large errors are.
         fitted = _winsorised(residual, settled) if first else residual
-        errors = fit_error_model(model, fitted, whole.dq, whole.friction, whole.variance, counts, lag)
-        deviation = errors.deviation(lag(errors.amplitudes(whole.dq, whole.friction, whole.variance)))
+        errors = fit_error_model(model, fitted, whole.dq, whole.friction, whole.variance, counts, lag, in_fit=in_fit)
+        w = lag(errors.amplitudes(whole.dq, whole.friction, whole.variance * (not in_fit)))
+        deviation = errors.deviation(w)
         statistic = errors.statistic(residual, deviation)
         threshold = alarm_threshold(statistic[counts], whole.period, false_alarms, robust=first)
         reach = max(round(3.0 * time_constant(bandwidth) / whole.period), 1)

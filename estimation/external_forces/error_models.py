@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import nnls
 
+from estimation.exports.friction import linear_friction
 from estimation.models.model import Model
+from robots.terms.friction import SLOWEST
 
 Array = NDArray[np.float64]
 
@@ -26,11 +28,12 @@ LEAST, DISTINCT = 1e-3, 1e-3
 class ErrorModel:
     """Variance of each joint's residual on a healthy robot, and the correlation between joints.
 
-        var_j = level_j + reversal_j w_1^2 + friction_j w_2^2 + w_3^2
+        var_j = level_j + reversal_j w_1^2 + friction_j w_2^2 + w_3^2 + w_4^2
 
-    w_1 is exp(-(dq / width)^2 / 2): near a reversal, and at rest, friction has no sure sign. w_2 is the friction's
-    size: its error grows with it. w_3 is what the parameters' errors make of a motion beyond that of any row of the
-    fit (the band of `oed predict`). Each passes the observer's filter, as the residual does.
+    w_1 is exp(-(dq / width)^2 / 2): near a reversal friction has no sure sign. w_2 is the friction's size: its error
+    grows with it. w_3 is what the parameters' errors make of a motion beyond that of any row of the fit (the band of
+    `oed predict`). w_4 is coulomb / sqrt(3) at rest: static friction is anywhere between its limits. Each passes the
+    observer's filter, as the residual does.
 
     Attributes:
         level: (n,) [(N m)^2].
@@ -39,6 +42,7 @@ class ErrorModel:
         width: (n,) [rad/s or m/s].
         growth: (n,) factor on the parameters' standard deviations.
         reach: (n,) largest standard deviation of a row of the fit [N m or N].
+        coulomb: (n,) Coulomb friction [N m or N].
         correlation: (n, n) of the scaled residuals.
     """
 
@@ -48,21 +52,25 @@ class ErrorModel:
     width: Array
     growth: Array
     reach: Array
+    coulomb: Array
     correlation: Array
 
     def amplitudes(self, dq: Array, friction: Array, variance: Array) -> Array:
-        """Gives w_1, w_2 and w_3 before the filter (N, 3, n).
+        """Gives w_1 to w_4 before the filter (N, 4, n).
 
         Args:
             dq: velocities (N, n).
             friction: friction torque (N, n).
             variance: of the torque by the parameters' errors (N, n).
         """
-        return amplitudes(dq, friction, variance, self.width, self.growth, self.reach)
+        beyond = self.growth * np.sqrt(np.maximum(variance - self.reach**2, 0.0))
+        holding = np.where(np.abs(dq) < SLOWEST, self.coulomb / np.sqrt(3.0), 0.0)
+        return np.stack([np.exp(-0.5 * (dq / self.width) ** 2), np.abs(friction), beyond, holding], axis=-2)
 
     def deviation(self, amplitudes: Array) -> Array:
-        """Gives the residual's standard deviation (N, n) [N m or N] of filtered amplitudes (N, 3, n)."""
-        weights = np.stack([self.reversal, self.friction, np.ones_like(self.level)])
+        """Gives the residual's standard deviation (N, n) [N m or N] of filtered amplitudes (N, 4, n)."""
+        known = np.ones_like(self.level)
+        weights = np.stack([self.reversal, self.friction, known, known])
         return np.asarray(np.sqrt(self.level + (weights * amplitudes**2).sum(axis=-2)))
 
     def statistic(self, residual: Array, deviation: Array) -> Array:
@@ -84,13 +92,7 @@ class ErrorModel:
         return ErrorModel(**{name: np.array(data[name], dtype=float) for name in FIELDS})
 
 
-FIELDS = ("level", "reversal", "friction", "width", "growth", "reach", "correlation")
-
-
-def amplitudes(dq: Array, friction: Array, variance: Array, width: Array, growth: Array, reach: Array) -> Array:
-    """Gives the three amplitudes (N, 3, n) of `ErrorModel`, before the filter."""
-    beyond = growth * np.sqrt(np.maximum(variance - reach**2, 0.0))
-    return np.stack([np.exp(-0.5 * (dq / width) ** 2), np.abs(friction), beyond], axis=-2)
+FIELDS = ("level", "reversal", "friction", "width", "growth", "reach", "coulomb", "correlation")
 
 
 def fit_error_model(
@@ -101,6 +103,8 @@ def fit_error_model(
     variance: Array,
     counts: NDArray[np.bool_],
     lagged: Callable[[Array], Array],
+    *,
+    in_fit: bool = False,
 ) -> ErrorModel:
     """Fits the variances to squared residuals by weighted least squares with non-negative coefficients.
 
@@ -115,30 +119,39 @@ def fit_error_model(
         variance: of the torque by the parameters' errors (N, n).
         counts: which samples (N,) are healthy.
         lagged: the observer's filter.
+        in_fit: whether the model was fitted to these logs: the parameters' errors hardly show in them, and are added at
+            any motion.
     """
     n = residual.shape[1]
     growth, reach = band_parts(model)
+    reach, shows = (np.zeros(n), 0.0) if in_fit else (reach, 1.0)
+    friction_of = linear_friction(model)
+    coulomb = np.zeros(n) if friction_of is None else friction_of.coulomb
     fastest = np.maximum(np.abs(dq).max(axis=0), np.finfo(float).tiny)
     rows = np.flatnonzero(counts)[:: max(1, int(counts.sum()) // MOST_ROWS)]
-    square = residual[rows] ** 2
-    best, found = np.full(n, np.inf), np.zeros((4, n))
-    beyond: Array | None = None
+    square, ones = residual[rows] ** 2, np.ones(n)
+    best, fitted = np.full(n, np.inf), np.zeros((4, n))
     for share in WIDTHS:
-        width = share * fastest
-        w = lagged(amplitudes(dq, friction, variance, width, growth, reach))[rows]
-        beyond = w[:, 2] if beyond is None else beyond
+        trial = ErrorModel(
+            level=ones,
+            reversal=ones,
+            friction=ones,
+            width=share * fastest,
+            growth=growth,
+            reach=reach,
+            coulomb=coulomb,
+            correlation=np.eye(n),
+        )
+        w = lagged(trial.amplitudes(dq, friction, variance))[rows] ** 2
         for j in range(n):
-            columns = np.column_stack([np.ones(len(rows)), w[:, 0, j] ** 2, w[:, 1, j] ** 2])
-            weights, cost = _variance_fit(columns, square[:, j], beyond[:, j] ** 2)
+            columns = np.column_stack([np.ones(len(rows)), w[:, 0, j], w[:, 1, j]])
+            weights, cost = _variance_fit(columns, square[:, j], w[:, 3, j] + shows * w[:, 2, j])
             if cost < best[j]:
-                best[j], found[:, j] = cost, [*weights, width[j]]
-    raw = ErrorModel(
-        level=found[0], reversal=found[1], friction=found[2], width=found[3], growth=growth, reach=reach,
-        correlation=np.eye(n),
-    )  # fmt: skip
-    w = lagged(raw.amplitudes(dq, friction, variance))[rows]
-    z = residual[rows] / raw.deviation(w)
-    return ErrorModel(**{**{name: getattr(raw, name) for name in FIELDS}, "correlation": _correlation(z)})
+                best[j], fitted[:, j] = cost, [*weights, trial.width[j]]
+    found = replace(trial, level=fitted[0], reversal=fitted[1], friction=fitted[2], width=fitted[3])
+    w = lagged(found.amplitudes(dq, friction, variance))[rows]
+    w[:, 2] *= shows
+    return replace(found, correlation=_correlation(residual[rows] / found.deviation(w)))
 
 
 def band_parts(model: Model) -> tuple[Array, Array]:

@@ -14,6 +14,7 @@ from estimation.external_forces.fit_checks import check_fit
 from estimation.external_forces.result import ForceEstimate
 from estimation.external_forces.signals import Signals, Velocity, signals_of
 from estimation.external_forces.wrenches import tool_load
+from estimation.logs.provenance import are_same_log, describe_logs
 from estimation.models.model import Model
 from estimation.predictions.prediction import Prediction, predict
 from robots.common.errors import InputError
@@ -88,6 +89,13 @@ def estimate_forces(
         return signals_of(model, dynamics, own, prediction, bandwidth, velocity)
 
     signals = prepared(log, 0)
+    known = model.provenance.get("logs", ())
+    in_fit = any(are_same_log(own, other) for own in describe_logs(healthy) for other in known)
+    if in_fit:
+        warnings.append(
+            "the model was fitted to a log of --healthy: the parameters' errors are added to its residual; a log that "
+            "the fit has not seen gives a lower threshold"
+        )
     if calibration is None:
         calibration = calibrate_signals(
             model,
@@ -96,6 +104,7 @@ def estimate_forces(
             velocity=velocity,
             false_alarms=false_alarms,
             own=not healthy,
+            in_fit=in_fit,
         )
     if calibration.own:
         warnings.append("the threshold comes from this log itself: a contact in most of it would be missed (--healthy)")

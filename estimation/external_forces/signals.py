@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import Literal
 
 import numpy as np
@@ -11,15 +12,19 @@ from numpy.typing import NDArray
 from estimation.external_forces.dynamics import Dynamics
 from estimation.external_forces.filters import external_torque, filtered, restarts, time_constant
 from estimation.models.model import Model
+from estimation.predictions.checked_motions import smoother_of
 from estimation.predictions.prediction import Prediction
+from estimation.preprocessing import Smoother
 from robots.common.errors import InputError
 from robots.signals import Log
 
 Array = NDArray[np.float64]
 Velocity = Literal["smoothed", "logged"]
 
-# Fewer samples than this make no residual.
-SHORTEST = 4.0
+# Time constants that a log must last.
+SHORTEST = 10.0
+# Time constants after a start in which nothing is judged.
+SETTLING = 3.0
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -86,7 +91,7 @@ def signals_of(
         )
     q, dq, ddq = motion.q, motion.dq, motion.ddq
     cold = model.torque(q, dq, ddq, gravity=log.gravity, payload=log.payload)
-    begins = restarts(motion.t, constant)
+    begins = _unsettled(motion.t, restarts(motion.t, constant), constant, smoother_of(model, prediction.cutoff))
     if velocity == "logged":
         q, dq = logged_motion(log, motion.t)
         ddq = filtered(_differences(dq, motion.t, begins), motion.t, constant, begins)
@@ -123,6 +128,20 @@ def logged_motion(log: Log, t: Array) -> tuple[Array, Array]:
             remedy="use velocities from smoothed positions: leave --velocity out",
         )
     return tuple(np.column_stack([np.interp(t, log.t, column) for column in x.T]) for x in (log.q, log.dq))  # type: ignore[return-value]
+
+
+def _unsettled(t: Array, begins: NDArray[np.bool_], constant: float, smoother: Smoother) -> NDArray[np.bool_]:
+    """Marks samples (N,) near the ends of each part, where smoothed positions are not to be trusted.
+
+    At the start filters of the recorder settle as well: the observer waits for some of its time constants.
+    """
+    result = np.zeros(len(t), dtype=bool)
+    edges = [*np.flatnonzero(begins).tolist(), len(t)]
+    for first, last in pairwise(edges):
+        own = t[first:last]
+        edge = smoother.edge(float(own[-1] - own[0]))
+        result[first:last] = (own < own[0] + max(edge, SETTLING * constant)) | (own > own[-1] - edge)
+    return result
 
 
 def _differences(x: Array, t: Array, begins: NDArray[np.bool_]) -> Array:

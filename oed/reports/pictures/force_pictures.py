@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from oed.reports.rendering.joint_units import joint_titles, joint_units
-from oed.reports.rendering.palette import joint_role, sequence_role
+from oed.reports.rendering.palette import sequence_role
 from oed.reports.rendering.picture import Line, Panel, Picture, Series, Span
 from oed.reports.rendering.significant import NORMAL_95
 from robots.signals import FloatArray
@@ -111,8 +111,8 @@ def external_torque_picture(
             y_label=f"[{units[j].torque}]",
             series=(
                 Series(x=times, y=other[:, j], name="inverse dynamics", role="neutral", opacity=0.7),
-                Series(x=times, y=residual[:, j], name="momentum observer", role=joint_role(j + 1)),
-                Series(x=times, y=NORMAL_95 * spread[:, j], name="95 % of a healthy robot", role="limit", dash="dot"),
+                Series(x=times, y=residual[:, j], name="momentum observer", role="measured"),
+                Series(x=times, y=NORMAL_95 * spread[:, j], name="95 % band of a healthy robot", role="limit", dash="dot"),
                 Series(x=times, y=-NORMAL_95 * spread[:, j], role="limit", dash="dot"),
             ),
             spans=_spans(windows),
