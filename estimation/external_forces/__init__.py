@@ -5,5 +5,6 @@ from estimation.external_forces.contacts import Contact
 from estimation.external_forces.force_estimation import estimate_forces
 from estimation.external_forces.localisation import Place
 from estimation.external_forces.result import ForceEstimate
+from estimation.external_forces.streaming import ForceObserver, Reading
 
-__all__ = ["Calibration", "Contact", "ForceEstimate", "Place", "estimate_forces"]
+__all__ = ["Calibration", "Contact", "ForceEstimate", "ForceObserver", "Place", "Reading", "estimate_forces"]

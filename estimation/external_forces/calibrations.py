@@ -40,6 +40,7 @@ class Calibration:
         errors: standard deviation of the residual by the motion.
         threshold: of the squared distance of the residual from zero.
         localiser: levels from which joints react.
+        friction_square: mean square of each joint's friction (n,) [(N m)^2].
         own: whether the log itself served, without its contacts.
     """
 
@@ -49,6 +50,7 @@ class Calibration:
     errors: ErrorModel
     threshold: AlarmThreshold
     localiser: Localiser
+    friction_square: Array
     own: bool = False
 
     @property
@@ -69,6 +71,7 @@ class Calibration:
                 "link": self.localiser.link.tolist(),
                 "tool": self.localiser.tool,
             },
+            "friction_square": self.friction_square.tolist(),
             "own_log": self.own,
         }
 
@@ -92,6 +95,7 @@ class Calibration:
                     link=np.array(levels["link"], dtype=float),
                     tool=float(levels["tool"]),
                 ),
+                friction_square=np.array(data["friction_square"], dtype=float),
                 own=bool(data["own_log"]),
             )
         except (KeyError, TypeError, ValueError) as error:
@@ -202,6 +206,7 @@ def calibrate_signals(
         errors=errors,
         threshold=threshold,
         localiser=localiser,
+        friction_square=np.maximum((whole.friction**2).mean(axis=0), np.finfo(float).tiny),
         own=own,
     )
 

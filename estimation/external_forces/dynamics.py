@@ -66,7 +66,7 @@ class Dynamics:
 
     def variance_expression(self, q: casadi.SX, dq: casadi.SX, ddq: casadi.SX) -> casadi.SX:
         """Builds diag(Y Cov Y') (n,) [(N m)^2]: the variance of the torque by the parameters' errors."""
-        spread = self.torque_model.symbolic(self.columns)(q, dq, ddq) @ casadi.DM(_root(self.covariance))
+        spread = self.torque_model.symbolic(self.columns)(q, dq, ddq) @ casadi.DM(covariance_root(self.covariance))
         return casadi.densify(casadi.sum2(spread**2))
 
     def _jacobian(self, q: casadi.SX) -> casadi.SX:
@@ -79,13 +79,14 @@ class Dynamics:
         return casadi.substitute(casadi.horzcat(*columns), frames.q, q)
 
     @cached_property
-    def _evaluator(self) -> BatchFunction:
+    def evaluator(self) -> BatchFunction:
+        """Evaluates `expressions` of (q, dq, pi)."""
         return _evaluator(self.torque_model, self.columns, self.tool)
 
     def __call__(self, q: Array, dq: Array) -> tuple[Array, Array, Array, Array]:
         """Evaluates `expressions` on arrays (N, n): p, beta without friction, friction (N, n), Jacobian (N, 6, n)."""
         pi = np.broadcast_to(self.values, (len(q), len(self.values)))
-        p, rest, friction, jacobian = self._evaluator(q, dq, pi)
+        p, rest, friction, jacobian = self.evaluator(q, dq, pi)
         return p[..., 0], rest[..., 0], friction[..., 0], jacobian
 
     def variance(self, q: Array, dq: Array, ddq: Array) -> Array:
@@ -108,7 +109,7 @@ def _evaluator(torque_model: TorqueModel, columns: tuple[int, ...], tool: tuple[
     return batch_function(casadi.Function("dynamics", [q, dq, pi], dynamics.expressions(q, dq, pi)))
 
 
-def _root(covariance: Array) -> Array:
+def covariance_root(covariance: Array) -> Array:
     """Gives a matrix (b, r) whose product with its transpose is the covariance."""
     values, vectors = np.linalg.eigh(covariance)
     kept = values > np.finfo(float).eps * max(float(values[-1]), 0.0)

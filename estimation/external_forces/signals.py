@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from estimation.external_forces.dynamics import Dynamics
 from estimation.external_forces.filters import external_torque, filtered, restarts, time_constant
+from estimation.external_forces.friction_levels import friction_excess
 from estimation.models.model import Model
 from estimation.predictions.checked_motions import smoother_of
 from estimation.predictions.prediction import Prediction
@@ -41,6 +42,7 @@ class Signals:
         jacobian: of the tool point in the base frame (N, 6, n).
         external: external torque by the momentum, not filtered (N, n) [N m or N].
         direct: external torque by inverse dynamics, not filtered (N, n) [N m or N].
+        excess: of the friction over the model's, as a share of it (N, n).
         extrapolates: where (N, n) the prediction extrapolates.
         begins: where (N,) the observer begins anew.
     """
@@ -54,6 +56,7 @@ class Signals:
     jacobian: Array
     external: Array
     direct: Array
+    excess: Array
     extrapolates: NDArray[np.bool_]
     begins: NDArray[np.bool_]
 
@@ -98,6 +101,8 @@ def signals_of(
     momentum, rest, friction, jacobian = dynamics(q, dq)
     # What the model adds to its terms, heat and extensions, acts at the joints as friction does.
     beta = rest + friction + (prediction.predicted - cold)
+    external = external_torque(motion.t, momentum, prediction.measured - beta, begins)
+    excess = friction_excess(motion.t, external, friction, begins)
     nothing = np.zeros(motion.q.shape, dtype=bool)
     return Signals(
         t=motion.t,
@@ -107,8 +112,9 @@ def signals_of(
         friction=friction,
         variance=dynamics.variance(q, dq, ddq),
         jacobian=jacobian,
-        external=external_torque(motion.t, momentum, prediction.measured - beta, begins),
-        direct=prediction.predicted - prediction.measured,
+        external=np.where(begins[:, None], 0.0, external + excess * friction),
+        direct=prediction.predicted - prediction.measured + excess * friction,
+        excess=excess,
         extrapolates=nothing if prediction.extrapolates is None else prediction.extrapolates,
         begins=begins,
     )

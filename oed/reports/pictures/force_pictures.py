@@ -112,7 +112,9 @@ def external_torque_picture(
             series=(
                 Series(x=times, y=other[:, j], name="inverse dynamics", role="neutral", opacity=0.7),
                 Series(x=times, y=residual[:, j], name="momentum observer", role="measured"),
-                Series(x=times, y=NORMAL_95 * spread[:, j], name="95 % band of a healthy robot", role="limit", dash="dot"),
+                Series(
+                    x=times, y=NORMAL_95 * spread[:, j], name="95 % band of a healthy robot", role="limit", dash="dot"
+                ),
                 Series(x=times, y=-NORMAL_95 * spread[:, j], role="limit", dash="dot"),
             ),
             spans=_spans(windows),
