@@ -17,6 +17,7 @@ import sys
 import time
 import warnings
 from dataclasses import replace
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -213,7 +214,8 @@ def table(rows: list[dict[str, Any]]) -> str:
         lines += [
             f"{words}: {len(rows)} robots, {len(pushes)} pushes of {FORCE:g} N for {LENGTH:g} s",
             f"  detected {len(hits)} ({_share(len(hits), len(pushes))})",
-            f"  false alarms {alarms} in {hours:.2f} h: {alarms / hours:.2f} ({np.nan_to_num(low):.2f} to {high:.2f}) per hour",
+            f"  false alarms {alarms} in {hours:.2f} h: {alarms / hours:.2f} per hour "
+            f"({np.nan_to_num(low):.2f} to {high:.2f})",
         ]
         if hits:
             errors = np.array([push["error"] for push in hits])
@@ -221,8 +223,10 @@ def table(rows: list[dict[str, Any]]) -> str:
             lines += [
                 f"  magnitude within 20 %: {close} ({_share(close, len(hits))})",
                 f"  magnitude within its own 95 % interval: {inside} ({_share(inside, len(hits))})",
-                f"  error of the force vector: median {np.median(errors):.2f} N, 95 % below {np.quantile(errors, 0.95):.2f} N",
-                f"  a force at the tool is accepted: {tool} ({_share(tool, len(hits))}); median delay {1e3 * delay:.0f} ms",
+                f"  error of the force vector: median {np.median(errors):.2f} N, 95 % below "
+                f"{np.quantile(errors, 0.95):.2f} N",
+                f"  a force at the tool is accepted: {tool} ({_share(tool, len(hits))})",
+                f"  median delay {1e3 * delay:.0f} ms",
             ]
     left = np.mean([row["friction_left"] for row in rows])
     return "\n".join([*lines, f"friction at the end over that at the start: {left:.2f}"])
@@ -242,7 +246,7 @@ def measured(folder: Path) -> str:
     lines = ["UR10, no contact in the log: contacts found, largest statistic over the threshold"]
     for parts in (2, 3):
         edges = np.linspace(0, len(log), parts + 1).astype(int)
-        pieces = [log.rows(slice(a, b)) for a, b in zip(edges[:-1], edges[1:], strict=True)]
+        pieces = [log.rows(slice(a, b)) for a, b in pairwise(edges.tolist())]
         models = [identify(robot, piece).model for piece in pieces]
         for i, model in enumerate(models):
             for k, piece in enumerate(pieces):

@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from estimation.external_forces.calibrations import Calibration, Observed
 from estimation.external_forces.localisation import Place
-from estimation.external_forces.signals import Signals
+from estimation.external_forces.residuals.signals import Signals
+from estimation.external_forces.thresholds.calibrations import Calibration, Observed
 from estimation.external_forces.wrenches import tool_load
 from robots.common.plain import all_finite, finite
 from robots.common.stretches import spans

@@ -6,13 +6,13 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from estimation.external_forces.calibrations import Calibration, calibrate_signals, observe
 from estimation.external_forces.contacts import find_contacts
-from estimation.external_forces.dynamics import dynamics_of, require_inertia
-from estimation.external_forces.filters import filtered
-from estimation.external_forces.fit_checks import check_fit
+from estimation.external_forces.residuals.dynamics import dynamics_of, require_inertia
+from estimation.external_forces.residuals.filters import filtered
+from estimation.external_forces.residuals.signals import Signals, Velocity, signals_of
 from estimation.external_forces.result import ForceEstimate
-from estimation.external_forces.signals import Signals, Velocity, signals_of
+from estimation.external_forces.thresholds.calibrations import Calibration, calibrate_signals, observe
+from estimation.external_forces.thresholds.fit_checks import check_fit
 from estimation.external_forces.wrenches import tool_load
 from estimation.logs.provenance import are_same_log, describe_logs
 from estimation.models.model import Model

@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from estimation.external_forces.calibrations import Calibration
 from estimation.external_forces.contacts import Contact
+from estimation.external_forces.thresholds.calibrations import Calibration
 from robots.common.files import write_atomic
 from robots.common.tables.table_files import write_table
 

@@ -117,6 +117,6 @@ def force(
 
 def _calibration(path: Path, joints: int) -> Calibration:
     """Reads the calibration of a forces.json."""
-    from estimation.external_forces.calibrations import read_calibration
+    from estimation.external_forces.thresholds.calibrations import read_calibration
 
     return read_calibration(path, joints)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from estimation.external_forces.filters import filtered
+from estimation.external_forces.residuals.filters import filtered
 
 Array = NDArray[np.float64]
 

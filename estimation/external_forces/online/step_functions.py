@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from estimation.external_forces.dynamics import Dynamics, covariance_root
-from estimation.external_forces.error_models import ErrorModel
+from estimation.external_forces.residuals.dynamics import Dynamics, covariance_root
+from estimation.external_forces.thresholds.error_models import ErrorModel
 from robots.terms.friction import SLOWEST
 
 Array = NDArray[np.float64]

@@ -9,11 +9,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from estimation.external_forces.calibrations import Calibration
-from estimation.external_forces.dynamics import dynamics_of
-from estimation.external_forces.friction_levels import MEMORY
-from estimation.external_forces.signals import SETTLING
-from estimation.external_forces.step_functions import StepErrors, StepFunction
+from estimation.external_forces.online.step_functions import StepErrors, StepFunction
+from estimation.external_forces.residuals.dynamics import dynamics_of
+from estimation.external_forces.residuals.friction_levels import MEMORY
+from estimation.external_forces.residuals.signals import SETTLING
+from estimation.external_forces.thresholds.calibrations import Calibration
 from estimation.external_forces.wrenches import tool_load
 from estimation.models.model import Model
 from robots.common.errors import InputError
@@ -159,15 +159,15 @@ class ForceObserver:
         """
         if dq is None:
             raise InputError("no velocities", allowed=f"{self.n} numbers [rad/s or m/s]", remedy="record dq as well")
-        q, dq, tau = self._checked(q, dq, tau)
+        at, speed, measured = self._checked(q, dq, tau)
         if self._t is not None and not t > self._t:
             raise InputError(f"time {t} after {self._t}", allowed="times that increase")
-        momentum, rest, friction, jacobian = self._step(q, dq)
-        other = tau - rest - self._factors * friction
+        momentum, rest, friction, jacobian = self._step(at, speed)
+        other = measured - rest - self._factors * friction
         constant, errors = self._constant, self._errors
         step = None if self._t is None else t - self._t
         if self._friction and step is not None:
-            self._heat(friction * dq, step)
+            self._heat(friction * speed, step)
         if step is None or step > max(constant, 2.0 * self.calibration.period):
             self._begun, fresh = t, True
             self._residual = np.zeros(self.n)
@@ -182,16 +182,16 @@ class ForceObserver:
             self._square = b * square + (1.0 - b) * friction * friction
             external += friction * cross / square
             self._residual = a * self._residual + (1.0 - a) * external
-            self._acceleration = a * self._acceleration + (1.0 - a) * (dq - self._dq) / step
-        variance = self._step.variance(q, dq, self._acceleration) if errors.widens else None
-        now = errors.amplitudes(dq, friction, variance)
+            self._acceleration = a * self._acceleration + (1.0 - a) * (speed - self._dq) / step
+        variance = self._step.variance(at, speed, self._acceleration) if errors.widens else None
+        now = errors.amplitudes(speed, friction, variance)
         self._amplitudes = now.copy() if fresh else a * self._amplitudes + (1.0 - a) * now
-        self._t, self._momentum, self._other, self._dq = t, momentum, other, dq
+        self._t, self._momentum, self._other, self._dq = t, momentum, other, speed
         deviation = errors.deviation(self._amplitudes)
         statistic = errors.statistic(self._residual, deviation) / self._threshold
         settled = t - self._begun > SETTLING * constant
         return Reading(
-            t, self._residual, deviation, statistic, settled and statistic > 1.0, jacobian, q, self.calibration
+            t, self._residual, deviation, statistic, settled and statistic > 1.0, jacobian, at, self.calibration
         )
 
     def _heat(self, power: Array, step: float) -> None:

@@ -11,11 +11,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from estimation.external_forces.alarm_rates import AlarmThreshold, alarm_threshold
-from estimation.external_forces.error_models import ErrorModel, fit_error_model
-from estimation.external_forces.filters import filtered, time_constant
 from estimation.external_forces.localisation import Localiser, fit_localiser
-from estimation.external_forces.signals import SETTLING, Signals, Velocity
+from estimation.external_forces.residuals.filters import filtered, time_constant
+from estimation.external_forces.residuals.signals import SETTLING, Signals, Velocity
+from estimation.external_forces.thresholds.alarm_rates import AlarmThreshold, alarm_threshold
+from estimation.external_forces.thresholds.error_models import ErrorModel, fit_error_model
 from estimation.models.model import Model
 from robots.common.errors import InputError
 from robots.common.files import existing_file

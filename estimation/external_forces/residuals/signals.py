@@ -9,9 +9,9 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from estimation.external_forces.dynamics import Dynamics
-from estimation.external_forces.filters import external_torque, filtered, restarts, time_constant
-from estimation.external_forces.friction_levels import friction_excess
+from estimation.external_forces.residuals.dynamics import Dynamics
+from estimation.external_forces.residuals.filters import external_torque, filtered, restarts, time_constant
+from estimation.external_forces.residuals.friction_levels import friction_excess
 from estimation.models.model import Model
 from estimation.predictions.checked_motions import smoother_of
 from estimation.predictions.prediction import Prediction
