@@ -34,7 +34,7 @@ from estimation.models.model import Model
 from estimation.predictions.prediction import predict
 from estimation.thermal import ThermalTorqueModel, start_temperatures
 from robots import Log, Motion, Robot, load_robot, nominal_plant, simulate
-from robots.common.errors import AssumedValueWarning
+from robots.common.errors import AssumedValueWarning, OedError
 from robots.plants import Plant, PlantEffect
 from robots.plants.heat import plant_heat, reference_friction
 from robots.thermal import ThermalModel
@@ -165,8 +165,12 @@ def run_seed(seed: int) -> dict[str, Any]:
     row: dict[str, Any] = {"seed": seed, "friction_left": float(np.mean(factor[1] / factor[0]))}
     for name, thermal in (("heat", thermal_of(model, plant, first, rng)), ("none", None)):
         predictor = predictor_of(model, thermal, [first, healthy, test])
-        found = estimate_forces(model, touched, healthy=[healthy], predictor=predictor)
-        alone = estimate_forces(model, free, calibration=found.calibration, predictor=predictor)
+        try:
+            found = estimate_forces(model, touched, healthy=[healthy], predictor=predictor)
+            alone = estimate_forces(model, free, calibration=found.calibration, predictor=predictor)
+        except OedError as error:
+            row[name] = {"refused": str(error), "pushes": [], "alarms": 0, "hours": 0.0}
+            continue
         row[name] = judged(found, alone, pushes)
     return {**row, "seconds": time.process_time() - started}
 
@@ -211,8 +215,9 @@ def table(rows: list[dict[str, Any]]) -> str:
         tool = sum(bool(push["tool"]) for push in hits)
         alarms, hours = sum(row[name]["alarms"] for row in rows), sum(row[name]["hours"] for row in rows)
         low, high = chi2.ppf([0.025, 0.975], [2 * alarms, 2 * alarms + 2]) / 2 / hours
+        refused = sum("refused" in row[name] for row in rows)
         lines += [
-            f"{words}: {len(rows)} robots, {len(pushes)} pushes of {FORCE:g} N for {LENGTH:g} s",
+            f"{words}: {len(rows)} robots, {refused} of them refused, {len(pushes)} pushes of {FORCE:g} N for {LENGTH:g} s",
             f"  detected {len(hits)} ({_share(len(hits), len(pushes))})",
             f"  false alarms {alarms} in {hours:.2f} h: {alarms / hours:.2f} per hour "
             f"({np.nan_to_num(low):.2f} to {high:.2f})",

@@ -82,11 +82,12 @@ def estimate_forces(
         prediction = run(own)
         if prediction.measured is None:
             raise InputError("the log has no torque", file=own.metadata.get("file"), remedy="record tau1.. or i1..")
-        found = check_fit(prediction, str(own.metadata.get("file") or own.name))
+        dynamics = dynamics_of(model, gravity=own.gravity, payload=own.payload, tool=tool)
+        signals = signals_of(model, dynamics, own, prediction, bandwidth, velocity)
+        found = check_fit(signals, prediction.band, str(own.metadata.get("file") or own.name))
         if found and not done:
             warnings.append(found)
-        dynamics = dynamics_of(model, gravity=own.gravity, payload=own.payload, tool=tool)
-        return signals_of(model, dynamics, own, prediction, bandwidth, velocity)
+        return signals
 
     signals = prepared(log, 0)
     known = model.provenance.get("logs", ())

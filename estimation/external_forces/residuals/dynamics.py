@@ -66,8 +66,14 @@ class Dynamics:
 
     def variance_expression(self, q: casadi.SX, dq: casadi.SX, ddq: casadi.SX) -> casadi.SX:
         """Builds diag(Y Cov Y') (n,) [(N m)^2]: the variance of the torque by the parameters' errors."""
-        spread = self.torque_model.symbolic(self.columns)(q, dq, ddq) @ casadi.DM(covariance_root(self.covariance))
-        return casadi.densify(casadi.sum2(spread**2))
+        Y = self.torque_model.symbolic(self.columns)(q, dq, ddq)
+        rows = []
+        for j in range(self.n):
+            used = Y[j, :].sparsity().get_triplet()[1]
+            y, own = Y[j, used], self.covariance[np.ix_(used, used)]
+            # Each product once: an upper triangle with the off-diagonal terms doubled.
+            rows.append(casadi.dot(y.T, casadi.DM(2.0 * np.triu(own, 1) + np.diag(np.diag(own))) @ y.T))
+        return casadi.densify(casadi.vertcat(*rows))
 
     def _jacobian(self, q: casadi.SX) -> casadi.SX:
         frames = symbolic_frames(self.torque_model.robot.chain)

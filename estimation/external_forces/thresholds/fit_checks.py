@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from estimation.predictions.prediction import Prediction
+from estimation.external_forces.residuals.signals import Signals
 from robots.common.errors import NotIdentifiableError
 from robots.terms.friction import SLOWEST
 
@@ -13,15 +13,18 @@ Array = NDArray[np.float64]
 
 # The band is to hold 95 % of a healthy log's errors. Where it holds less than half, something acts most of the time.
 HALF = 0.5
+# A joint that moves in less of the samples says nothing of the model.
+FEW = 0.1
 
 
-def check_fit(prediction: Prediction, name: str) -> str | None:
-    """Compares a log's torque with the model's prediction of it.
+def check_fit(signals: Signals, band: Array | None, name: str) -> str | None:
+    """Compares a log's torque with the model's prediction of it, with the level of friction as it is followed.
 
     Only samples count in which a joint moves: friction holds a joint that stands with any torque.
 
     Args:
-        prediction: of the log.
+        signals: of the log.
+        band: half-widths (N, n) of the model's 95 % band [N m or N]; None without one.
         name: of the log, for the message.
 
     Returns:
@@ -30,18 +33,16 @@ def check_fit(prediction: Prediction, name: str) -> str | None:
     Raises:
         NotIdentifiableError: the error of such a joint varies more than its torque, so that the model is of no use.
     """
-    assert prediction.measured is not None
-    if prediction.band is None:
+    if band is None:
         return None
-    outside, ratio = np.zeros((2, prediction.measured.shape[1]))
+    outside, ratio = np.zeros((2, signals.torque.shape[1]))
     for j in range(len(outside)):
-        moving = np.abs(prediction.motion.dq[:, j]) > SLOWEST
-        if moving.sum() < HALF * len(moving) / 2:
+        moving = np.abs(signals.dq[:, j]) > SLOWEST
+        if moving.mean() < FEW:
             continue
-        measured = prediction.measured[moving, j]
-        error = measured - prediction.predicted[moving, j]
-        outside[j] = np.mean(np.abs(error) > prediction.band[moving, j])
-        ratio[j] = np.sqrt(np.mean(error**2)) / max(float(measured.std()), np.finfo(float).tiny)
+        error = signals.direct[moving, j]
+        outside[j] = np.mean(np.abs(error) > band[moving, j])
+        ratio[j] = np.sqrt(np.mean(error**2)) / max(float(signals.torque[moving, j].std()), np.finfo(float).tiny)
     joint = int(np.argmax(np.where(outside > HALF, ratio, 0.0)))
     if not outside[joint] > HALF:
         return None

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import ExitStack
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -57,6 +58,14 @@ def force(
         str,
         typer.Option("--velocity", help="Velocities: smoothed (from positions) or logged (columns dq1..)."),
     ] = "smoothed",
+    c_code: Annotated[
+        Path | None,
+        typer.Option(
+            "--c-code",
+            help="Also write the observer as C code for a controller; needs --velocity logged.",
+            show_default=False,
+        ),
+    ] = None,
     out: OutOption = Path("forces"),
     png: PngOption = False,
     force: ForceOption = False,
@@ -68,49 +77,56 @@ def force(
     Writes forces.csv with the force at each sample, forces.json with the contacts, and report.html.
     """
     console = Console(json=json, quiet=quiet)
-    with console.working() as progress:
+    with console.working() as progress, ExitStack() as files:
         from estimation import load_model, predict, read_logs
         from estimation.external_forces import estimate_forces
+        from estimation.external_forces.online.c_export import observer_code
         from estimation.predictions.prediction import Prediction, clock_shift
         from oed.reports import save_force_report
         from robots.common.errors import InputError
-        from robots.common.files import ResultFolder
+        from robots.common.files import ResultFolder, open_atomic
         from robots.signals import Log
 
         if healthy and calibration is not None:
             raise InputError("--healthy and --calibration together", allowed="one of them")
+        if c_code is not None and calibration is None and velocity != "logged":
+            raise InputError("--c-code without --velocity logged", remedy="a controller has no smoothed velocities")
         point = numbers("--tool", tool)
         names = ["forces.csv", "forces.json", "report.html"]
-        with ResultFolder(out, force, names=names) as folder:
-            identified = load_model(model)
-            robot = identified.robot
-            options: dict[str, Any] = {"n": robot.n, "mapping": mapping, "joints": robot.joint_names}
-            read = read_logs([log, *(healthy or [])], **options, kinds=robot.chain.kinds)
-            recorded, *normal = with_torque_meaning(robot, with_known_setup(read, payload, gravity), torque_is)
-            assumed = ""
+        folder = files.enter_context(ResultFolder(out, force, names=names))
+        code = None if c_code is None else files.enter_context(open_atomic(c_code, force=force))
+        identified = load_model(model)
+        robot = identified.robot
+        options: dict[str, Any] = {"n": robot.n, "mapping": mapping, "joints": robot.joint_names}
+        read = read_logs([log, *(healthy or [])], **options, kinds=robot.chain.kinds)
+        recorded, *normal = with_torque_meaning(robot, with_known_setup(read, payload, gravity), torque_is)
+        assumed = ""
 
-            def predicted(own: Log) -> Prediction:
-                nonlocal assumed
-                later, clock = clock_shift(identified, own)
-                heat = heat_of(model, identified, own, before or [], ambient, mapping, later)
-                if own is recorded:
-                    assumed = "\n".join(words for words in (heat.assumed, clock) if words)
-                return predict(identified, own, later=later, **heat.options)
+        def predicted(own: Log) -> Prediction:
+            nonlocal assumed
+            later, clock = clock_shift(identified, own)
+            heat = heat_of(model, identified, own, before or [], ambient, mapping, later)
+            if own is recorded:
+                assumed = "\n".join(words for words in (heat.assumed, clock) if words)
+            return predict(identified, own, later=later, **heat.options)
 
-            result = estimate_forces(
-                identified,
-                recorded,
-                healthy=normal,
-                calibration=None if calibration is None else _calibration(calibration, robot.n),
-                false_alarms=false_alarms,
-                bandwidth=bandwidth,
-                tool=point,
-                velocity=velocity,  # type: ignore[arg-type]
-                predictor=predicted,
-                progress=progress,
-            )
-            result.save(folder.path("forces.json").parent)
-            save_force_report(result, folder, kinds=robot.chain.kinds, png=png)
+        result = estimate_forces(
+            identified,
+            recorded,
+            healthy=normal,
+            calibration=None if calibration is None else _calibration(calibration, robot.n),
+            false_alarms=false_alarms,
+            bandwidth=bandwidth,
+            tool=point,
+            velocity=velocity,  # type: ignore[arg-type]
+            predictor=predicted,
+            progress=progress,
+        )
+        result.save(folder.path("forces.json").parent)
+        save_force_report(result, folder, kinds=robot.chain.kinds, png=png)
+        if code is not None:
+            own = {"gravity": recorded.gravity, "payload": recorded.payload, "tool": point}
+            code.write(observer_code(identified, result.calibration, **own).encode())
     lines = [result.summary(), *([assumed] if assumed else []), f"written to {out.resolve()}"]
     console.result("\n".join(lines), {**result.to_dict(), "heat": assumed or None})
 
