@@ -217,7 +217,8 @@ def table(rows: list[dict[str, Any]]) -> str:
         low, high = chi2.ppf([0.025, 0.975], [2 * alarms, 2 * alarms + 2]) / 2 / hours
         refused = sum("refused" in row[name] for row in rows)
         lines += [
-            f"{words}: {len(rows)} robots, {refused} of them refused, {len(pushes)} pushes of {FORCE:g} N for {LENGTH:g} s",
+            f"{words}: {len(rows)} robots, {refused} of them refused, {len(pushes)} pushes of {FORCE:g} N for "
+            f"{LENGTH:g} s",
             f"  detected {len(hits)} ({_share(len(hits), len(pushes))})",
             f"  false alarms {alarms} in {hours:.2f} h: {alarms / hours:.2f} per hour "
             f"({np.nan_to_num(low):.2f} to {high:.2f})",

@@ -17,7 +17,7 @@ from robots.terms.friction import SLOWEST
 Array = NDArray[np.float64]
 
 # Widths of the reversals that are compared, as shares of a joint's highest speed.
-WIDTHS = np.geomspace(1e-3, 0.3, 8)
+WIDTHS = np.geomspace(1e-3, 0.3, 16)
 # Rounds of the weighted fit; rows that stand for a longer log.
 ROUNDS, MOST_ROWS = 4, 20_000
 # Smallest variance as a share of the mean one, and smallest eigenvalue of the correlation.
@@ -65,7 +65,7 @@ class ErrorModel:
         """
         beyond = self.growth * np.sqrt(np.maximum(variance - self.reach**2, 0.0))
         holding = np.where(np.abs(dq) < SLOWEST, self.coulomb / np.sqrt(3.0), 0.0)
-        return np.stack([np.exp(-0.5 * (dq / self.width) ** 2), np.abs(friction), beyond, holding], axis=-2)
+        return np.stack([reversal_amplitude(dq, self.width), np.abs(friction), beyond, holding], axis=-2)
 
     def deviation(self, amplitudes: Array) -> Array:
         """Gives the residual's standard deviation (N, n) [N m or N] of filtered amplitudes (N, 4, n)."""
@@ -93,6 +93,11 @@ class ErrorModel:
 
 
 FIELDS = ("level", "reversal", "friction", "width", "growth", "reach", "coulomb", "correlation")
+
+
+def reversal_amplitude(dq: Array, width: Array) -> Array:
+    """Gives w_1 of `ErrorModel` before the filter (N, n)."""
+    return np.asarray(np.exp(-0.5 * (dq / width) ** 2))
 
 
 def fit_error_model(
@@ -131,23 +136,25 @@ def fit_error_model(
     rows = np.flatnonzero(counts)[:: max(1, int(counts.sum()) // MOST_ROWS)]
     square, ones = residual[rows] ** 2, np.ones(n)
     best, fitted = np.full(n, np.inf), np.zeros((4, n))
+    trial = ErrorModel(
+        level=ones,
+        reversal=ones,
+        friction=ones,
+        width=fastest,
+        growth=growth,
+        reach=reach,
+        coulomb=coulomb,
+        correlation=np.eye(n),
+    )
+    w = lagged(trial.amplitudes(dq, friction, variance))[rows] ** 2
+    added = w[:, 3] + shows * w[:, 2]
     for share in WIDTHS:
-        trial = ErrorModel(
-            level=ones,
-            reversal=ones,
-            friction=ones,
-            width=share * fastest,
-            growth=growth,
-            reach=reach,
-            coulomb=coulomb,
-            correlation=np.eye(n),
-        )
-        w = lagged(trial.amplitudes(dq, friction, variance))[rows] ** 2
+        near = lagged(reversal_amplitude(dq, share * fastest))[rows] ** 2
         for j in range(n):
-            columns = np.column_stack([np.ones(len(rows)), w[:, 0, j], w[:, 1, j]])
-            weights, cost = _variance_fit(columns, square[:, j], w[:, 3, j] + shows * w[:, 2, j])
+            columns = np.column_stack([np.ones(len(rows)), near[:, j], w[:, 1, j]])
+            weights, cost = _variance_fit(columns, square[:, j], added[:, j])
             if cost < best[j]:
-                best[j], fitted[:, j] = cost, [*weights, trial.width[j]]
+                best[j], fitted[:, j] = cost, [*weights, share * fastest[j]]
     found = replace(trial, level=fitted[0], reversal=fitted[1], friction=fitted[2], width=fitted[3])
     w = lagged(found.amplitudes(dq, friction, variance))[rows]
     w[:, 2] *= shows
@@ -163,15 +170,17 @@ def band_parts(model: Model) -> tuple[Array, Array]:
 
 
 def _variance_fit(columns: Array, square: Array, added: Array) -> tuple[Array, float]:
-    """Non-negative weights (3,) of the columns, and the mean negative log-likelihood."""
+    """Non-negative weights (3,) of the columns beside a known variance, and the mean negative log-likelihood."""
     mean = max(float(square.mean()), np.finfo(float).tiny)
     scale = np.maximum(np.sqrt((columns**2).mean(axis=0)), np.finfo(float).tiny)
-    variance, weights = np.full(len(square), mean), np.zeros(columns.shape[1])
+    unit, variance, weights = columns / scale, np.full(len(square), mean) + added, np.zeros(columns.shape[1])
     for _ in range(ROUNDS):
-        weights = nnls(columns / scale / variance[:, None], square / variance)[0] / scale
+        weighted = unit / variance[:, None]
+        # Three unknowns: the triangle of the rows has the same solution as the rows.
+        triangle = np.linalg.qr(np.column_stack([weighted, (square - added) / variance]), mode="r")
+        weights = nnls(triangle[:, :-1], triangle[:, -1])[0] / scale
         weights[0] = max(weights[0], LEAST * mean)
-        variance = columns @ weights
-    variance = variance + added
+        variance = columns @ weights + added
     return weights, float(np.mean(np.log(variance) + square / variance))
 
 

@@ -99,7 +99,7 @@ def test_model_without_inertia_is_refused(exact, upright):
         determined=np.ones(count, dtype=bool),
         formulas=("",) * count,
     )
-    with pytest.raises(InputError, match="no inertial parameters.*oed identify"):
+    with pytest.raises(InputError, match=r"no inertial parameters.*oed identify"):
         dynamics_of(bare)
 
 

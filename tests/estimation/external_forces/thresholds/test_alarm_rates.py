@@ -77,5 +77,5 @@ def test_rate_must_be_positive(rate):
 
 def test_short_log_is_refused():
     """Half a second has too few independent peaks; the message says how much is needed."""
-    with pytest.raises(InputError, match="independent peaks.*longer healthy log"):
+    with pytest.raises(InputError, match=r"independent peaks.*longer healthy log"):
         alarm_threshold(coloured(0, 50), PERIOD, 1.0)

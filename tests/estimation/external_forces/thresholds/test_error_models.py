@@ -52,10 +52,10 @@ def test_variances_and_correlation_are_recovered(exact):
 
 @pytest.mark.slow
 def test_rows_beyond_the_reach_are_not_taken_for_noise(exact):
-    """A tenth of the rows with a third of a newton metre more than the fit knew raises the level, never lowers it."""
+    """A tenth of the rows with errors of the parameters beyond the reach leaves the level as it is."""
     model, truth, residual, dq, friction, variance = samples(exact, beyond=0.25)
     found = fit_error_model(model, residual, dq, friction, variance, np.ones(len(dq), dtype=bool), lambda x: x)
-    assert (found.level > 0.95 * truth.level).all()
+    np.testing.assert_allclose(found.level, truth.level, rtol=0.15)
 
 
 @pytest.mark.slow
