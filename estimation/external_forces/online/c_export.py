@@ -141,7 +141,7 @@ BODY = """
 typedef struct {
     double t, begun;
     int started;
-    double residual[NAME_N], acceleration[NAME_N], momentum[NAME_N], other[NAME_N], dq[NAME_N];
+    double residual[NAME_N], acceleration[NAME_N], momentum[NAME_N], other[NAME_N], dq[NAME_N], before[NAME_N];
     double cross[NAME_N], square[NAME_N], amplitudes[4 * NAME_N];
 } NAME_observer;
 
@@ -220,9 +220,10 @@ int NAME_observer_step(NAME_observer *s, double t, const double *q, const double
         for (int j = 0; j < NAME_N; ++j) {
             const double external = (momentum[j] - s->momentum[j]) / step - (other[j] + s->other[j]) / 2.0;
             const double level = s->cross[j] / s->square[j];
-            s->cross[j] = b * s->cross[j] - (1.0 - b) * external * friction[j];
-            s->square[j] = b * s->square[j] + (1.0 - b) * friction[j] * friction[j];
-            s->residual[j] = a * s->residual[j] + (1.0 - a) * (external + friction[j] * level);
+            const double mean = (friction[j] + s->before[j]) / 2.0;
+            s->cross[j] = b * s->cross[j] - (1.0 - b) * external * mean;
+            s->square[j] = b * s->square[j] + (1.0 - b) * mean * mean;
+            s->residual[j] = a * s->residual[j] + (1.0 - a) * (external + mean * level);
             s->acceleration[j] = a * s->acceleration[j] + (1.0 - a) * (dq[j] - s->dq[j]) / step;
         }
     }
@@ -246,6 +247,7 @@ int NAME_observer_step(NAME_observer *s, double t, const double *q, const double
         s->momentum[j] = momentum[j];
         s->other[j] = other[j];
         s->dq[j] = dq[j];
+        s->before[j] = friction[j];
     }
     *statistic = 0.0;
     for (int i = 0; i < NAME_N; ++i)

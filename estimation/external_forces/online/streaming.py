@@ -138,7 +138,7 @@ class ForceObserver:
         self._begun = 0.0
         self._residual, self._acceleration = np.zeros(n), np.zeros(n)
         self._amplitudes = np.zeros((4, n))
-        self._momentum, self._other, self._dq = np.zeros(n), np.zeros(n), np.zeros(n)
+        self._momentum, self._other, self._dq, self._before = np.zeros((4, n))
         self._factors, self._energy, self._gathered = np.ones(n), np.zeros(n), 0.0
         for j, online in enumerate(self._friction):
             if online is not None:
@@ -178,15 +178,16 @@ class ForceObserver:
             external = (momentum - self._momentum) / step - (other + self._other) / 2.0
             b = math.exp(-min(step, 2.0 * self.calibration.period) / MEMORY)
             cross, square = self._cross, self._square
-            self._cross = b * cross - (1.0 - b) * external * friction
-            self._square = b * square + (1.0 - b) * friction * friction
-            external += friction * cross / square
+            mean = (friction + self._before) / 2.0
+            self._cross = b * cross - (1.0 - b) * external * mean
+            self._square = b * square + (1.0 - b) * mean * mean
+            external += mean * cross / square
             self._residual = a * self._residual + (1.0 - a) * external
             self._acceleration = a * self._acceleration + (1.0 - a) * (speed - self._dq) / step
         variance = self._step.variance(at, speed, self._acceleration) if errors.widens else None
         now = errors.amplitudes(speed, friction, variance)
         self._amplitudes = now.copy() if fresh else a * self._amplitudes + (1.0 - a) * now
-        self._t, self._momentum, self._other, self._dq = t, momentum, other, speed
+        self._t, self._momentum, self._other, self._dq, self._before = t, momentum, other, speed, friction
         deviation = errors.deviation(self._amplitudes)
         statistic = errors.statistic(self._residual, deviation) / self._threshold
         settled = t - self._begun > SETTLING * constant

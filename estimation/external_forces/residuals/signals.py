@@ -102,7 +102,9 @@ def signals_of(
     # What the model adds to its terms, heat and extensions, acts at the joints as friction does.
     beta = rest + friction + (prediction.predicted - cold)
     external = external_torque(motion.t, momentum, prediction.measured - beta, begins)
-    excess = friction_excess(motion.t, external, friction, begins)
+    # As the external torque, the mean of each step.
+    mean = np.concatenate([friction[:1], (friction[1:] + friction[:-1]) / 2.0])
+    excess = friction_excess(motion.t, external, mean, begins)
     nothing = np.zeros(motion.q.shape, dtype=bool)
     return Signals(
         t=motion.t,
@@ -112,7 +114,7 @@ def signals_of(
         friction=friction,
         variance=dynamics.variance(q, dq, ddq),
         jacobian=jacobian,
-        external=np.where(begins[:, None], 0.0, external + excess * friction),
+        external=np.where(begins[:, None], 0.0, external + excess * mean),
         direct=prediction.predicted - prediction.measured + excess * friction,
         excess=excess,
         extrapolates=nothing if prediction.extrapolates is None else prediction.extrapolates,
@@ -145,7 +147,8 @@ def _unsettled(t: Array, begins: NDArray[np.bool_], constant: float, smoother: S
     edges = [*np.flatnonzero(begins).tolist(), len(t)]
     for first, last in pairwise(edges):
         own = t[first:last]
-        edge = smoother.edge(float(own[-1] - own[0]))
+        # The momentum's change feels the smoothing's end for a period of its cut-off.
+        edge = max(smoother.edge(float(own[-1] - own[0])), 1.0 / smoother.cutoff)
         result[first:last] = (own < own[0] + max(edge, SETTLING * constant)) | (own > own[-1] - edge)
     return result
 

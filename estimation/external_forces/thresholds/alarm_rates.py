@@ -12,9 +12,10 @@ from robots.common.errors import InputError
 Array = NDArray[np.float64]
 
 HOUR = 3600.0
-# Shares of the samples below the level above which peaks count: the first that leaves enough independent peaks.
-BASES = (0.98, 0.95, 0.9, 0.8, 0.7, 0.6, 0.5)
-ENOUGH_PEAKS = 30
+# Shares of the samples below the levels above which peaks count. All high ones with enough independent peaks are tried;
+# of the lower ones the first that has enough, where no high one has.
+HIGH, LOW = (0.995, 0.99, 0.98, 0.95, 0.9), (0.8, 0.7, 0.6, 0.5)
+ENOUGH_PEAKS = 20
 # Fewer independent peaks than this say too little of a tail.
 LEAST_PEAKS = 8
 
@@ -54,7 +55,7 @@ def alarm_threshold(statistic: Array, period: float, rate: float, *, robust: boo
     Peaks over a base level, with the exceedances grouped by the intervals estimator of the extremal index (Ferro and
     Segers 2003), which follows from the serial correlation. The peaks' heights are exponential in the tail, as those of
     a squared distance of Gaussian residuals. The threshold is that of their predictive distribution: few peaks make it
-    higher.
+    higher. Of several base levels the one with the highest threshold counts.
 
         rate = (C / time) (1 + (u - u_0) / (C m))^-C
 
@@ -69,22 +70,38 @@ def alarm_threshold(statistic: Array, period: float, rate: float, *, robust: boo
     """
     if not (np.isfinite(rate) and rate > 0):
         raise InputError(f"{rate} false alarms per hour", allowed="a positive number")
-    for share in BASES:
-        base = float(np.quantile(statistic, share)) if len(statistic) else 0.0
-        places = np.flatnonzero(statistic > base)
-        index, clusters, run = _grouped(places)
-        if clusters >= ENOUGH_PEAKS:
+    found: AlarmThreshold | None = None
+    for share in HIGH + LOW:
+        if found is not None and share in LOW:
             break
-    if clusters < LEAST_PEAKS:
+        tried = _above(float(np.quantile(statistic, share)) if len(statistic) else 0.0, statistic, period, rate, robust)
+        if tried.peaks < ENOUGH_PEAKS and share != LOW[-1]:
+            continue
+        # A tail that falls more slowly than it does lower down shows in the higher levels.
+        if found is None or tried.value > found.value:
+            found = tried
+    assert found is not None
+    if found.peaks < LEAST_PEAKS:
         raise InputError(
-            f"the healthy log of {period * len(statistic):.3g} s has {clusters} independent peaks of the residual",
+            f"the healthy log of {period * len(statistic):.3g} s has {found.peaks} independent peaks of the residual",
             allowed=f"{LEAST_PEAKS} or more",
             remedy="give a longer healthy log with --healthy: a minute or more",
         )
+    return found
+
+
+def _above(base: float, statistic: Array, period: float, rate: float, robust: bool) -> AlarmThreshold:
+    """Gives the threshold by the peaks above one level; infinite without any."""
+    places, seconds = np.flatnonzero(statistic > base), period * len(statistic)
+    index, _, run = _grouped(places)
+    if not len(places):
+        return AlarmThreshold(
+            value=np.inf, rate=float(rate), base=base, excess=0.0, peaks=0, separation=period, extremal_index=1.0,
+            seconds=seconds,
+        )  # fmt: skip
     starts = np.concatenate([[0], np.flatnonzero(np.diff(places) >= run) + 1])
     heights = np.maximum.reduceat(statistic[places], starts) - base
     mean = float(np.median(heights) / np.log(2.0)) if robust else float(heights.mean())
-    seconds = period * len(statistic)
     return AlarmThreshold(
         value=_threshold(base, mean, len(heights), seconds, rate),
         rate=float(rate),

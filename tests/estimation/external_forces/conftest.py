@@ -11,6 +11,7 @@ import pytest
 
 from estimation.models.model import Model
 from robots.base_parameters import find_base_parameters
+from robots.geometry.chain import Chain
 from robots.plants import Sensors, nominal_plant, simulate
 from robots.regressor import default_model
 from robots.robot import Robot
@@ -64,9 +65,18 @@ def twin_of() -> type[Twin]:
 
 
 @pytest.fixture(scope="session")
-def exact(upright: Robot) -> Model:
+def limb(upright: Robot) -> Robot:
+    """The three-joint arm with a flange at the end of its last link, where all joints feel a force."""
+    chain = upright.chain
+    tip = np.eye(4)
+    tip[:3, 3] = [0.35, 0.05, 0.02]
+    return replace(upright, chain=Chain(chain.joints, gravity=chain.gravity, tip=tip))
+
+
+@pytest.fixture(scope="session")
+def exact(limb: Robot) -> Model:
     """The exact model of the three-joint arm."""
-    return exact_model(upright)
+    return exact_model(limb)
 
 
 @pytest.fixture(scope="session")
@@ -74,17 +84,31 @@ def model_of() -> Callable[..., Model]:
     return exact_model
 
 
+def _motion(robot: Robot, seed: int, duration: float, period: float = 0.008) -> Motion:
+    """Twelve sinusoids per joint that do not repeat; derivatives in closed form."""
+    rng, t = np.random.default_rng(seed), period * np.arange(round(duration / period))
+    w, phase = 2 * np.pi * rng.uniform(0.05, 0.5, (12, robot.n)), rng.uniform(0, 2 * np.pi, (12, robot.n))
+    size = rng.normal(size=(12, robot.n)) / w * 0.25
+    angle = t[:, None, None] * w + phase
+    return Motion(
+        t=t,
+        q=(size * np.sin(angle)).sum(axis=1),
+        dq=(size * w * np.cos(angle)).sum(axis=1),
+        ddq=-(size * w**2 * np.sin(angle)).sum(axis=1),
+    )
+
+
 @pytest.fixture(scope="session")
-def pushed_log(upright: Robot, fourier_motion: Callable[..., Motion]) -> Callable[..., Log]:
+def pushed_log(limb: Robot) -> Callable[..., Log]:
     """Simulates the arm with 1 % coloured noise, and adds pushes at the flange by pinocchio's Jacobian."""
-    plant, twin = nominal_plant(upright, friction="coulomb-viscous", sensors=Sensors(torque_noise=0.01)), Twin(upright)
+    plant, twin = nominal_plant(limb, friction="coulomb-viscous", sensors=Sensors(torque_noise=0.01)), Twin(limb)
 
     def build(
         seed: int,
         pushes: tuple[tuple[float, float, tuple[float, float, float]], ...] = (),
         duration: float = 20.0,
     ) -> Log:
-        motion = fourier_motion(upright, seed, duration=duration, period=0.008)
+        motion = _motion(limb, seed, duration)
         log = simulate(plant, motion, seed=seed)
         tau = np.array(log.tau)
         for at, length, force in pushes:

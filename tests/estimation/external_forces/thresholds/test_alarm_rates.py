@@ -21,11 +21,10 @@ def coloured(seed, samples, memory=0.05, n=4):
 
 @pytest.mark.slow
 def test_rate_of_alarms_is_the_stated_one():
-    """Thresholds from two minutes are passed in two hours of the same process at about the stated rate.
+    """Thresholds from two minutes are passed in two hours of the same process at no more than the stated rate.
 
-    Twelve thresholds for 60 alarms per hour. The mean rate over them and two hours each is that of 1440 alarms, were
-    the thresholds exact; those of two minutes scatter. The predictive threshold is to keep the mean below the stated
-    rate, and not far below: between a third and one of it. Fixed seeds.
+    Twelve thresholds for 60 alarms per hour. Each is the highest of several levels and that of a predictive
+    distribution, so the mean rate of two hours each is to be below the stated one, and above a tenth of it. Fixed seeds.
     """
     rates = []
     for seed in range(12):
@@ -34,28 +33,29 @@ def test_rate_of_alarms_is_the_stated_one():
         places = np.flatnonzero(series)
         alarms = int(bool(len(places))) + int((np.diff(places) * PERIOD > found.separation).sum())
         rates.append(alarms / 2.0)
-    assert 20.0 < np.mean(rates) < 60.0
+    assert 6.0 < np.mean(rates) < 60.0
 
 
 def test_peaks_are_as_rare_as_the_process_is_slow():
     """A statistic that is constant over ten samples has a tenth of the peaks: the extremal index tells it."""
     white = np.random.default_rng(0).exponential(size=3000)
-    fast, slow = alarm_threshold(white, PERIOD, 1.0), alarm_threshold(np.repeat(white, 10), PERIOD, 1.0)
+    held = np.repeat(white, 10)
+    fast, slow = alarm_threshold(white, PERIOD, 1.0), alarm_threshold(held, PERIOD, 1.0)
     assert fast.extremal_index > 0.8
     assert slow.extremal_index == pytest.approx(0.1, abs=0.03)
-    assert slow.peaks < 1.5 * fast.peaks
+    assert slow.peaks == pytest.approx(0.1 * (held > slow.base).sum(), rel=0.1)
 
 
 def test_threshold_of_exponential_peaks_has_its_closed_form():
-    """Independent exponential samples: the threshold of a rate is their quantile, wider by what few peaks leave open.
+    """Independent exponential samples: the threshold is their quantile log(N T), or up to 1.35 times that.
 
-    5 % above the base of 60,000 samples, so 1200 to 3000 peaks: their mean is known to 3 %, and the quantile log(N T)
-    to as much.
+    The highest of nine levels counts, and the smallest number of peaks is 20 or more: their mean scatters by a fifth.
     """
     samples = np.random.default_rng(1).exponential(size=60_000)
     found = alarm_threshold(samples, PERIOD, 6.0)
-    assert found.value == pytest.approx(np.log(3600 / PERIOD / 6.0), rel=0.06)
-    assert found.at(0.6) - found.at(6.0) == pytest.approx(np.log(10.0), rel=0.06)
+    exact = np.log(3600 / PERIOD / 6.0)
+    assert exact < found.value < 1.35 * exact
+    assert np.log(10.0) < found.at(0.6) - found.at(6.0) < 1.35 * np.log(10.0)
 
 
 def test_median_height_resists_a_contact():
