@@ -153,7 +153,7 @@ void NAME_observer_reset(NAME_observer *s)
 
 static void NAME_force(const double *J, const double *z, const double *deviation, double *force)
 {
-    double B[3 * NAME_N], W[3 * NAME_N], A[9], b[3], scale[3];
+    double B[3 * NAME_N], W[3 * NAME_N], A[9], b[3], scale[3], determinant = 1.0;
     for (int k = 0; k < 3; ++k)
         for (int j = 0; j < NAME_N; ++j) B[k * NAME_N + j] = J[k * NAME_N + j] / deviation[j];
     for (int k = 0; k < 3; ++k)
@@ -181,7 +181,9 @@ static void NAME_force(const double *J, const double *z, const double *deviation
             A[3 * k + l] /= A[4 * l];
         }
         for (int m = 0; m < k; ++m) A[4 * k] -= A[3 * k + m] * A[3 * k + m];
-        if (!(A[4 * k] > NAME_UNOBSERVABLE)) {
+        /* Of a matrix with a unit diagonal the smallest eigenvalue is the determinant over 2.25, or more. */
+        determinant *= A[4 * k];
+        if (!(determinant > 6.75 * NAME_UNOBSERVABLE)) {
             force[0] = force[1] = force[2] = NAN;
             return;
         }
