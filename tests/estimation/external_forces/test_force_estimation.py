@@ -99,7 +99,7 @@ def test_logged_velocities_serve_as_well(exact, healthy, touched):
     """With the log's own velocities the pushes are the same; a log without any is refused with the columns' names."""
     found = estimate_forces(exact, touched, healthy=[healthy], velocity="logged")
     assert [round(contact.start) for contact in found.contacts] == [8, 14]
-    with pytest.raises(InputError, match="no velocities.*dq1"):
+    with pytest.raises(InputError, match=r"no velocities.*dq1"):
         estimate_forces(exact, replace(touched, dq=None), healthy=[healthy], velocity="logged")
 
 
@@ -144,7 +144,7 @@ def test_bad_logs_are_named(exact, touched, arm_log, pushed_log):
         estimate_forces(exact, arm_log())
     with pytest.raises(InputError, match="no torque"):
         estimate_forces(exact, replace(touched, tau=None))
-    with pytest.raises(InputError, match="a log of|independent peaks|rows"):
+    with pytest.raises(InputError, match=r"a log of|independent peaks|rows"):
         estimate_forces(exact, touched.rows(slice(0, 40)))
 
 
