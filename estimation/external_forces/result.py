@@ -89,8 +89,12 @@ class ForceEstimate:
             lines.append(
                 f"  {contact.start:9.4g}  {contact.end - contact.start:12.3g}  {size:>21}  {parts:22}  {where}"
             )
-        median = ", ".join(f"{value:.2g}" for value in np.median(self.force_deviation, axis=0))
-        lines.append(f"median standard deviation of the force at the tool: {median} N along x, y, z of the base")
+        median = np.median(self.force_deviation, axis=0)
+        if np.isfinite(median).any():
+            words = ", ".join(f"{value:.2g}" if np.isfinite(value) else "unknown" for value in median)
+            lines.append(f"median standard deviation of the force at the tool: {words} N along x, y, z of the base")
+        else:
+            lines.append("the joints do not feel all directions of a force at the tool, so its size is not known")
         return "\n".join([*lines, *self.warnings])
 
     def to_dict(self) -> dict[str, Any]:

@@ -235,7 +235,7 @@ int NAME_observer_step(NAME_observer *s, double t, const double *q, const double
             exp(NAME_NARROW[j] * dq[j] * dq[j]),
             fabs(friction[j]),
             NAME_GROWTH[j] * sqrt(fmax(variance[j] - NAME_REACH2[j], 0.0)),
-            fabs(dq[j]) < NAME_SLOWEST ? NAME_HOLD[j] : 0.0,
+            NAME_HOLD[j] / (1.0 + (dq[j] / NAME_SLOWEST) * (dq[j] / NAME_SLOWEST)),
         };
         double w[4];
         for (int k = 0; k < 4; ++k) {

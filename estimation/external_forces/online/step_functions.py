@@ -75,7 +75,7 @@ class StepErrors:
         np.abs(friction, out=now[1])
         if variance is not None:
             np.multiply(self._growth, np.sqrt(np.maximum(variance - self._reach2, 0.0)), out=now[2])
-        np.multiply(self._hold, np.abs(dq) < SLOWEST, out=now[3])
+        np.divide(self._hold, 1.0 + (dq / SLOWEST) ** 2, out=now[3])
         return now
 
     def deviation(self, amplitudes: Array) -> Array:

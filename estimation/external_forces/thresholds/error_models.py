@@ -32,8 +32,8 @@ class ErrorModel:
 
     w_1 is exp(-(dq / width)^2 / 2): near a reversal friction has no sure sign. w_2 is the friction's size: its error
     grows with it. w_3 is what the parameters' errors make of a motion beyond that of any row of the fit (the band of
-    `oed predict`). w_4 is coulomb / sqrt(3) at rest: static friction is anywhere between its limits. Each passes the
-    observer's filter, as the residual does.
+    `oed predict`). w_4 is coulomb / sqrt(3) at rest, for static friction is anywhere between its limits; it fades above
+    the speed at which a joint stands. Each passes the observer's filter, as the residual does.
 
     Attributes:
         level: (n,) [(N m)^2].
@@ -64,7 +64,7 @@ class ErrorModel:
             variance: of the torque by the parameters' errors (N, n).
         """
         beyond = self.growth * np.sqrt(np.maximum(variance - self.reach**2, 0.0))
-        holding = np.where(np.abs(dq) < SLOWEST, self.coulomb / np.sqrt(3.0), 0.0)
+        holding = self.coulomb / np.sqrt(3.0) / (1.0 + (dq / SLOWEST) ** 2)
         return np.stack([reversal_amplitude(dq, self.width), np.abs(friction), beyond, holding], axis=-2)
 
     def deviation(self, amplitudes: Array) -> Array:
@@ -177,7 +177,8 @@ def _variance_fit(columns: Array, square: Array, added: Array) -> tuple[Array, f
     for _ in range(ROUNDS):
         weighted = unit / variance[:, None]
         # Three unknowns: the triangle of the rows has the same solution as the rows.
-        triangle = np.linalg.qr(np.column_stack([weighted, (square - added) / variance]), mode="r")
+        rows = np.column_stack([weighted, (square - added) / variance])
+        triangle = np.asarray(np.linalg.qr(rows, mode="r"))
         weights = nnls(triangle[:, :-1], triangle[:, -1])[0] / scale
         weights[0] = max(weights[0], LEAST * mean)
         variance = columns @ weights + added

@@ -125,8 +125,10 @@ def force(
         result.save(folder.path("forces.json").parent)
         save_force_report(result, folder, kinds=robot.chain.kinds, png=png)
         if code is not None:
-            own = {"gravity": recorded.gravity, "payload": recorded.payload, "tool": point}
-            code.write(observer_code(identified, result.calibration, **own).encode())
+            text = observer_code(
+                identified, result.calibration, tool=point, gravity=recorded.gravity, payload=recorded.payload
+            )
+            code.write(text.encode())
     lines = [result.summary(), *([assumed] if assumed else []), f"written to {out.resolve()}"]
     console.result("\n".join(lines), {**result.to_dict(), "heat": assumed or None})
 

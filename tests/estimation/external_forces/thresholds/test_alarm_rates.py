@@ -24,7 +24,8 @@ def test_rate_of_alarms_is_the_stated_one():
     """Thresholds from two minutes are passed in two hours of the same process at no more than the stated rate.
 
     Twelve thresholds for 60 alarms per hour. Each is the highest of several levels and that of a predictive
-    distribution, so the mean rate of two hours each is to be below the stated one, and above a tenth of it. Fixed seeds.
+    distribution, so the mean rate of two hours each is to be below the stated one, and above a tenth of it. Seeds are
+    fixed.
     """
     rates = []
     for seed in range(12):
