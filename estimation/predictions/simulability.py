@@ -95,8 +95,8 @@ class UnfitDirection:
         return (
             f"The model cannot be simulated: moving {way} has an inertia of {self.inertia:.3g} kg m2. {part} makes it "
             f"so: {self.parameter} is {self.value:.3g}, and {self.needed:.3g} in the nearest model that simulates "
-            f"({shift}). There the inertia is {self.expected:.3g} kg m2. The largest change of a determined parameter in "
-            f"it is {self.change:.2g} standard errors."
+            f"({shift}). There the inertia is {self.expected:.3g} kg m2. The largest change of a determined parameter "
+            f"in it is {self.change:.2g} standard errors."
         )
 
 
