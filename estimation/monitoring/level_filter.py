@@ -1,0 +1,116 @@
+"""The healthy level of one monitored quantity: what its features explain, and a slowly varying model error."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+# Correlation time of the model error [s], about that of a change of the motion or of the temperature.
+CORRELATION_TIME = 300.0
+# The prior of the model error's variance counts as so many windows, and no more than so many others count beside it.
+PRIOR_WINDOWS, MOST_WINDOWS = 30.0, 1000.0
+# Squared standardised innovations above this count as this: an outlier is not a larger variance.
+CLIPPED = 9.0
+
+
+class LevelFilter:
+    """A Kalman filter for y = features b + e + noise, where e is an Ornstein-Uhlenbeck process.
+
+    The coefficients b are constant. The standard deviation of e is learnt from the innovations, from a prior on.
+
+    Args:
+        mean: prior means of the coefficients (m,).
+        spread: their prior standard deviations (m,).
+        scatter: prior standard deviation of e.
+    """
+
+    def __init__(self, mean: Array, spread: Array, scatter: float) -> None:
+        m = len(mean)
+        self.state = np.concatenate([np.asarray(mean, dtype=float), [0.0]])
+        self.covariance = np.zeros((m + 1, m + 1))
+        self.covariance[np.arange(m), np.arange(m)] = np.square(spread)
+        self.scatter = float(scatter)
+        self.covariance[m, m] = self.scatter**2
+        self.weight = 0.0
+        self.square = 0.0
+        self.time: float | None = None
+
+    @property
+    def coefficients(self) -> Array:
+        """Means of the coefficients (m,)."""
+        return self.state[:-1]
+
+    @property
+    def deviation(self) -> float:
+        """Standard deviation of the model error e, as learnt so far."""
+        ratio = (PRIOR_WINDOWS + self.square) / (PRIOR_WINDOWS + self.weight)
+        return self.scatter * float(np.sqrt(ratio))
+
+    def explained(self, features: Array) -> tuple[float, float]:
+        """What the coefficients make of features (m,), and its variance, without the model error."""
+        return float(features @ self.state[:-1]), float(features @ self.covariance[:-1, :-1] @ features)
+
+    def predict(self, time: float) -> None:
+        """Goes on to a time [s]: the model error decays, and new error comes."""
+        keep = 0.0 if self.time is None else float(np.exp(-max(time - self.time, 0.0) / CORRELATION_TIME))
+        self.state[-1] *= keep
+        self.covariance[-1, :] *= keep
+        self.covariance[:, -1] *= keep
+        self.covariance[-1, -1] += self.deviation**2 * (1 - keep**2)
+        self.time = time
+
+    def innovation(self, features: Array, y: float, variance: float) -> tuple[float, float]:
+        """Measured minus predicted value, and the variance of this difference.
+
+        Args:
+            features: (m,).
+            y: the measured value.
+            variance: of its noise.
+        """
+        row = np.concatenate([features, [1.0]])
+        return y - float(row @ self.state), float(row @ self.covariance @ row) + variance
+
+    def update(self, features: Array, y: float, variance: float) -> float:
+        """Takes a measured value into account, and returns its standardised innovation."""
+        error, total = self.innovation(features, y, variance)
+        row = np.concatenate([features, [1.0]])
+        gain = self.covariance @ row / total
+        self.state = self.state + gain * error
+        P = self.covariance - np.outer(gain, row @ self.covariance)
+        self.covariance = (P + P.T) / 2
+        z = error / float(np.sqrt(total))
+        # Only what the model error makes of the innovation says something of its size.
+        share = max(total - variance, 0.0) / total
+        self.weight = min(self.weight + share, MOST_WINDOWS)
+        forgotten = 1 - share / MOST_WINDOWS if self.weight >= MOST_WINDOWS else 1.0
+        self.square = self.square * forgotten + share * min(z * z, CLIPPED)
+        return z
+
+    def shift(self, size: float, variance: float) -> None:
+        """Adds a confirmed step to the level, which is the last coefficient."""
+        self.state[-2] += size
+        self.covariance[-2, -2] += variance
+
+    def to_dict(self) -> dict[str, Any]:
+        """Gives the state as plain data."""
+        return {
+            "state": self.state.tolist(),
+            "covariance": self.covariance.tolist(),
+            "scatter": self.scatter,
+            "weight": self.weight,
+            "square": self.square,
+            "time": self.time,
+        }
+
+    @classmethod
+    def from_dict(cls, data: dict[str, Any]) -> LevelFilter:
+        """Reads `to_dict`."""
+        state = np.array(data["state"], dtype=float)
+        found = cls(state[:-1], np.zeros(len(state) - 1), data["scatter"])
+        found.state, found.covariance = state, np.array(data["covariance"], dtype=float)
+        found.weight, found.square, found.time = data["weight"], data["square"], data["time"]
+        return found
