@@ -130,7 +130,7 @@ class VirtualRobot:
     def _run(self, seconds: float, motion: int, *, record: bool) -> tuple[np.ndarray, ...] | None:
         # Heat in steps of 1 s: a hundredth of the fast time constant.
         count, rows = round(seconds), round(1.0 / STEP)
-        q, v, a, rigid, sign = self.motions[motion]
+        q, v, _, rigid, _ = self.motions[motion]
         c, w = self._friction(motion)
         start = self.clock
         times, places, torques = [], [], []
@@ -172,7 +172,5 @@ class VirtualRobot:
                 strength = np.where((s > 0) & (s < 1), np.sin(np.pi * np.clip(s, 0, 1)), 0.0)
                 if strength.any():
                     force = cause.amount * strength[:, None] * np.array(cause.direction)
-                    found += point_force_torque(
-                        self.machine.model, q[index], self.n, np.array([0.0, 0.0, 0.1]), force
-                    )
+                    found += point_force_torque(self.machine.model, q[index], self.n, np.array([0.0, 0.0, 0.1]), force)
         return found

@@ -9,18 +9,18 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from estimation.monitoring.baseline import Baseline
-from estimation.monitoring.bursts import BurstChart
-from estimation.monitoring.charts import Chart
+from estimation.monitoring.control_charts.bursts import BurstChart
+from estimation.monitoring.control_charts.charts import Chart
+from estimation.monitoring.control_charts.level_filter import LevelFilter
+from estimation.monitoring.control_charts.quantities import SHARE, Group, Quantity, Sample
 from estimation.monitoring.findings import Finding
-from estimation.monitoring.heat import HeatState, common_change
 from estimation.monitoring.history import History
-from estimation.monitoring.level_filter import LevelFilter
 from estimation.monitoring.naming import changes_at, name_changes
-from estimation.monitoring.projection import HIGHEST_ORDER, Colour, Window, project
-from estimation.monitoring.quantities import SHARE, Group, Quantity, Sample
 from estimation.monitoring.settings import MonitorSettings
-from estimation.monitoring.window_rows import WindowRows, rows_of_window
+from estimation.monitoring.windows.baseline import Baseline
+from estimation.monitoring.windows.heat import HeatState, common_change
+from estimation.monitoring.windows.projection import HIGHEST_ORDER, Colour, Window, project
+from estimation.monitoring.windows.window_rows import WindowRows, rows_of_window
 from robots.terms.base import force_unit
 
 Array = NDArray[np.float64]

@@ -10,7 +10,7 @@ import numpy as np
 
 from robots.common.plain import finite
 
-Kind = Literal["damage", "friction_decrease", "payload", "contact", "heat", "offset", "unknown"]
+Kind = Literal["damage", "friction_decrease", "payload", "contact", "heat", "offset", "misfit", "unknown"]
 Severity = Literal["info", "watch", "act"]
 
 EFFECTS: dict[str, str | None] = {
@@ -20,6 +20,7 @@ EFFECTS: dict[str, str | None] = {
     "contact": "external_contact",
     "heat": "thermal_friction",
     "offset": "torque_sensor_drift",
+    "misfit": None,
     "unknown": None,
 }
 """The name of each kind among the effects of the diagnosis."""
@@ -31,7 +32,8 @@ SEVERITIES: dict[str, Severity] = {
     "contact": "watch",
     "heat": "info",
     "offset": "watch",
-    "unknown": "act",
+    "misfit": "act",
+    "unknown": "watch",
 }
 LIGHTS = {"info": "green", "watch": "amber", "act": "red"}
 ORDER = ("info", "watch", "act")
@@ -46,7 +48,7 @@ class Finding:
     """One change.
 
     Attributes:
-        kind: damage, friction_decrease, payload, contact, heat, offset or unknown.
+        kind: damage, friction_decrease, payload, contact, heat, offset, misfit or unknown.
         joint: counted from 1; None for the whole robot.
         size: in the unit.
         low: lower end of its 95 % interval.
@@ -102,6 +104,7 @@ class Finding:
             "contact": f"an external force acted for a short time{self.text}",
             "heat": f"all joints changed together, as by heat: {amount}",
             "offset": f"the torque offset changed by {amount}",
+            "misfit": f"the model does not fit{self.text}",
             "unknown": f"the residual changed in a way that no known cause explains{self.text}",
         }[self.kind]
         text = where + (what if where else what[0].upper() + what[1:])
@@ -128,6 +131,8 @@ class Finding:
             "contact": "Check the cell for a collision at this time.",
             "heat": "Nothing to do. If it stays, check the ambient temperature, or run oed thermal with these logs.",
             "offset": f"Check the torque sensor and zero position of joint{joint}. Then {before}.",
+            "misfit": "Check that the logs are of this robot, and what torque they hold (oed check). If so, "
+            "identify it again.",
             "unknown": before[0].upper() + before[1:] + ".",
         }[self.kind]
 

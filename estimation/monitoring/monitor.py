@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 import json
 from collections.abc import Iterable
 from os import PathLike
@@ -12,12 +13,12 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from estimation.models.model import model_from_dict
-from estimation.monitoring.baseline import Baseline, baseline_of
 from estimation.monitoring.evaluation import Evaluation
 from estimation.monitoring.findings import Finding
 from estimation.monitoring.settings import MonitorSettings
-from estimation.monitoring.stream_windows import StreamWindows
-from estimation.monitoring.window_rows import settling
+from estimation.monitoring.windows.baseline import Baseline, baseline_of
+from estimation.monitoring.windows.stream_windows import StreamWindows
+from estimation.monitoring.windows.window_rows import settling
 from robots.common.errors import InputError
 from robots.common.files import existing_file, write_atomic
 
@@ -124,6 +125,14 @@ class Monitor:
         self._consume(self._windows.add(rows))
         return self.findings[before:]
 
+    def copy(self) -> Monitor:
+        """A copy that goes its own way; the model is shared."""
+        return copy.deepcopy(self, {id(self.baseline): self.baseline})
+
+    def take(self, other: Monitor) -> None:
+        """Goes on from the state of a copy."""
+        self.__dict__.update(other.copy().__dict__)
+
     def finish(self) -> tuple[Finding, ...]:
         """Ends the recording, and concludes an alarm with the windows that there are.
 
@@ -220,11 +229,10 @@ class Monitor:
             found._windows.restore(data["stream"])
             if data["evaluation"] is not None:
                 found._evaluation = Evaluation.from_dict(data["evaluation"], found.baseline, found.settings)
-        except (OSError, UnicodeDecodeError, json.JSONDecodeError, AttributeError, KeyError, TypeError, ValueError) as e:
+        except (OSError, AttributeError, KeyError, TypeError, ValueError) as e:
             raise InputError(
                 f"is not a state of a monitor, or is damaged ({type(e).__name__}: {e})",
                 file=file,
                 remedy="start the monitor anew from the logs",
             ) from e
         return found
-

@@ -9,10 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import chi2
 
-from estimation.monitoring.baseline import PAYLOAD
-from estimation.monitoring.change_fit import StepFit, fit_steps
+from estimation.monitoring.control_charts.change_fit import StepFit, fit_steps
+from estimation.monitoring.control_charts.quantities import Quantity
 from estimation.monitoring.findings import NORMAL_95, Finding, Kind, relative
-from estimation.monitoring.quantities import Quantity
+from estimation.monitoring.windows.baseline import PAYLOAD
 
 Array = NDArray[np.float64]
 
@@ -131,11 +131,11 @@ def name_changes(
         group: [c for c in changes if c.quantity.group == group]
         for group in ("friction", "offset", "payload", "common", "residual")
     }
-    first = [c for c in changes if c.first]
-    if len({c.quantity.index for c in first if c.quantity.group == "friction"}) >= max(3, joints / 2):
-        worst = max(first, key=lambda c: c.gain)
-        text = f": {len(first)} quantities differ; the model does not fit this robot, or does not fit it any more"
-        return [_finding(worst, "unknown", None, (0.0, 0.0, 0.0), "", detected, log, text)]
+    # One cause damages one joint or two; what all joints share is taken out before.
+    if len(by_group["friction"]) >= max(3, joints / 2):
+        worst = max(changes, key=lambda c: c.gain)
+        text = f": {len(changes)} quantities differ from the model at once"
+        return [_finding(worst, "misfit", None, (0.0, 0.0, 0.0), "", detected, log, text)]
     found = []
     for c in by_group["friction"]:
         kind: Kind = "damage" if c.size > 0 else "friction_decrease"

@@ -18,6 +18,7 @@ from oed.cli.commands.effects import effects
 from oed.cli.commands.example import example
 from oed.cli.commands.export import export
 from oed.cli.commands.identify import identify
+from oed.cli.commands.monitor import monitor
 from oed.cli.commands.pareto import pareto
 from oed.cli.commands.payload import payload
 from oed.cli.commands.predict import predict
@@ -45,6 +46,7 @@ FUNCTIONS = (
     diagnose,
     predict,
     compare,
+    monitor,
     payload,
     example,
     robot,

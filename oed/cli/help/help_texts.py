@@ -19,6 +19,8 @@ OPTIONS = {
         *(
             "trajectory",
             "log",
+            "log_dir",
+            "state",
             "without",
             "held_out",
             "before",
@@ -79,6 +81,10 @@ EXAMPLES = {
     "compare": (
         "oed compare monday/model.json friday/model.json --out compared",
         "oed compare logs/day1.csv logs/day2.csv logs/day3.csv --robot er3a --out compared",
+    ),
+    "monitor": (
+        "oed monitor --model thermal --log day1.csv day2.csv day3.csv --out monitored",
+        "oed monitor --model model --log-dir logs --state robot7.state --out monitored --force",
     ),
     "payload": (
         "oed payload --robot ur10 --log with.csv --without without.csv --to urscript --out payload",

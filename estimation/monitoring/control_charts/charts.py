@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from estimation.monitoring.level_filter import CORRELATION_TIME
-from estimation.monitoring.run_lengths import cusum_threshold, ewma_threshold
+from estimation.monitoring.control_charts.level_filter import CORRELATION_TIME
+from estimation.monitoring.control_charts.run_lengths import cusum_threshold, ewma_threshold
 
 # Allowance of the CUSUM: half of a change by two standard deviations of the innovations.
 ALLOWANCE = 1.0

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import solve_triangular
 
-from estimation.monitoring.level_filter import CORRELATION_TIME
+from estimation.monitoring.control_charts.level_filter import CORRELATION_TIME
 
 Array = NDArray[np.float64]
 

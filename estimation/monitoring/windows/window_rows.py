@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from estimation.monitoring.baseline import Baseline, Directions
+from estimation.monitoring.windows.baseline import Baseline, Directions
 from estimation.predictions.checked_motions import smoother_of
 from estimation.preprocessing import resample, smooth
 from robots.common.errors import InputError

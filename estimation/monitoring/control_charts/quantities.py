@@ -8,8 +8,8 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from estimation.monitoring.charts import Chart
-from estimation.monitoring.level_filter import LevelFilter
+from estimation.monitoring.control_charts.charts import Chart
+from estimation.monitoring.control_charts.level_filter import LevelFilter
 
 Array = NDArray[np.float64]
 
@@ -94,6 +94,9 @@ class Quantity:
     def from_dict(cls, data: dict[str, Any]) -> Quantity:
         """Reads `to_dict`."""
         found = cls(data["group"], data["index"], LevelFilter.from_dict(data["level"]), Chart(**data["chart"]))
-        found.samples = [Sample(*row[:5], np.array(row[5], dtype=float)) for row in data["samples"]]
+        found.samples = [
+            Sample(start, end, t, y, variance, np.array(features, dtype=float))
+            for start, end, t, y, variance, features in data["samples"]
+        ]
         found.before = [(np.array(m, dtype=float), np.array(c, dtype=float)) for m, c in data["before"]]
         return found

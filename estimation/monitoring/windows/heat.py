@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from estimation.monitoring.baseline import Baseline
 from estimation.monitoring.settings import Heat
+from estimation.monitoring.windows.baseline import Baseline
 from robots.common.errors import InputError
 from robots.thermal import ThermalModel
 from robots.thermal.online import Step, discretise

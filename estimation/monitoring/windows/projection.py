@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.signal import lfilter
 
-from estimation.monitoring.baseline import Directions
+from estimation.monitoring.windows.baseline import Directions
 from estimation.uncertainty.autoregressive import autocovariance, levinson
 
 Array = NDArray[np.float64]
