@@ -7,7 +7,7 @@ from functools import lru_cache
 import numpy as np
 from scipy.integrate import quad
 from scipy.optimize import brentq
-from scipy.stats import norm
+from scipy.special import ndtr
 
 # Mean overshoot of a normal random walk beyond a boundary, on both sides together (Siegmund 1985, eq. 10.17).
 OVERSHOOT = 1.166
@@ -65,9 +65,13 @@ def ewma_run_length(threshold: float, weight: float, correlation: float = 0.0) -
     r = (keep + correlation) / (1 + keep * correlation)
     spread = np.sqrt(1 - r * r)
     rate, _ = quad(
-        lambda y: norm.pdf(y) * norm.cdf((threshold - r * y) / spread), threshold, threshold + 12.0, epsabs=0, limit=200
+        lambda y: np.exp(-y * y / 2) * ndtr((threshold - r * y) / spread),
+        threshold,
+        threshold + 12.0,
+        epsabs=0,
+        limit=200,
     )
-    return float(1 / max(2 * rate, np.finfo(float).tiny))
+    return float(1 / max(2 * rate / np.sqrt(2 * np.pi), np.finfo(float).tiny))
 
 
 @lru_cache(maxsize=256)
