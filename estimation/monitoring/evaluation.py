@@ -328,7 +328,7 @@ class Evaluation:
             self.forces = [force for force in self.forces if not low <= force[1] <= high]
         for change in changes:
             q = change.quantity
-            q.level.shift(change.size, change.error**2)
+            q.level.restart(*q.before[change.window], change.size, change.error**2)
             q.samples, q.before = [], []
         for q in self.quantities:
             q.chart.reset()

@@ -34,6 +34,7 @@ class Change:
         earliest: of the date [s].
         latest: of the date [s].
         first: whether the step begins with the first of all windows.
+        window: index of the first changed window among the quantity's samples.
     """
 
     quantity: Quantity
@@ -43,6 +44,7 @@ class Change:
     earliest: float
     latest: float
     first: bool
+    window: int
 
     @property
     def sigmas(self) -> float:
@@ -109,6 +111,7 @@ def _change(q: Quantity, fit: StepFit, k: int, begin: float) -> Change:
         earliest=earliest,
         latest=q.samples[last].end,
         first=k == 0 and q.samples[0].start <= begin + 1e-6,
+        window=k,
     )
 
 

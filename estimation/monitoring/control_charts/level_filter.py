@@ -47,8 +47,12 @@ class LevelFilter:
     @property
     def deviation(self) -> float:
         """Standard deviation of the model error e, as learnt so far."""
-        ratio = (PRIOR_WINDOWS + self.square) / (PRIOR_WINDOWS + self.weight)
-        return self.scatter * float(np.sqrt(ratio))
+        return self.scatter * float(np.sqrt(self._ratio))
+
+    @property
+    def _ratio(self) -> float:
+        """The learnt variance of the model error over that of the prior."""
+        return (PRIOR_WINDOWS + self.square) / (PRIOR_WINDOWS + self.weight)
 
     def explained(self, features: Array) -> tuple[float, float]:
         """What the coefficients make of features (m,), and its variance, without the model error."""
@@ -85,15 +89,29 @@ class LevelFilter:
         z = error / float(np.sqrt(total))
         # Only what the model error makes of the innovation says something of its size.
         share = max(total - variance, 0.0) / total
+        worth = share * min(z * z, CLIPPED) * self._ratio
         self.weight = min(self.weight + share, MOST_WINDOWS)
         forgotten = 1 - share / MOST_WINDOWS if self.weight >= MOST_WINDOWS else 1.0
-        self.square = self.square * forgotten + share * min(z * z, CLIPPED)
+        self.square = self.square * forgotten + worth
         return z
 
-    def shift(self, size: float, variance: float) -> None:
-        """Adds a confirmed step to the level, which is the last coefficient."""
-        self.state[-2] += size
+    def restart(self, mean: Array, covariance: Array, step: float, variance: float) -> None:
+        """Goes on after a confirmed step of the level, which is the last coefficient.
+
+        What the filter has learnt since the step is dropped: it took a part of the step for something else.
+
+        Args:
+            mean: of the coefficients before the step (m,).
+            covariance: of them (m, m).
+            step: its size.
+            variance: of the size.
+        """
+        self.state = np.concatenate([mean, [0.0]])
+        self.state[-2] += step
+        self.covariance = np.zeros((len(mean) + 1, len(mean) + 1))
+        self.covariance[:-1, :-1] = covariance
         self.covariance[-2, -2] += variance
+        self.covariance[-1, -1] = self.deviation**2
 
     def to_dict(self) -> dict[str, Any]:
         """Gives the state as plain data."""

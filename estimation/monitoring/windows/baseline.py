@@ -173,7 +173,8 @@ def baseline_of(model: Model, data: Mapping[str, Any] | None = None, file: Path 
     Raises:
         InputError: a model without friction, or a damaged thermal part.
     """
-    content = model.to_dict() if data is None else data
+    # As a file would hold it: tuples become lists.
+    content = json.loads(json.dumps(model.to_dict())) if data is None else data
     if not any(column.friction for column in model.parameters):
         raise InputError("the model has no friction", file=file, remedy="identify the robot with friction")
     return Baseline(model=model, thermal=thermal_from_dict(model, content), source=content)
