@@ -70,5 +70,5 @@ def test_result_is_saved_whole(arm, monitor, tmp_path):
     assert (tmp_path / "monitor.json").read_text().startswith("{")
     lines = (tmp_path / "trends.csv").read_text().splitlines()
     assert len(lines) == 1 + 3 * 6
-    with pytest.raises(InputError, match="exists|already"):
+    with pytest.raises(InputError, match=r"exists|already"):
         result.save(tmp_path)

@@ -1,5 +1,7 @@
 """The monitor on an arm whose torque comes from pinocchio: what it names, and that restarts change nothing."""
 
+from itertools import pairwise
+
 import numpy as np
 import pytest
 
@@ -80,7 +82,7 @@ def test_chunks_and_restarts_change_nothing(arm, baseline, tmp_path):
     rng, file = np.random.default_rng(1), tmp_path / "state.json"
     for log in logs:
         cuts = [0, *np.sort(rng.choice(len(log), 6, replace=False)).tolist(), len(log)]
-        for number, (a, b) in enumerate(zip(cuts[:-1], cuts[1:], strict=True)):
+        for number, (a, b) in enumerate(pairwise(cuts)):
             parts.update(log.t[a:b], log.q[a:b], log.tau[a:b])
             if number % 3 == 2:
                 parts.save(file)
