@@ -29,7 +29,12 @@ class _Pending:
 
 
 def monitor_logs(
-    monitor: Monitor, logs: Sequence[Log], *, refused: Sequence[LogRow] = (), progress: Progress | None = None
+    monitor: Monitor,
+    logs: Sequence[Log],
+    *,
+    refused: Sequence[LogRow] = (),
+    earlier: Sequence[LogRow] = (),
+    progress: Progress | None = None,
 ) -> MonitorResult:
     """Sends logs through a monitor, in the given order.
 
@@ -40,6 +45,7 @@ def monitor_logs(
         monitor: new, or with what it has seen before; it is changed.
         logs: with torque or current, in the order in which they were recorded.
         refused: logs that could not be read, for the result.
+        earlier: rows of logs that the monitor has seen before, for the result.
         progress: receives the progress.
 
     Returns:
@@ -84,7 +90,7 @@ def monitor_logs(
         else:
             rows += [_row(other, ()) for other in pending.logs]
     bar.finish()
-    return MonitorResult.of(monitor, (*rows, *refused), (*notes, *missing_days(spans)))
+    return MonitorResult.of(monitor, (*earlier, *rows, *refused), (*notes, *missing_days(spans)))
 
 
 def _checked(baseline: Baseline, logs: Sequence[Log]) -> tuple[list[Log], list[LogRow]]:

@@ -17,6 +17,7 @@ from oed.cli.commands.doctor import doctor
 from oed.cli.commands.effects import effects
 from oed.cli.commands.example import example
 from oed.cli.commands.export import export
+from oed.cli.commands.fleet import fleet
 from oed.cli.commands.identify import identify
 from oed.cli.commands.monitor import monitor
 from oed.cli.commands.pareto import pareto
@@ -47,6 +48,7 @@ FUNCTIONS = (
     predict,
     compare,
     monitor,
+    fleet,
     payload,
     example,
     robot,

@@ -104,22 +104,15 @@ def _read(paths: list[Path], folder: Path | None, robot: Robot, mapping: Path | 
     """
     from estimation import read_log
     from estimation.logs.campaigns import log_files
-    from estimation.monitoring import LogRow
+    from estimation.monitoring.log_files import read_each
     from robots.common.errors import InputError
 
     named = [file for path in paths for file in (log_files(path) if path.is_dir() else [path])]
-    found = [] if folder is None else log_files(folder)
-    logs, refused = [], []
-    for file in [*named, *found]:
-        try:
-            logs.append(read_log(file, mapping=mapping, joints=robot.joint_names, kinds=robot.chain.kinds))
-        except InputError as error:
-            if file in named:
-                raise
-            refused.append(LogRow.left_out(file.stem, str(error)))
-    if not logs:
-        raise InputError("no log in the folder can be read", file=folder, remedy=refused[0].note if refused else "")
-    return logs, refused
+    logs = [read_log(file, mapping=mapping, joints=robot.joint_names, kinds=robot.chain.kinds) for file in named]
+    more, refused = ([], []) if folder is None else read_each(log_files(folder), robot, mapping)
+    if not logs and not more:
+        raise InputError("no log in the folder can be read", file=folder, remedy=refused[0].note)
+    return [*logs, *more], refused
 
 
 def _require_same(watcher: object, model: Path, settings: object, state: Path) -> None:

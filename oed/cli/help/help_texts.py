@@ -7,7 +7,7 @@ COMMANDS = {
     "Experiments": ("design", "pareto", "retime", "campaign", "export"),
     "Robot and virtual robot": ("stream", "record", "controller", "simulate"),
     "Models": ("check", "identify", "thermal", "predict", "payload"),
-    "Diagnosis": ("diagnose", "compare", "monitor"),
+    "Diagnosis": ("diagnose", "compare", "monitor", "fleet"),
 }
 """Commands by purpose; those that are not listed come last."""
 
@@ -86,6 +86,7 @@ EXAMPLES = {
         "oed monitor --model thermal --log day1.csv day2.csv day3.csv --out monitored",
         "oed monitor --model model --log-dir logs --state robot7.state --out monitored --force",
     ),
+    "fleet": ("oed fleet logs_of_all_robots --model model --workers 4 --out fleet",),
     "payload": (
         "oed payload --robot ur10 --log with.csv --without without.csv --to urscript --out payload",
         "oed payload --model model --log with.csv --to franka kuka --out payload",
