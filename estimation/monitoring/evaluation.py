@@ -31,6 +31,8 @@ COLOUR_WINDOWS = 30
 UNSURE = 0.25
 # A model without a stated residual: share of the torque.
 USUAL_RESIDUAL = 0.05
+# Windows between tests for steps, where no pause comes before.
+STEP_TESTS = 30
 # Windows in a row with a short force that are no short force any more.
 LASTING = 3
 # Relative noise of the log of a residual RMS, beyond what the model error makes.
@@ -85,9 +87,9 @@ class Evaluation:
         self.bursts = BurstChart(self._run_length(1))
 
     def _run_length(self, count: int) -> float:
-        """Windows between false alarms of each of all charts: two of each quantity, and that of short forces."""
+        """Windows between false alarms of each of all tests: three of each quantity, and that of short forces."""
         quantities = 3 * self.n + self.baseline.payload_count + 1
-        hours = self.settings.false_alarm_hours * (2 * quantities + 1) / count
+        hours = self.settings.false_alarm_hours * (3 * quantities + 1) / count
         return hours * 3600.0 / self.settings.window
 
     def window(
@@ -133,7 +135,15 @@ class Evaluation:
             self._note_force(window, len(logs) - 1)
         self.heat.advance(cold * factors, (end - start) / 2, found.ambient)
         self.end = end
+        if self.event is None and (last or len(self.history.rows) % STEP_TESTS == 0):
+            self._test_steps(len(logs) - 1)
         self._settle(logs)
+
+    def _test_steps(self, log: int) -> None:
+        """Opens an event where the last windows of a quantity hold a step; they have confirmed it already."""
+        sources = [index for index, q in enumerate(self.quantities) if q.step_alarm()]
+        if sources and self.end is not None:
+            self.event = Event(time=self.end, log=log, sources=sources, windows=self.settings.confirm)
 
     def _expected(self) -> Array:
         """Expected friction factors (n,): by heat and the level so far."""

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import chi2
 
-from estimation.monitoring.control_charts.change_fit import StepFit, fit_steps
+from estimation.monitoring.control_charts.change_fit import StepFit
 from estimation.monitoring.control_charts.quantities import Quantity
 from estimation.monitoring.findings import NORMAL_95, Finding, Kind, relative
 from estimation.monitoring.windows.baseline import PAYLOAD
@@ -63,7 +63,7 @@ def changes_at(quantities: Sequence[Quantity], sources: Sequence[Quantity], begi
     Returns:
         The changes; none where the alarm is not confirmed.
     """
-    fits = [(q, _fit(q)) for q in quantities if len(q.samples) > 1]
+    fits = [(q, q.steps()) for q in quantities if len(q.samples) > 1]
     critical = float(chi2.isf(BESIDE / max(len(fits), 1), 1))
     own = [(q, fit, int(np.argmax(fit.gains))) for q, fit in fits if any(q is s for s in sources)]
     own = [(q, fit, k) for q, fit, k in own if fit.gains[k] > critical]
@@ -83,19 +83,6 @@ def changes_at(quantities: Sequence[Quantity], sources: Sequence[Quantity], begi
         if fit.gains[alarmed] > critical:
             found.append(_change(q, fit, alarmed, begin))
     return found
-
-
-def _fit(q: Quantity) -> StepFit:
-    mean, covariance = q.before[0]
-    return fit_steps(
-        np.array([s.t for s in q.samples]),
-        np.array([s.y for s in q.samples]),
-        np.array([s.variance for s in q.samples]),
-        np.stack([s.features for s in q.samples]),
-        mean,
-        covariance,
-        q.level.deviation,
-    )
 
 
 def _change(q: Quantity, fit: StepFit, k: int, begin: float) -> Change:

@@ -7,7 +7,9 @@ from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.stats import chi2
 
+from estimation.monitoring.control_charts.change_fit import StepFit, fit_steps
 from estimation.monitoring.control_charts.charts import Chart
 from estimation.monitoring.control_charts.level_filter import LevelFilter
 
@@ -78,6 +80,29 @@ class Quantity:
         scatter = self.level.deviation
         z = self.level.update(sample.features, sample.y, sample.variance)
         return self.chart.update(z, self.deviation, scatter, sample.variance, unsure)
+
+    def step_alarm(self) -> bool:
+        """Tests for a step at any of the last windows, by the likelihood ratio (Willsky and Jones 1976).
+
+        It finds what charts of single windows absorb: a change in a long pause, before which nothing is remembered but
+        the level. Tests at one window after another are correlated, so alarms are rarer than stated.
+        """
+        if len(self.samples) < 4:
+            return False
+        return bool(self.steps().gains[1:].max() > chi2.isf(1.0 / self.chart.run_length, 1))
+
+    def steps(self) -> StepFit:
+        """Fits a step at each of the last windows."""
+        mean, covariance = self.before[0]
+        return fit_steps(
+            np.array([s.t for s in self.samples]),
+            np.array([s.y for s in self.samples]),
+            np.array([s.variance for s in self.samples]),
+            np.stack([s.features for s in self.samples]),
+            mean,
+            covariance,
+            self.level.deviation,
+        )
 
     def to_dict(self) -> dict[str, Any]:
         """Gives the state as plain data."""

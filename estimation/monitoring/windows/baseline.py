@@ -34,7 +34,8 @@ class Directions:
     Attributes:
         rest: torque without friction (N, n) [N m or N].
         friction: friction of the model (N, n) [N m or N], that at the reference temperature of a thermal model.
-        payload: torque of a unit of each payload direction (N, n, 4); of no columns where the flange is not known.
+        payload: torque of a unit of each of the ten inertial parameters of a body on the flange (N, n, 10), the
+            `PAYLOAD` directions first; of no columns where the flange is not known.
     """
 
     rest: Array
@@ -132,7 +133,7 @@ class Baseline:
             carried = last @ moved_body(self.robot.chain.tip)
             if payload is not None:
                 rest = rest + carried @ np.asarray(payload, dtype=float)
-            directions = carried[:, :, : len(PAYLOAD)]
+            directions = carried
         else:
             directions = np.zeros((*q.shape, 0))
             if payload is not None:
