@@ -1,9 +1,10 @@
 """Whether `oed monitor` finds damage under heat and nothing else, on virtual robots that share no code with it.
 
-Run it with ``python benchmarks/monitoring.py FOLDER [thesis|healthy|weeks|speed|table] [COUNT]``. Rows go to files in
-FOLDER; a second run goes on where the first one ended. ``table`` prints the figures of all rows.
+Run it with ``python benchmarks/monitoring.py FOLDER [thesis|night|healthy|weeks|speed|table] [COUNT]``. Rows go to
+files in FOLDER; a second run goes on where the first one ended. ``table`` prints the figures of all rows.
 
 - thesis: friction of one joint rises by 32 % after 60 min of the second day, while heat changes the friction of all.
+- night: the same change in the night before the second day: the first log of that day must show it.
 - healthy: 100 h of heating and cooling without any change.
 - weeks: five days of six 5 min cycles, with mixed causes.
 - speed: a stream of 6 joints at 250 Hz, how many times faster than real time it is followed.
@@ -36,7 +37,7 @@ from robots import load_robot
 from robots.signals import Log
 from tests.truth.description import write_description
 
-ROBOTS = (1, 2)
+ROBOTS = (1,)
 # Friction falls by half at full duty, so that a cold joint has 60 to 70 % more of it than a warm one.
 FALL = 0.5
 LOGGED, CYCLE, REST = 60.0, 300.0, 5.0
@@ -99,14 +100,14 @@ def monitors_of(models: dict[str, Baseline], study: str = "thesis") -> dict[str,
     }
 
 
-def thesis(folder: Path, seed: int, joint: int) -> dict[str, Any]:
-    """Two days of 24 cycles; the damage comes 60 min into the second."""
+def thesis(folder: Path, seed: int, joint: int, *, night: bool = False) -> dict[str, Any]:
+    """Two days of 24 cycles; the damage comes 60 min into the second, or in the night before it."""
     models, robot = trained(folder, seed), robot_of(seed)
     robot.rng = np.random.default_rng([seed, joint])
     robot.rest(DAY / 2)
     monitors = monitors_of(models)
     begin = robot.clock
-    moment = begin + DAY + 12 * CYCLE + 30.0
+    moment = begin + DAY + (-3600.0 if night else 12 * CYCLE + 30.0)
     robot.causes = [Cause(kind="damage", time=moment, joint=joint, amount=DAMAGE)]
     for _ in range(2):
         start = robot.clock
@@ -121,7 +122,7 @@ def thesis(folder: Path, seed: int, joint: int) -> dict[str, Any]:
         first = right[0] if right else None
         table = monitor.evaluation.history.table()["friction"]
         found[name] = {
-            "delay": None if first is None else first.detected - moment,
+            "delay": None if first is None else first.detected - max(moment, begin + DAY),
             "dated": None if first is None else bool(first.earliest <= moment <= first.latest),
             "width": None if first is None else first.latest - first.earliest,
             "size": None if first is None else first.size,
@@ -259,8 +260,8 @@ def run(folder: Path, study: str, count: int) -> None:
         if str(number) in done:
             continue
         start = time.perf_counter()
-        if study == "thesis":
-            row = thesis(folder, ROBOTS[number // 6 % len(ROBOTS)], number % 6 + 1)
+        if study in ("thesis", "night"):
+            row = thesis(folder, ROBOTS[number // 6 % len(ROBOTS)], number % 6 + 1, night=study == "night")
         elif study == "healthy":
             row = healthy(folder, ROBOTS[number % len(ROBOTS)])
         elif study == "weeks":
@@ -275,7 +276,7 @@ def run(folder: Path, study: str, count: int) -> None:
 
 def table(folder: Path) -> None:
     """Prints the figures of all rows."""
-    for study in ("thesis", "healthy", "weeks", "speed"):
+    for study in ("thesis", "night", "healthy", "weeks", "speed"):
         file = folder / f"{study}.jsonl"
         rows = [json.loads(line) for line in file.read_text().splitlines()] if file.exists() else []
         if not rows:
@@ -285,12 +286,15 @@ def table(folder: Path) -> None:
             found = [row[name] for row in rows if name in row]
             if not found:
                 continue
-            if study == "thesis":
+            if study in ("thesis", "night"):
                 seen = [f for f in found if f["delay"] is not None]
                 good = [
                     f
                     for f in seen
-                    if f["delay"] <= CYCLE and f["dated"] and f["width"] <= CYCLE and abs(f["size"] - 32) <= 5
+                    if f["delay"] <= CYCLE
+                    and f["dated"]
+                    and (f["width"] <= CYCLE or study == "night")
+                    and abs(f["size"] - 100 * DAMAGE) <= 5
                 ]
                 clean = sum(not f["false"] for f in found)
                 print(
@@ -331,7 +335,7 @@ def main() -> int:
         return 2
     folder, study = Path(sys.argv[1]), sys.argv[2] if len(sys.argv) > 2 else "table"
     folder.mkdir(parents=True, exist_ok=True)
-    counts = {"thesis": 12, "healthy": 1, "weeks": 200, "speed": 1}
+    counts = {"thesis": 6, "night": 6, "healthy": 1, "weeks": 200, "speed": 1}
     if study == "table":
         table(folder)
         return 0

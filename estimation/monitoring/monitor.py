@@ -21,6 +21,7 @@ from estimation.monitoring.windows.stream_windows import StreamWindows
 from estimation.monitoring.windows.window_rows import settling
 from robots.common.errors import InputError
 from robots.common.files import existing_file, write_atomic
+from robots.common.parallel import one_blas_thread
 
 Array = NDArray[np.float64]
 
@@ -148,9 +149,10 @@ class Monitor:
     def _consume(self, windows: Iterable[tuple[Array, float, float, bool]]) -> None:
         for rows, start, end, last in windows:
             if self._evaluation is not None:
-                self._evaluation.window(
-                    rows, start, end, last=last, payload=self._payload, gravity=self._gravity, logs=self.logs
-                )
+                with one_blas_thread():
+                    self._evaluation.window(
+                        rows, start, end, last=last, payload=self._payload, gravity=self._gravity, logs=self.logs
+                    )
 
     def _rows(
         self, t: ArrayLike, q: ArrayLike, tau: ArrayLike, temperature: ArrayLike | None, ambient: ArrayLike | None

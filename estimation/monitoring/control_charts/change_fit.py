@@ -41,7 +41,14 @@ class StepFit:
 
 
 def fit_steps(
-    t: Array, y: Array, variances: Array, features: Array, mean: Array, covariance: Array, scatter: float
+    t: Array,
+    y: Array,
+    variances: Array,
+    features: Array,
+    mean: Array,
+    covariance: Array,
+    scatter: float,
+    begins: NDArray[np.intp] | None = None,
 ) -> StepFit:
     """Fits y = features b + step + e + noise for a step at each window, by generalised least squares.
 
@@ -53,13 +60,14 @@ def fit_steps(
         mean: prior means of b (m,).
         covariance: of b (m, m).
         scatter: standard deviation of the model error e.
+        begins: windows with which a step may begin (c,), the results are of these; all by default.
     """
     k = len(t)
     V = features @ covariance @ features.T
     V += scatter**2 * np.exp(-np.abs(t[:, None] - t[None, :]) / CORRELATION_TIME)
     V[np.diag_indices(k)] += variances + 1e-12 * max(float(np.trace(V)) / k, 1e-300)
     root = np.linalg.cholesky(V)
-    steps = np.tril(np.ones((k, k)))
+    steps = np.tril(np.ones((k, k))) if begins is None else (np.arange(k)[:, None] >= begins).astype(float)
     both = solve_triangular(root, np.column_stack([y - features @ mean, steps]), lower=True)
     r, S = both[:, 0], both[:, 1:]
     squares = (S**2).sum(axis=0)

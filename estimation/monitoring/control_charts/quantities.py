@@ -19,6 +19,8 @@ Group = Literal["friction", "offset", "payload", "common", "residual"]
 
 # The model error projects onto each direction with this share of the model's residual.
 SHARE = 0.5
+# A longer time between windows [s] is a pause.
+PAUSE = 30.0
 # Windows kept for dating and sizing a change.
 KEPT = 150
 
@@ -82,17 +84,20 @@ class Quantity:
         return self.chart.update(z, self.deviation, scatter, sample.variance, unsure)
 
     def step_alarm(self) -> bool:
-        """Tests for a step at any of the last windows, by the likelihood ratio (Willsky and Jones 1976).
+        """Tests for a step after any of the last pauses, by the likelihood ratio (Willsky and Jones 1976).
 
         It finds what charts of single windows absorb: a change in a long pause, before which nothing is remembered but
         the level. Tests at one window after another are correlated, so alarms are rarer than stated.
         """
-        if len(self.samples) < 4:
+        starts = np.array([s.start for s in self.samples])
+        ends = np.array([s.end for s in self.samples])
+        begins = 1 + np.flatnonzero(starts[1:] - ends[:-1] > PAUSE)
+        if not len(begins):
             return False
-        return bool(self.steps().gains[1:].max() > chi2.isf(1.0 / self.chart.run_length, 1))
+        return bool(self.steps(begins).gains.max() > chi2.isf(1.0 / self.chart.run_length, 1))
 
-    def steps(self) -> StepFit:
-        """Fits a step at each of the last windows."""
+    def steps(self, begins: NDArray[np.intp] | None = None) -> StepFit:
+        """Fits a step at each of the last windows, or at some of them."""
         mean, covariance = self.before[0]
         return fit_steps(
             np.array([s.t for s in self.samples]),
@@ -102,6 +107,7 @@ class Quantity:
             mean,
             covariance,
             self.level.deviation,
+            begins,
         )
 
     def to_dict(self) -> dict[str, Any]:
