@@ -44,7 +44,7 @@ LOGGED, CYCLE, REST = 60.0, 300.0, 5.0
 DAMAGE = 0.32
 VARIANTS = {"thermal model": ("thermal", "model"), "assumed heat": ("plain", "common"), "no heat": ("plain", "none")}
 # Variants of each study: more cost time.
-STUDIED = {"thesis": tuple(VARIANTS), "healthy": ("thermal model", "no heat"), "weeks": ("thermal model",)}
+STUDIED = {"thesis": tuple(VARIANTS), "healthy": ("thermal model",), "weeks": ("thermal model",)}
 
 
 def robot_of(seed: int) -> VirtualRobot:

@@ -27,6 +27,8 @@ DEGREES, ROOM = 20.0, 20.0
 # Standard deviations of what is unknown and common to all joints: the ambient temperature [K], or a share.
 AMBIENT_SPREAD, COMMON_SPREAD = 10.0, 0.5
 LOWEST_FACTOR = 0.05
+# Deviations of a joint, in standard deviations, from which it counts less, and not at all.
+FAR, TOO_FAR = 2.0, 4.0
 
 
 class HeatState:
@@ -149,7 +151,7 @@ def common_change(
     """Estimates the unknown that all joints share, such as an error of the ambient temperature.
 
     Weighted least squares with a normal prior; joints that deviate from the others by more than `FAR` standard
-    deviations count less (Huber 1964).
+    deviations count less (Huber 1964), and by more than `TOO_FAR` not at all: a damaged joint must not move the others.
 
     Args:
         deviations: of the logs of friction (n,); NaN where unknown.
@@ -172,10 +174,7 @@ def common_change(
     precision = 0.0
     for _ in range(10):
         distance = np.abs(d - s * found) / np.sqrt(v)
-        weight = np.minimum(1.0, FAR / np.maximum(distance, FAR)) ** 2 / v
+        weight = np.where(distance < TOO_FAR, np.minimum(1.0, FAR / np.maximum(distance, FAR)) ** 2, 0.0) / v
         precision = float(weight @ s**2) + spread**-2
         found = float(weight @ (s * d)) / precision
     return found, 1.0 / precision
-
-
-FAR = 2.0
