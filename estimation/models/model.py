@@ -234,7 +234,8 @@ def load_model(path: str | Path) -> Model:
     except FileNotFoundError:
         raise InputError("no such file", file=file, remedy="give a model.json, or the folder that holds one") from None
     except (OSError, UnicodeDecodeError, json.JSONDecodeError) as error:
-        raise InputError(f"cannot be read as JSON: {error}", file=file) from error
+        message = "give the model.json of oed identify or oed diagnose, or the folder that holds one"
+        raise InputError(f"is not a model file ({error})", file=file, remedy=message) from error
     if not isinstance(data, dict) or data.get("format") != FORMAT:
         raise InputError("is not a model file", file=file, allowed=f'"format": "{FORMAT}"')
     version = data.get("format_version")

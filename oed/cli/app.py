@@ -18,6 +18,7 @@ from oed.cli.commands.effects import effects
 from oed.cli.commands.example import example
 from oed.cli.commands.export import export
 from oed.cli.commands.fleet import fleet
+from oed.cli.commands.force import force
 from oed.cli.commands.identify import identify
 from oed.cli.commands.monitor import monitor
 from oed.cli.commands.pareto import pareto
@@ -50,6 +51,7 @@ FUNCTIONS = (
     monitor,
     fleet,
     payload,
+    force,
     example,
     robot,
     robots,
