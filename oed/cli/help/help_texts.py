@@ -7,7 +7,7 @@ COMMANDS = {
     "Experiments": ("design", "pareto", "retime", "campaign", "export"),
     "Robot and virtual robot": ("stream", "record", "loop", "controller", "simulate"),
     "Models": ("check", "identify", "thermal", "predict", "payload"),
-    "Diagnosis": ("diagnose", "compare", "monitor", "force"),
+    "Diagnosis": ("diagnose", "compare", "monitor", "fleet", "force"),
 }
 """Commands by purpose; those that are not listed come last."""
 
@@ -19,6 +19,8 @@ OPTIONS = {
         *(
             "trajectory",
             "log",
+            "log_dir",
+            "state",
             "without",
             "held_out",
             "healthy",
@@ -93,6 +95,11 @@ EXAMPLES = {
         "oed compare monday/model.json friday/model.json --out compared",
         "oed compare logs/day1.csv logs/day2.csv logs/day3.csv --robot er3a --out compared",
     ),
+    "monitor": (
+        "oed monitor --model thermal --log day1.csv day2.csv day3.csv --out monitored",
+        "oed monitor --model model --log-dir logs --state robot7.state --out monitored --force",
+    ),
+    "fleet": ("oed fleet logs_of_all_robots --model model --workers 4 --out fleet",),
     "payload": (
         "oed payload --robot ur10 --log with.csv --without without.csv --to urscript --out payload",
         "oed payload --model model --log with.csv --to franka kuka --out payload",
