@@ -186,7 +186,9 @@ class Evaluation:
 
         def add(group: Group, index: int, mean: Array, spread: Array, scatter: float) -> None:
             chart = Chart(window=self.settings.window, run_length=run_length)
-            self.quantities.append(Quantity(group, index, LevelFilter(mean, spread, scatter), chart))
+            # Besides friction: what is smaller than half of the model's own residual is no finding.
+            margin = float(np.log1p(self.settings.smallest)) if group == "friction" else scatter
+            self.quantities.append(Quantity(group, index, LevelFilter(mean, spread, scatter), chart, margin))
 
         mean, spread = self.heat.prior
         for j in range(n):

@@ -66,7 +66,7 @@ def changes_at(quantities: Sequence[Quantity], sources: Sequence[Quantity], begi
     fits = [(q, q.steps()) for q in quantities if len(q.samples) > 1]
     critical = float(chi2.isf(BESIDE / max(len(fits), 1), 1))
     own = [(q, fit, int(np.argmax(fit.gains))) for q, fit in fits if any(q is s for s in sources)]
-    own = [(q, fit, k) for q, fit, k in own if fit.gains[k] > critical]
+    own = [(q, fit, k) for q, fit, k in own if fit.exceeding(q.margin)[k] > critical]
     if not own:
         return []
     quantity, _, k = max(own, key=lambda item: float(item[1].gains[item[2]]))
@@ -80,7 +80,7 @@ def changes_at(quantities: Sequence[Quantity], sources: Sequence[Quantity], begi
             if place >= len(starts):
                 continue
             alarmed = fit.best(max(place - NEAR, 0), min(place + NEAR, len(starts) - 1))
-        if fit.gains[alarmed] > critical:
+        if fit.exceeding(q.margin)[alarmed] > critical:
             found.append(_change(q, fit, alarmed, begin))
     return found
 
