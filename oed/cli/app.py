@@ -20,6 +20,7 @@ from oed.cli.commands.export import export
 from oed.cli.commands.fleet import fleet
 from oed.cli.commands.force import force
 from oed.cli.commands.identify import identify
+from oed.cli.commands.loop import loop
 from oed.cli.commands.monitor import monitor
 from oed.cli.commands.pareto import pareto
 from oed.cli.commands.payload import payload
@@ -41,6 +42,7 @@ FUNCTIONS = (
     record,
     controller,
     campaign,
+    loop,
     simulate,
     check,
     identify,

@@ -5,7 +5,7 @@ from __future__ import annotations
 COMMANDS = {
     "First steps": ("example", "robots", "robot", "effects", "doctor"),
     "Experiments": ("design", "pareto", "retime", "campaign", "export"),
-    "Robot and virtual robot": ("stream", "record", "controller", "simulate"),
+    "Robot and virtual robot": ("stream", "record", "loop", "controller", "simulate"),
     "Models": ("check", "identify", "thermal", "predict", "payload"),
     "Diagnosis": ("diagnose", "compare", "monitor", "fleet", "force"),
 }
@@ -64,7 +64,14 @@ EXAMPLES = {
         "oed controller --robot er3a --plant plant.yaml",
         "oed controller --robot er3a --replies echo --lose 0.05 --double 0.05 --late 0.05",
     ),
-    "campaign": ("oed campaign --robot er3a --design experiment --out campaign",),
+    "campaign": (
+        "oed campaign --robot er3a --design experiment --out campaign",
+        "oed campaign --robot er3a --out campaign --run 192.168.0.10",
+    ),
+    "loop": (
+        "oed loop --robot er3a --host 192.168.0.10 --out loop",
+        "oed loop --robot er3a --host 127.0.0.1 --design experiment --experiments 3 --out loop",
+    ),
     "simulate": (
         "oed simulate --trajectory experiment/trajectory.csv --out log.csv",
         "oed simulate --trajectory experiment/trajectory.csv --plant plant.yaml --seed 1 --out log.csv",
