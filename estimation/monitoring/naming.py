@@ -71,6 +71,7 @@ def changes_at(quantities: Sequence[Quantity], sources: Sequence[Quantity], begi
         return []
     quantity, _, k = max(own, key=lambda item: float(item[1].gains[item[2]]))
     date = quantity.samples[k].start
+    carried = any(q.group == "payload" for q, _, _ in own)
     found = []
     for q, fit in fits:
         alarmed = next((k for other, _, k in own if other is q), None)
@@ -80,7 +81,9 @@ def changes_at(quantities: Sequence[Quantity], sources: Sequence[Quantity], begi
             if place >= len(starts):
                 continue
             alarmed = fit.best(max(place - NEAR, 0), min(place + NEAR, len(starts) - 1))
-        if fit.exceeding(q.margin)[alarmed] > critical:
+        # A body has mass and moments together: small moments belong to a mass that changed.
+        margin = 0.0 if carried and q.group == "payload" else q.margin
+        if fit.exceeding(margin)[alarmed] > critical:
             found.append(_change(q, fit, alarmed, begin))
     return found
 
