@@ -175,7 +175,7 @@ def week(folder: Path, number: int) -> dict[str, Any]:
     )
     kind = str(rng.choice([name for name, _ in kinds], p=[share for _, share in kinds]))
     # From the second day on, anywhere in a cycle; a contact within a log, for it is not seen elsewhere.
-    day, place = int(rng.integers(1, 5)), int(rng.integers(0, 6))
+    day, place = int(rng.integers(1, 4)), int(rng.integers(0, 6))
     offset = float(rng.uniform(0.0, CYCLE if "contact" not in kind else 45.0)) + (10.0 if "contact" in kind else 0.0)
     moment = begin + day * DAY + place * CYCLE + offset
     joints = rng.permutation(robot.n)[:2] + 1

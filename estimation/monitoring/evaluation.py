@@ -3,22 +3,22 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from estimation.monitoring.control_charts.bursts import BurstChart
-from estimation.monitoring.control_charts.charts import Chart
-from estimation.monitoring.control_charts.level_filter import LevelFilter
-from estimation.monitoring.control_charts.quantities import SHARE, Group, Quantity, Sample
+from estimation.monitoring.control_charts.quantities import Quantity, Sample
+from estimation.monitoring.events import Event, contact_finding
 from estimation.monitoring.findings import Finding
 from estimation.monitoring.history import History
+from estimation.monitoring.initial_quantities import initial_quantities
 from estimation.monitoring.naming import changes_at, name_changes
+from estimation.monitoring.observations import observed_values
 from estimation.monitoring.settings import MonitorSettings
 from estimation.monitoring.windows.baseline import Baseline
-from estimation.monitoring.windows.heat import HeatState, common_change
+from estimation.monitoring.windows.heat import HeatState
 from estimation.monitoring.windows.projection import HIGHEST_ORDER, Colour, Window, project
 from estimation.monitoring.windows.window_rows import WindowRows, rows_of_window
 from robots.terms.base import force_unit
@@ -29,31 +29,10 @@ Array = NDArray[np.float64]
 COLOUR_WINDOWS = 30
 # A friction factor with a larger relative standard error says nothing in its window.
 UNSURE = 0.25
-# A model without a stated residual: share of the torque.
-USUAL_RESIDUAL = 0.05
 # Windows between tests for steps, where no pause comes before.
 STEP_TESTS = 30
 # Windows in a row with a short force that are no short force any more.
 LASTING = 3
-# Relative noise of the log of a residual RMS, beyond what the model error makes.
-RESIDUAL_SCATTER, RESIDUAL_NOISE, RESIDUAL_SPREAD = 0.3, 0.1, 1.0
-
-
-@dataclass
-class Event:
-    """An alarm that is being confirmed.
-
-    Attributes:
-        time: end of the window with the alarm [s].
-        log: number of the log, from 0.
-        sources: indices of the quantities with an alarm.
-        windows: seen since.
-    """
-
-    time: float
-    log: int
-    sources: list[int]
-    windows: int = 0
 
 
 class Evaluation:
@@ -125,7 +104,9 @@ class Evaluation:
         window = self._project(found, start, end)
         if self.first is None:
             self.first = start
-            self._create(found, window)
+            self.quantities = initial_quantities(
+                self.baseline, self.heat, self.settings, window, found.directions.payload, self._run_length(1)
+            )
         factors = np.where(self._known(window), window.values[: self.n], self._expected())
         burst = self.bursts.update(window.burst)
         self.bursts_in_row = self.bursts_in_row + 1 if burst else 0
@@ -176,34 +157,6 @@ class Evaluation:
             self.colour_count += 1
         return window
 
-    def _create(self, found: WindowRows, window: Window) -> None:
-        """Makes the quantities, with priors by the model's residual."""
-        n, run_length = self.n, self._run_length(1)
-        residual = np.where(
-            np.isfinite(self.baseline.residual), self.baseline.residual, USUAL_RESIDUAL * window.torque_rms
-        )
-        residual = np.maximum(residual, 1e-6 * max(float(window.torque_rms.max()), 1e-9))
-
-        def add(group: Group, index: int, mean: Array, spread: Array, scatter: float) -> None:
-            chart = Chart(window=self.settings.window, run_length=run_length)
-            self.quantities.append(Quantity(group, index, LevelFilter(mean, spread, scatter), chart))
-
-        mean, spread = self.heat.prior
-        for j in range(n):
-            scatter = min(SHARE * residual[j] / max(window.friction_rms[j], 1e-9), 0.3)
-            add("friction", j, mean, spread, scatter)
-        zero, one = np.zeros(1), np.ones(1)
-        for j in range(n):
-            add("offset", j, zero, residual[j] * one, SHARE * residual[j])
-        level = float(np.sqrt(np.mean(residual**2)))
-        for k in range(self.baseline.payload_count):
-            size = level / max(float(np.sqrt(np.mean(found.directions.payload[:, :, k] ** 2))), 1e-9)
-            add("payload", k, zero, size * one, SHARE * size)
-        common = max(self.heat.common_spread, 1e-9)
-        add("common", 0, zero, common * one, SHARE * common)
-        for j in range(n):
-            add("residual", j, np.log(residual[j]) * one, RESIDUAL_SPREAD * one, RESIDUAL_SCATTER)
-
     def _known(self, window: Window) -> NDArray[np.bool_]:
         """Joints (n,) whose friction factor the window determines."""
         factor = window.values[: self.n]
@@ -212,47 +165,18 @@ class Evaluation:
 
     def _observe(self, window: Window, log: int, *, skip: bool) -> None:
         """Gives each quantity its value in the window."""
-        n, known = self.n, self._known(window)
-        error = np.sqrt(np.diag(window.covariance))
-        features = [self.heat.features(j) for j in range(n)]
-        known &= np.array([f is not None for f in features])
-        y = np.where(known, np.log(np.where(known, window.values[:n], 1.0)), np.nan)
-        noise = np.where(known, (error[:n] / np.where(known, window.values[:n], 1.0)) ** 2, np.nan)
-        explained, spread = np.zeros(n), np.full(n, np.nan)
-        for j in np.flatnonzero(known).tolist():
-            level = self.quantities[j].level
-            explained[j], unsure = level.explained(features[j])  # type: ignore[arg-type]
-            spread[j] = noise[j] + unsure + level.deviation**2
-        sensitivity = np.array([self.heat.sensitivity(j) for j in range(n)])
-        rest = y - explained
-        unknown = self.heat.common_spread
-        whole, whole_variance = common_change(rest, spread, sensitivity, unknown, None)
-        own = np.full(n, np.nan)
-        values: list[tuple[int, float, float, Array]] = []
-        for j in np.flatnonzero(known).tolist():
-            others, _ = common_change(rest, spread, sensitivity, unknown, j)
-            own[j] = y[j] - sensitivity[j] * others
-            values.append((j, own[j], float(noise[j]), np.asarray(features[j])))
-        one = np.ones(1)
-        for k in range(n + self.baseline.payload_count):
-            if window.determined[n + k]:
-                values.append((n + k, float(window.values[n + k]), float(error[n + k] ** 2), one))
-        place = 2 * n + self.baseline.payload_count
-        if unknown > 0 and known.any():
-            values.append((place, whole, whole_variance, one))
-        for j in range(n):
-            values.append((place + 1 + j, float(np.log(window.residual_rms[j])), RESIDUAL_NOISE**2, one))
-        heat = explained - np.array([q.level.coefficients[-1] for q in self.quantities[:n]]) + sensitivity * whole
+        values, seen = observed_values(self.heat, self.quantities, window, self._known(window))
+        known, heat = seen.known, seen.heat
         baseline = self.baseline.residual
         misfit = float(np.nanmedian(window.residual_rms / np.where(np.isfinite(baseline), baseline, np.nan)))
         self.history.add(
             window.start,
             window.end,
             log,
-            y,
-            np.sqrt(noise),
+            seen.friction,
+            np.sqrt(seen.noise),
             np.where(known, heat, np.nan),
-            y - heat,
+            seen.friction - heat,
             misfit if np.isfinite(misfit) else 1.0,
         )
         if skip:
@@ -288,30 +212,10 @@ class Evaluation:
             for force in self.forces:
                 # Two windows without an alarm after it: what acted is over.
                 if self.end is not None and self.end - force[0] > 3.5 * self.settings.window:
-                    self._report_force(force, logs)
+                    self.findings.append(contact_finding(force, logs))
                 else:
                     kept.append(force)
             self.forces = kept
-
-    def _report_force(self, force: tuple[float, float, int, int, int], logs: Sequence[str]) -> None:
-        _, at, log, link, _ = force
-        text = f", felt by the joints up to {link}" if link else ""
-        self.findings.append(
-            Finding(
-                kind="contact",
-                joint=None,
-                size=0.0,
-                low=0.0,
-                high=0.0,
-                unit="",
-                earliest=at - 0.5,
-                latest=at + 0.5,
-                detected=at,
-                sigmas=0.0,
-                log=logs[log],
-                text=text,
-            )
-        )
 
     def conclude(self, logs: Sequence[str]) -> None:
         """Ends the confirmation of an alarm: names what changed, takes it as the new level, and goes on."""

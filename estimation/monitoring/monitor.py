@@ -191,6 +191,7 @@ class Monitor:
                 "window": s.window,
                 "false_alarm_hours": s.false_alarm_hours,
                 "heat": s.heat,
+                "smallest": s.smallest,
                 "confirm": s.confirm,
             },
             "logs": self.logs,

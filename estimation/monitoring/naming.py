@@ -66,11 +66,12 @@ def changes_at(quantities: Sequence[Quantity], sources: Sequence[Quantity], begi
     fits = [(q, q.steps()) for q in quantities if len(q.samples) > 1]
     critical = float(chi2.isf(BESIDE / max(len(fits), 1), 1))
     own = [(q, fit, int(np.argmax(fit.gains))) for q, fit in fits if any(q is s for s in sources)]
-    own = [(q, fit, k) for q, fit, k in own if fit.gains[k] > critical]
+    own = [(q, fit, k) for q, fit, k in own if fit.exceeding(q.margin)[k] > critical]
     if not own:
         return []
     quantity, _, k = max(own, key=lambda item: float(item[1].gains[item[2]]))
     date = quantity.samples[k].start
+    carried = any(q.group == "payload" for q, _, _ in own)
     found = []
     for q, fit in fits:
         alarmed = next((k for other, _, k in own if other is q), None)
@@ -80,7 +81,9 @@ def changes_at(quantities: Sequence[Quantity], sources: Sequence[Quantity], begi
             if place >= len(starts):
                 continue
             alarmed = fit.best(max(place - NEAR, 0), min(place + NEAR, len(starts) - 1))
-        if fit.gains[alarmed] > critical:
+        # A body has mass and moments together: small moments belong to a mass that changed.
+        margin = 0.0 if carried and q.group == "payload" else q.margin
+        if fit.exceeding(margin)[alarmed] > critical:
             found.append(_change(q, fit, alarmed, begin))
     return found
 

@@ -23,6 +23,8 @@ class MonitorSettings:
         heat: what explains common changes of friction. `model`: the thermal model. `temperature`: measured joint
             temperatures. `common`: two heat states per joint, with assumed time constants. `none`: nothing. `auto`
             takes the first that is known, in this order.
+        smallest: change of friction that is worth a finding, as a share. Smaller ones are within what thermal models
+            get wrong between cold and warm.
         confirm: windows after an alarm that confirm, size and name it.
 
     Raises:
@@ -32,6 +34,7 @@ class MonitorSettings:
     window: float = 10.0
     false_alarm_hours: float = 1000.0
     heat: Heat = "auto"
+    smallest: float = 0.05
     confirm: int = 6
 
     def __post_init__(self) -> None:
@@ -41,5 +44,7 @@ class MonitorSettings:
             raise InputError(f"{self.false_alarm_hours} h between false alarms", allowed="1 h or more")
         if self.heat not in HEATS:
             raise InputError(f"heat {self.heat!r}", allowed=", ".join(HEATS))
+        if not 0.0 <= self.smallest < 1.0:
+            raise InputError(f"a smallest change of {self.smallest}", allowed="0 or more, and less than 1")
         if self.confirm < 1:
             raise InputError(f"{self.confirm} windows to confirm an alarm", allowed="1 or more")

@@ -30,6 +30,10 @@ class StepFit:
     sizes: Array
     errors: Array
 
+    def exceeding(self, margin: float) -> Array:
+        """Twice the gains against steps of at most `margin` in either direction (k,); the gains of a margin of 0."""
+        return (np.maximum(np.abs(self.sizes) - margin, 0.0) / self.errors) ** 2
+
     def best(self, first: int, last: int) -> int:
         """The window from `first` to `last`, both included, with which a step most likely begins."""
         return first + int(np.argmax(self.gains[first : last + 1]))

@@ -54,10 +54,11 @@ class Quantity:
         index: joint, or payload direction, counted from 0.
         level: its healthy level.
         chart: its charts.
+        margin: steps up to this size are no finding.
     """
 
-    def __init__(self, group: Group, index: int, level: LevelFilter, chart: Chart) -> None:
-        self.group, self.index, self.level, self.chart = group, index, level, chart
+    def __init__(self, group: Group, index: int, level: LevelFilter, chart: Chart, margin: float) -> None:
+        self.group, self.index, self.level, self.chart, self.margin = group, index, level, chart, margin
         self.samples: list[Sample] = []
         # Coefficients and covariance before each of the samples.
         self.before: list[tuple[Array, Array]] = []
@@ -94,7 +95,7 @@ class Quantity:
         begins = 1 + np.flatnonzero(starts[1:] - ends[:-1] > PAUSE)
         if not len(begins):
             return False
-        return bool(self.steps(begins).gains.max() > chi2.isf(1.0 / self.chart.run_length, 1))
+        return bool(self.steps(begins).exceeding(self.margin).max() > chi2.isf(1.0 / self.chart.run_length, 1))
 
     def steps(self, begins: NDArray[np.intp] | None = None) -> StepFit:
         """Fits a step at each of the last windows, or at some of them."""
@@ -117,6 +118,7 @@ class Quantity:
             "index": self.index,
             "level": self.level.to_dict(),
             "chart": self.chart.to_dict(),
+            "margin": self.margin,
             "samples": [[s.start, s.end, s.t, s.y, s.variance, s.features.tolist()] for s in self.samples],
             "before": [[mean.tolist(), covariance.tolist()] for mean, covariance in self.before],
         }
@@ -124,7 +126,9 @@ class Quantity:
     @classmethod
     def from_dict(cls, data: dict[str, Any]) -> Quantity:
         """Reads `to_dict`."""
-        found = cls(data["group"], data["index"], LevelFilter.from_dict(data["level"]), Chart(**data["chart"]))
+        found = cls(
+            data["group"], data["index"], LevelFilter.from_dict(data["level"]), Chart(**data["chart"]), data["margin"]
+        )
         found.samples = [
             Sample(start, end, t, y, variance, np.array(features, dtype=float))
             for start, end, t, y, variance, features in data["samples"]

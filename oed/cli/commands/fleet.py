@@ -50,7 +50,7 @@ def fleet(
     with console.working() as progress:
         from estimation.monitoring import MonitorSettings
         from estimation.monitoring.fleets import monitor_fleet
-        from oed.reports.pages.fleet_report import save_fleet_report
+        from oed.reports.pages.monitoring.fleet_report import save_fleet_report
         from robots.common.files import ResultFolder
 
         settings = MonitorSettings(window=window, false_alarm_hours=false_alarm_hours, heat=heat)  # type: ignore[arg-type]

@@ -71,7 +71,7 @@ def monitor(
     console = Console(json=json, quiet=quiet)
     with console.working() as progress:
         from estimation.monitoring import Monitor, MonitorSettings, monitor_logs, read_baseline
-        from oed.reports.pages.monitor_report import save_monitor_report
+        from oed.reports.pages.monitoring.monitor_report import save_monitor_report
         from robots.common.errors import InputError
         from robots.common.files import ResultFolder
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-COMMANDS = {
+COMMANDS: dict[str, tuple[str, ...]] = {
     "First steps": ("example", "robots", "robot", "effects", "doctor"),
     "Experiments": ("design", "pareto", "retime", "campaign", "export"),
     "Robot and virtual robot": ("stream", "record", "loop", "controller", "simulate"),

@@ -9,15 +9,9 @@ from estimation.monitoring import MonitorSettings
 from estimation.monitoring.fleets import RobotRow, find_members, fleet, monitor_fleet
 from robots.common.errors import InputError
 from robots.common.files import write_atomic
+from tests.estimation.monitoring.arm import write
 
 SETTINGS = MonitorSettings(heat="none")
-
-
-def write(log, file):
-    file.parent.mkdir(parents=True, exist_ok=True)
-    names = ["t", *(f"q{j}" for j in range(1, 7)), *(f"tau{j}" for j in range(1, 7))]
-    table = np.column_stack([log.t, log.q, log.tau])
-    np.savetxt(file, table, delimiter=",", header=",".join(names), comments="", fmt="%.9g")
 
 
 @pytest.fixture(scope="module")

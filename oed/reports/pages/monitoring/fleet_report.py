@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from estimation.monitoring.fleets import FleetResult, RobotRow
-from oed.reports.pages.monitor_report import STATUS
+from oed.reports.pages.monitoring.monitor_report import STATUS
 from oed.reports.rendering.page import Cell, Fact, Page, Section, Table
 from oed.reports.rendering.palette import joint_role
 from oed.reports.rendering.picture import Line, Panel, Picture, Series
