@@ -132,7 +132,7 @@ def test_budget_and_probability(two, designed, controllers, tmp_path: Path, monk
     scripted(two, monkeypatch, "ambiguous", "ambiguous", "unexplained")
 
     def run(options: LoopOptions) -> Any:
-        return run_loop(two, place, tmp_path, design=designed, options=FREE, stream_options=FAST, speed=SPEED)
+        return run_loop(two, place, tmp_path, design=designed, options=options, stream_options=FAST, speed=SPEED)
 
     one = run(replace(FREE, experiments=1))
     assert not one.success
