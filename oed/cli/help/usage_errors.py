@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 import sys
+from collections.abc import Collection
 from difflib import get_close_matches
 from typing import Any
 
@@ -35,7 +36,7 @@ def usage_message(error: Any) -> str:
 def _problem(error: Any, context: Any) -> str:
     wrong = getattr(error, "option_name", None)
     if wrong is not None and "such option" in str(error.message):
-        known = [] if context is None else [name for p in context.command.get_params(context) for name in p.opts]
+        known = [] if context is None else [name for p in context.command.get_params(context) for name in _spellings(p)]
         return f"no option {wrong}" + _nearest(wrong, known)
     command = _COMMAND.match(str(error.message))
     if command is not None:
@@ -44,9 +45,28 @@ def _problem(error: Any, context: Any) -> str:
     return str(error.format_message())
 
 
-def _nearest(wrong: str, known: list[str]) -> str:
-    """Says which known name was probably meant; nothing where none is near."""
-    close = get_close_matches(wrong.lower(), known, n=1, cutoff=0.66)
+def _spellings(parameter: Any) -> list[str]:
+    """Lists how an option is typed; of an argument nothing."""
+    return [name for name in (*parameter.opts, *parameter.secondary_opts) if name.startswith("-")]
+
+
+def _nearest(wrong: str, known: Collection[str]) -> str:
+    close = nearest_name(wrong, known)
+    return f"; did you mean {close}?" if close else ""
+
+
+def nearest_name(wrong: str, known: Collection[str]) -> str | None:
+    """Finds the known name that was probably meant.
+
+    Args:
+        wrong: what was typed.
+        known: all names.
+
+    Returns:
+        The most similar name, exchanged letters counting least; else one that begins alike; None where none is near.
+    """
+    typed = wrong.lower().replace("_", "-")
+    close = get_close_matches(typed, known, n=3, cutoff=0.66)
     if not close:
-        close = [name for name in known if name.lstrip("-").startswith(wrong.lstrip("-").lower())][:1]
-    return f"; did you mean {close[0]}?" if close else ""
+        close = [name for name in known if name.lstrip("-").startswith(typed.lstrip("-"))]
+    return min(close, key=lambda name: sorted(name) != sorted(typed), default=None)
