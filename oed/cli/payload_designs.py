@@ -11,9 +11,9 @@ MEANINGLESS = ("essential", "after", "task", "offset", "discriminate")
 
 
 def is_given(context: typer.Context, name: str) -> bool:
-    """Whether an option stands on the command line."""
+    """Whether an option stands on the command line or in the configuration file."""
     source = context.get_parameter_source(name)
-    return source is not None and source.name == "COMMANDLINE"
+    return source is not None and source.name in ("COMMANDLINE", "DEFAULT_MAP")
 
 
 def refuse_beside_payload(context: typer.Context) -> None:

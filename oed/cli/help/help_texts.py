@@ -26,6 +26,7 @@ OPTIONS = {
             "before",
             "own_clocks",
             "mapping",
+            "config",
             "torque_is",
             "model",
             "campaign_folder",
