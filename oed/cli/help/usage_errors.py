@@ -15,6 +15,8 @@ UsageError: type[Exception] = typer.BadParameter.__mro__[1]
 CommandLineError: type[Exception] = typer.BadParameter.__mro__[2]
 
 _COMMAND = re.compile(r"No such command '([^']*)'")
+_NAME = re.compile(r"[A-Za-z][\w-]*")
+_LAST_NAME = re.compile(r"(?:'|^--[\w-]+ )([A-Za-z][\w-]*)'?$")
 _OPTION = re.compile(r"'(--?[\w-]+(?: / -\w)?)'")
 
 
@@ -55,6 +57,24 @@ def _nearest(wrong: str, known: Collection[str]) -> str:
     return f"; did you mean {close}?" if close else ""
 
 
+def with_nearest(problem: str, allowed: str | None, message: str) -> str:
+    """Adds the nearest choice to a message about a wrong one.
+
+    Args:
+        problem: what was found; its last word is the wrong name.
+        allowed: the choices, separated by commas.
+        message: the whole message.
+
+    Returns:
+        The message, with the choice that was probably meant if one is near and none is named yet.
+    """
+    wrong = _LAST_NAME.search(problem)
+    if wrong is None or allowed is None or "did you mean" in message:
+        return message
+    choices = [name for name in allowed.split(", ") if _NAME.fullmatch(name)]
+    return message + (_nearest(wrong[1], choices) if wrong[1] not in choices else "")
+
+
 def nearest_name(wrong: str, known: Collection[str]) -> str | None:
     """Finds the known name that was probably meant.
 
@@ -65,7 +85,7 @@ def nearest_name(wrong: str, known: Collection[str]) -> str | None:
     Returns:
         The most similar name, exchanged letters counting least; else one that begins alike; None where none is near.
     """
-    typed = wrong.lower().replace("_", "-")
+    typed = wrong.lower() if any("_" in name for name in known) else wrong.lower().replace("_", "-")
     close = get_close_matches(typed, known, n=3, cutoff=0.66)
     if not close:
         close = [name for name in known if name.lstrip("-").startswith(typed.lstrip("-"))]
