@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from itertools import product
 from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
@@ -19,7 +20,7 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 
 DAMPING = 0.05
-"""Damping ratio of the resonance."""
+"""Damping ratio of the resonance, unless the data show another one."""
 INEXACT = 0.05
 """Relative error of the dynamic stiffness in addition to that of the data, by errors of inertia and damping."""
 OWN = 0.03
@@ -30,6 +31,8 @@ LIGHTEST = 0.02
 """Smallest inertia of a joint in any pose, as a fraction of its largest."""
 APART = 5.0
 """Largest ratio between the dynamic stiffness and the inverse compliance, which are equal for an ideal gear."""
+SOFTEST = 0.5
+"""Largest share of a gear's stiffness that the slope of its load takes away."""
 LOWEST, HIGHEST = 3.0, 1000.0
 """Range of a gear's resonance [Hz]."""
 
@@ -37,10 +40,12 @@ LOWEST, HIGHEST = 3.0, 1000.0
 class JointElasticity(Effect):
     """tau = -(d rigid/dq_j w + d rigid/d(dq_j) w' + M_j w'') c: torque change by the gear's deflection c w.
 
-    c is the gear's compliance and w the link's load. It follows from M_jj w'' / K + w = tau_L, where tau_L is the load
-    computed from the motor's motion. Above the resonance sqrt(K / M_jj), which depends on the pose, the link no longer
-    follows the motor. The dynamic stiffness K equals 1 / c if the base model's link inertia is correct. The inertia of
-    an unknown rotor is part of neither M nor tau_L.
+    c is the gear's compliance and w the link's load. It follows from
+    M_jj w'' / K + (d + V_jj / K) w' + (1 + G_jj / K) w = tau_L, where tau_L is the load computed from the motor's
+    motion, and G and V are d rigid/dq and d rigid/d(dq). Above the resonance sqrt(K / M_jj), which depends on the pose,
+    the link no longer follows the motor. The dynamic stiffness K equals 1 / c if the base model's link inertia is
+    correct. The inertia of an unknown rotor is part of neither M nor tau_L. The damping is fitted too: a wrong one
+    biases compliance and rotor inertia where the motion excites the resonance.
     """
 
     name: ClassVar[str] = "joint_elasticity"
@@ -50,6 +55,7 @@ class JointElasticity(Effect):
     shapes: ClassVar[tuple[Shape, ...]] = (
         Shape("dynamic_stiffness", "N m/rad", 1e-6, 1e12, "log", inexact=INEXACT),
         ROTOR,
+        Shape("damping_ratio", "", 1e-3, 0.5, "log", (DAMPING,), default=DAMPING, beside=True),
     )
     rivals: ClassVar[tuple[str, ...]] = ("backlash", "time_delay", "current_lag", "encoder_offset")
     experiments: ClassVar[tuple[str, ...]] = ("multisine", "payload")
@@ -64,25 +70,26 @@ class JointElasticity(Effect):
         """Lists stiffnesses for the resonances in `SCANNED`, for each rotor inertia of the scan."""
         assert joint is not None
         rotors = rotor_grid(situation, joint)
-        return tuple((_stiffness(situation, joint, f, rotor), rotor) for rotor in rotors for f in SCANNED)
+        return tuple((_stiffness(situation, joint, f, rotor), rotor, DAMPING) for rotor in rotors for f in SCANNED)
 
     def bounds(self, situation: Situation, joint: Place) -> tuple[tuple[float, float], ...]:
         """Bounds the stiffness to resonances of usual gears, and the rotor inertia to its known range."""
         assert joint is not None
         rotor = rotor_bounds(situation, joint)
         softest = _stiffness(situation, joint, LOWEST, rotor[1])
-        return (softest, _stiffness(situation, joint, HIGHEST, rotor[0])), rotor
+        damping = self.shapes[2]
+        return (softest, _stiffness(situation, joint, HIGHEST, rotor[0])), rotor, (damping.lower, damping.upper)
 
     def likely(
         self, situation: Situation, joint: Place, shape: tuple[float, ...], coefficients: Array
     ) -> tuple[tuple[float | None, ...], ...]:
-        """Lists the stiffness that equals the inverse compliance, the known rotor, and both together."""
+        """Lists combinations of the stiffness 1 / c, the known rotor and the usual damping with refined values."""
         assert joint is not None
-        plain: tuple[tuple[float | None, ...], ...] = () if is_sure(situation, joint) else ((None, KNOWN),)
-        if coefficients[0] <= 0:
-            return plain
-        stiffness = float(np.clip(1.0 / coefficients[0], *self.bounds(situation, joint)[0]))
-        return (stiffness, KNOWN), *plain, *((stiffness, None) for _ in plain)
+        stiffness: tuple[float | None, ...] = (None,)
+        if coefficients[0] > 0:
+            stiffness = (float(np.clip(1.0 / coefficients[0], *self.bounds(situation, joint)[0])), None)
+        rotors: tuple[float | None, ...] = (KNOWN,) if is_sure(situation, joint) else (KNOWN, None)
+        return tuple(product(stiffness, rotors, (DAMPING, None)))
 
     def is_plausible(self, robot: Robot, joint: Place, coefficients: Array, shape: tuple[float, ...] = ()) -> bool:
         """Rejects an oscillation whose dynamic stiffness is far from the inverse compliance."""
@@ -92,8 +99,10 @@ class JointElasticity(Effect):
     def columns(self, situation: Situation, joint: Place, shape: tuple[float, ...] = ()) -> Array:
         """Evaluates the torque of all joints per compliance of one joint (N, n, 1)."""
         assert joint is not None
-        stiffness, rotor = shape
-        load = followed(situation, load_beside(situation, joint, rotor), stiffness, _inertia(situation, joint, rotor))
+        stiffness, rotor, damping = shape
+        inertia, j = least_inertia(situation, joint, rotor), joint - 1
+        slopes = (situation.sensitivity(kind)[:, j, j] for kind in ("position", "velocity"))
+        load = followed(situation, load_beside(situation, joint, rotor), stiffness, inertia, damping, *slopes)
         return windup(situation, joint, load, *situation.derivatives(load), rotor)[:, :, None]
 
     def describe(
@@ -120,8 +129,16 @@ class JointElasticity(Effect):
         return f"second derivative of the load of joint {joint} [{unit}/s2]", curve
 
 
-def followed(situation: Situation, load: Array, stiffness: float, inertia: Array) -> Array:
-    """Filters a load by the dynamics of a link on an elastic gear with a damping ratio of 5 %.
+def followed(
+    situation: Situation,
+    load: Array,
+    stiffness: float,
+    inertia: Array,
+    damping: float = DAMPING,
+    slope: Array | float = 0.0,
+    resistance: Array | float = 0.0,
+) -> Array:
+    """Filters a load by the dynamics of a link on an elastic gear.
 
     If the mean resonance is above 0.4 of the Nyquist frequency, the load is returned unchanged.
 
@@ -130,6 +147,9 @@ def followed(situation: Situation, load: Array, stiffness: float, inertia: Array
         load: load by the motor's motion (N,) [N m or N].
         stiffness: of the gear [N m/rad or N/m].
         inertia: of the link (N,) [kg m2 or kg].
+        damping: ratio of the mean resonance.
+        slope: derivative of the load by the link's position (N,) [N m/rad or N/m].
+        resistance: derivative of the load by the link's velocity (N,) [N m s/rad or N s/m].
 
     Returns:
         The link's load (N,) [N m or N].
@@ -141,20 +161,24 @@ def followed(situation: Situation, load: Array, stiffness: float, inertia: Array
     # at rest are put before the log.
     k = 1.0 / np.tan(0.5 * w * situation.period)
     share = inertia / np.mean(inertia)
-    stored, lost = k**2 * share, 2 * DAMPING * k * np.sqrt(share)
+    # A soft gear of a link that falls over would be unstable; no robot has one.
+    held = np.broadcast_to(1.0 + np.clip(slope / stiffness, -SOFTEST, None), load.shape)
+    stored, lost = k**2 * share, 2 * damping * k + w * k * np.broadcast_to(resistance, load.shape) / stiffness
+    lost = np.maximum(lost, 0.0)
     result = np.empty_like(load)
     for run in situation.runs:
-        x, m, d = (np.concatenate([values[run][:1]] * 2 + [values[run]]) for values in (load, stored, lost))
-        m, d = m[1:-1], d[1:-1]
+        x, m, d, g = (np.concatenate([values[run][:1]] * 2 + [values[run]]) for values in (load, stored, lost, held))
+        m, d, g = m[1:-1], d[1:-1], g[1:-1]
         band = np.ones((3, len(x)))
-        band[0, 2:], band[1, 1:-1], band[2, :-2] = m + d + 1.0, 2.0 - 2.0 * m, m - d + 1.0
+        band[0, 2:], band[1, 1:-1], band[2, :-2] = m + d + g, 2.0 * (g - m), m - d + g
+        band[0, :2] = 1.0
         band[1, 0] = 0.0
         right = np.concatenate([x[:2], x[2:] + 2.0 * x[1:-1] + x[:-2]])
         result[run] = solve_banded((2, 0), band, right)[2:]
     return result
 
 
-def _inertia(situation: Situation, joint: int, rotor: float = KNOWN) -> Array:
+def least_inertia(situation: Situation, joint: int, rotor: float = KNOWN) -> Array:
     """Returns the link inertia (N,) on a joint's gear, at least a fraction of its largest value.
 
     A wrist's inertia is so small that its fit may be negative, which would make the link unstable.
@@ -165,7 +189,7 @@ def _inertia(situation: Situation, joint: int, rotor: float = KNOWN) -> Array:
 
 def _stiffness(situation: Situation, joint: int, resonance: float, rotor: float = KNOWN) -> float:
     """Computes the stiffness that gives the log's mean inertia a resonance [Hz]."""
-    return float((2 * np.pi * resonance) ** 2 * np.mean(_inertia(situation, joint, rotor)))
+    return float((2 * np.pi * resonance) ** 2 * np.mean(least_inertia(situation, joint, rotor)))
 
 
 def link_inertia(situation: Situation, joint: int, rotor: float = KNOWN) -> Array:
