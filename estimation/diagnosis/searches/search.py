@@ -21,7 +21,6 @@ from estimation.diagnosis.noise_models.noise_nuisance_basis import build_nuisanc
 from estimation.diagnosis.recordings.log_reading import Recording
 from estimation.diagnosis.reversals.reversal_timing import measure_reversal_timing
 from estimation.diagnosis.searches.refit import RefitResult, base_torque_changed, noise_decreased, refit
-from estimation.diagnosis.searches.relinearisation import relinearise
 from estimation.diagnosis.searches.selection import Selection, select, with_rivals
 from estimation.regressions.parameter_priors import inflate_conflicting_prior
 from robots.base_parameters import BaseParameters
@@ -128,9 +127,8 @@ def search(
         # Such an effect, for example a delay, increased the estimated width of the friction sign.
         blurred = any(found.effect.hypothesis.effect.at_reversals is AtReversals.LATE for found in last.selection.found)
     assert last is not None
-    posed, problem, selection = relinearise(last.searched_problem, last.selection, hypotheses)
-    with_alternatives = with_rivals(posed, last.entries, selection)
-    return replace(last, searched_problem=posed, problem=problem, selection=with_alternatives)
+    with_alternatives = with_rivals(last.searched_problem, last.entries, last.selection)
+    return replace(last, selection=with_alternatives)
 
 
 def _trust_reversal_rows(base: BaseParameters, recording: Recording) -> Recording:
@@ -194,7 +192,7 @@ def _searched(
     entries = measure(problem, hypotheses, _scan_progress(bar, share, 0.2))
     give_back()
     advance = _note_progress(bar, share + 0.25)
-    selection = select(problem, entries, false_alarm=false_alarm, advance=advance, known=known)
+    problem, selection = select(problem, entries, false_alarm=false_alarm, advance=advance, known=known)
     members = [found.effect for found in selection.found]
     return Search(problem, with_total_torque(problem, members, hypotheses), entries, selection)
 

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.integrate import cumulative_trapezoid
 
 from robots.terms.base import force_unit, length_unit
 from robots.terms.effect_bases.base import Coefficient, Effect, Place, Shape, Situation
@@ -40,10 +41,8 @@ BRIEFEST, LANDS = 0.012, 0.02
 so predicting a shorter impact would increase the error."""
 SOFT = 0.03
 """Landing time [s] of a scan: long, so that crossing times between those of the scan are found, too."""
-REBOUND = 1 / 3
-"""Fraction of its speed with which a link rebounds from the flank."""
-SETTLES = (1 - REBOUND) / REBOUND
-"""Decay time of the rebound in landing times: the link then rests at its flank again."""
+SETTLES = 0.05
+"""Time [s] after a landing before the link can leave again: the controller's response to the impact."""
 LEAST, MOST = 1 / 2, 2.0
 """Factors on the gap from the crossing time. The size of the impacts is known to this factor; the crossing time, which
 grows with the cube root of the gap, is known better."""
@@ -52,6 +51,8 @@ HOVERS = 0.05
 
 INEXACT = 0.2
 """Relative error of the formula, because links rebound differently and drives yield to the impact."""
+UNEXPLAINED = 0.25
+"""Fraction of the effect that the formula may leave."""
 SMALLEST = 5e-7
 """Half backlash below which it counts as zero [rad or m]: the roughness of teeth at a radius of 0.1 m."""
 
@@ -61,11 +62,11 @@ class Backlash(Effect):
 
     The link leaves its flank when the gear's load changes sign, and is followed until it reaches the other flank, or
     its own one again if the load returns. A load that grows by r per second moves it over the gap b in
-    (6 b M / r)^(1/3). The flank stops it within a time L by a half wave of force. L is half a period of the link on the
-    stiffness of teeth and drive. Until it has settled it does not leave, because the impact moves the motor, and that
-    shows in the load by the motor's motion. The torque is therefore too small during the crossing; then it shows a
-    short and large impact. It follows from the lag as for an elastic gear, at zero crossings of the load, not of the
-    velocity.
+    (6 b M / r)^(1/3). The flank stops it within a time L by a half wave of force. L is the duration of the impact and
+    the error of its time; the force is centred on that time. The link does not leave before it has settled, because the
+    impact moves the motor, and that shows in the load by the motor's motion. The torque is therefore too small during
+    the crossing; then it shows a short and large impact. It follows from the lag as for an elastic gear, at zero
+    crossings of the load, not of the velocity.
 
     Size and duration of the impacts both determine the gap, but only roughly, because real crossings vary. The zero of
     the load is known to some per cent, because a log separates offset and load poorly. It is a shape parameter.
@@ -151,10 +152,14 @@ class Backlash(Effect):
         gap, at, rotor, landing = shape
         load = load_beside(situation, joint, rotor) - at
         pushed = load / least_inertia(situation, joint, rotor) / (gap / 2)
-        lag = np.zeros((3, len(situation)))
+        lag = np.empty(len(situation))
         for run in situation.runs:
-            lag[:, run] = _lag(situation.t[run], pushed[run], landing)
-        return windup(situation, joint, *lag, rotor)[:, :, None]
+            lag[run] = _spread(_lag(situation.t[run], pushed[run]), landing, situation.period)
+        return windup(situation, joint, lag, *situation.derivatives(lag), rotor)[:, :, None]
+
+    def leakage(self, robot: Robot, joint: int, shape: tuple[float, ...] = ()) -> float:
+        """Returns a quarter: links rebound differently, and the motor yields to the impact."""
+        return UNEXPLAINED
 
     def describe(
         self,
@@ -179,78 +184,54 @@ class Backlash(Effect):
         return f"load of joint {joint} [{unit}]", load_beside(situation, joint, shape[2] if len(shape) > 2 else KNOWN)
 
 
-def _lag(t: Array, pushed: Array, landing: float) -> Array:
-    """Follows a link between two flanks at 1 and -1.
+def _lag(t: Array, pushed: Array) -> Array:
+    """Follows a link between two flanks at 1 and -1, which take all its speed.
 
     Args:
         t: times (N,) [s].
         pushed: acceleration of the lag while the link is free (N,) [1/s2].
-        landing: time in which a flank stops the link [s].
 
     Returns:
-        The lag, and its first and second derivative (3, N).
+        The lag (N,).
     """
-    speed = np.concatenate([[0.0], np.cumsum(0.5 * (pushed[1:] + pushed[:-1]) * np.diff(t))])
-    way = np.concatenate([[0.0], np.cumsum(0.5 * (speed[1:] + speed[:-1]) * np.diff(t))])
+    speed = cumulative_trapezoid(pushed, t, initial=0.0)
+    way = cumulative_trapezoid(speed, t, initial=0.0)
     changes = np.flatnonzero(pushed[:-1] * pushed[1:] < 0) + 1
-    lag = np.zeros((3, len(t)))
+    lag = np.empty(len(t))
     side = 1.0 if np.sum(pushed[: max(len(t) // 100, 1)]) >= 0 else -1.0
-    row, settled = 0, 0
+    row = settled = 0
     while row < len(t):
         # The link stays until the load pushes it off its flank.
-        if side * pushed[row] < 0:
-            leaves = row
-        else:
+        leaves = row
+        if side * pushed[row] >= 0:
             leaves = next((int(c) for c in changes[np.searchsorted(changes, row) :] if side * pushed[c] < 0), len(t))
-        lag[0, row:leaves] += side
+        lag[row:leaves] = side
         if leaves == len(t):
             break
-        last = min(leaves + int(np.searchsorted(t[leaves:], t[leaves] + SLOWEST)), len(t))
         begins = t[leaves]
         if leaves > settled:
             before, after = pushed[leaves - 1], pushed[leaves]
             begins = t[leaves - 1] + (t[leaves] - t[leaves - 1]) * before / (before - after)
         v0, x0 = (float(np.interp(begins, t, values)) for values in (speed, way))
+        last = min(int(np.searchsorted(t, t[leaves] + SLOWEST)), len(t))
         free = side + way[leaves:last] - x0 - v0 * (t[leaves:last] - begins)
         outside = np.flatnonzero(np.abs(free) > 1.0)
         lands = leaves + int(outside[0]) if len(outside) else last
-        lag[0, leaves:lands] += free[: lands - leaves]
-        lag[1, leaves:lands] += speed[leaves:lands] - v0
-        lag[2, leaves:lands] += pushed[leaves:lands]
+        lag[leaves:lands] = free[: lands - leaves]
         if lands == len(t):
             break
-        side = float(np.sign(free[lands - leaves])) if len(outside) else -side
-        fast = speed[lands] - v0
-        over = (abs(free[lands - leaves]) - 1.0) / abs(fast) if len(outside) and fast else 0.0
-        hits = max(t[lands] - over, begins)
-        row = settled = lands + int(np.searchsorted(t[lands:], hits + (1 + SETTLES) * landing))
-        lag[:, lands:row] += _landing(t[lands:row] - hits, landing) * fast
-        lag[0, lands:row] += side
+        side = float(np.sign(free[outside[0]])) if len(outside) else -side
+        row = settled = max(int(np.searchsorted(t, t[lands] + SETTLES)), lands + 1)
+        lag[lands:row] = side
     return lag
 
 
-def _landing(since: Array, landing: float) -> Array:
-    """Evaluates the motion of a link of speed one that meets a flank, beyond the flank.
-
-    A half wave of force reverses its velocity to the fraction `REBOUND`, which decays within `SETTLES` landing times.
-
-    Args:
-        since: time since the impact (K,) [s].
-        landing: time in which the flank stops the link [s].
-
-    Returns:
-        The position, and its two derivatives [1/s] and [1/s2] (3, K).
-    """
-    lost = SETTLES * landing
-    u, k = np.pi * since / landing, np.pi * np.clip((since - landing) / lost, 0.0, 1.0)
-    mean, swing, back = (1 - REBOUND) / 2, (1 + REBOUND) / 2, REBOUND / 2
-    stops = since < landing
-    position = np.where(
-        stops, landing * (mean * u + swing * np.sin(u)) / np.pi, mean * landing - back * lost * (k + np.sin(k)) / np.pi
-    )
-    rate = np.where(stops, mean + swing * np.cos(u), -back * (1 + np.cos(k)))
-    curve = np.where(stops, -swing * np.pi / landing * np.sin(u), back * np.pi / lost * np.sin(k))
-    return np.stack([position, rate, curve])
+def _spread(lag: Array, landing: float, period: float) -> Array:
+    """Spreads each change of speed over the duration of a landing [s], as a half wave of force does."""
+    reach = int(0.5 * landing / period) if period else 0
+    kernel = np.cos(np.pi * period / landing * np.arange(-reach, reach + 1))
+    padded = np.pad(lag, reach, mode="edge")
+    return np.convolve(padded, kernel / kernel.sum(), mode="valid")
 
 
 def _size(situation: Situation, joint: int) -> float:

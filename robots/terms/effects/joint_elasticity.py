@@ -31,8 +31,6 @@ LIGHTEST = 0.02
 """Smallest inertia of a joint in any pose, as a fraction of its largest."""
 APART = 5.0
 """Largest ratio between the dynamic stiffness and the inverse compliance, which are equal for an ideal gear."""
-SOFTEST = 0.5
-"""Largest share of a gear's stiffness that the slope of its load takes away."""
 LOWEST, HIGHEST = 3.0, 1000.0
 """Range of a gear's resonance [Hz]."""
 
@@ -40,12 +38,11 @@ LOWEST, HIGHEST = 3.0, 1000.0
 class JointElasticity(Effect):
     """tau = -(d rigid/dq_j w + d rigid/d(dq_j) w' + M_j w'') c: torque change by the gear's deflection c w.
 
-    c is the gear's compliance and w the link's load. It follows from
-    M_jj w'' / K + (d + V_jj / K) w' + (1 + G_jj / K) w = tau_L, where tau_L is the load computed from the motor's
-    motion, and G and V are d rigid/dq and d rigid/d(dq). Above the resonance sqrt(K / M_jj), which depends on the pose,
-    the link no longer follows the motor. The dynamic stiffness K equals 1 / c if the base model's link inertia is
-    correct. The inertia of an unknown rotor is part of neither M nor tau_L. The damping is fitted too: a wrong one
-    biases compliance and rotor inertia where the motion excites the resonance.
+    c is the gear's compliance and w the link's load. It follows from M_jj w'' / K + w = tau_L, where tau_L is the load
+    computed from the motor's motion. Above the resonance sqrt(K / M_jj), which depends on the pose, the link no longer
+    follows the motor. The dynamic stiffness K equals 1 / c if the base model's link inertia is correct. The inertia of
+    an unknown rotor is part of neither M nor tau_L. The damping is fitted, too: a wrong one biases compliance and rotor
+    inertia where the motion excites the resonance.
     """
 
     name: ClassVar[str] = "joint_elasticity"
@@ -89,7 +86,7 @@ class JointElasticity(Effect):
         if coefficients[0] > 0:
             stiffness = (float(np.clip(1.0 / coefficients[0], *self.bounds(situation, joint)[0])), None)
         rotors: tuple[float | None, ...] = (KNOWN,) if is_sure(situation, joint) else (KNOWN, None)
-        return tuple(product(stiffness, rotors, (DAMPING, None)))
+        return tuple(product(stiffness, rotors, (DAMPING, None)))[:-1]
 
     def is_plausible(self, robot: Robot, joint: Place, coefficients: Array, shape: tuple[float, ...] = ()) -> bool:
         """Rejects an oscillation whose dynamic stiffness is far from the inverse compliance."""
@@ -100,9 +97,8 @@ class JointElasticity(Effect):
         """Evaluates the torque of all joints per compliance of one joint (N, n, 1)."""
         assert joint is not None
         stiffness, rotor, damping = shape
-        inertia, j = least_inertia(situation, joint, rotor), joint - 1
-        slopes = (situation.sensitivity(kind)[:, j, j] for kind in ("position", "velocity"))
-        load = followed(situation, load_beside(situation, joint, rotor), stiffness, inertia, damping, *slopes)
+        inertia = least_inertia(situation, joint, rotor)
+        load = followed(situation, load_beside(situation, joint, rotor), stiffness, inertia, damping)
         return windup(situation, joint, load, *situation.derivatives(load), rotor)[:, :, None]
 
     def describe(
@@ -129,15 +125,7 @@ class JointElasticity(Effect):
         return f"second derivative of the load of joint {joint} [{unit}/s2]", curve
 
 
-def followed(
-    situation: Situation,
-    load: Array,
-    stiffness: float,
-    inertia: Array,
-    damping: float = DAMPING,
-    slope: Array | float = 0.0,
-    resistance: Array | float = 0.0,
-) -> Array:
+def followed(situation: Situation, load: Array, stiffness: float, inertia: Array, damping: float = DAMPING) -> Array:
     """Filters a load by the dynamics of a link on an elastic gear.
 
     If the mean resonance is above 0.4 of the Nyquist frequency, the load is returned unchanged.
@@ -147,9 +135,7 @@ def followed(
         load: load by the motor's motion (N,) [N m or N].
         stiffness: of the gear [N m/rad or N/m].
         inertia: of the link (N,) [kg m2 or kg].
-        damping: ratio of the mean resonance.
-        slope: derivative of the load by the link's position (N,) [N m/rad or N/m].
-        resistance: derivative of the load by the link's velocity (N,) [N m s/rad or N s/m].
+        damping: ratio of the resonance.
 
     Returns:
         The link's load (N,) [N m or N].
@@ -161,17 +147,13 @@ def followed(
     # at rest are put before the log.
     k = 1.0 / np.tan(0.5 * w * situation.period)
     share = inertia / np.mean(inertia)
-    # A soft gear of a link that falls over would be unstable; no robot has one.
-    held = np.broadcast_to(1.0 + np.clip(slope / stiffness, -SOFTEST, None), load.shape)
-    stored, lost = k**2 * share, 2 * damping * k + w * k * np.broadcast_to(resistance, load.shape) / stiffness
-    lost = np.maximum(lost, 0.0)
+    stored, lost = k**2 * share, 2 * damping * k * np.sqrt(share)
     result = np.empty_like(load)
     for run in situation.runs:
-        x, m, d, g = (np.concatenate([values[run][:1]] * 2 + [values[run]]) for values in (load, stored, lost, held))
-        m, d, g = m[1:-1], d[1:-1], g[1:-1]
+        x, m, d = (np.concatenate([values[run][:1]] * 2 + [values[run]]) for values in (load, stored, lost))
+        m, d = m[1:-1], d[1:-1]
         band = np.ones((3, len(x)))
-        band[0, 2:], band[1, 1:-1], band[2, :-2] = m + d + g, 2.0 * (g - m), m - d + g
-        band[0, :2] = 1.0
+        band[0, 2:], band[1, 1:-1], band[2, :-2] = m + d + 1.0, 2.0 - 2.0 * m, m - d + 1.0
         band[1, 0] = 0.0
         right = np.concatenate([x[:2], x[2:] + 2.0 * x[1:-1] + x[:-2]])
         result[run] = solve_banded((2, 0), band, right)[2:]
