@@ -34,7 +34,8 @@ PLACES = {
     "backlash": (1, 2, 3),
     "joint_elasticity": (1, 2, 3),
     "base_compliance": (1, 2, 3),
-    "spring": (1, 2, 3),
+    # Over the range of joint 2 a spring is the same as gravity.
+    "spring": (1, 3, 5),
 }
 SIZES = (0.02, 0.035, 0.05)
 
@@ -99,7 +100,7 @@ def main() -> int:
     parser.add_argument("--kinds", nargs="+", default=list(KINDS), choices=list(PLACES))
     parser.add_argument("--seeds", type=int, nargs="+", default=list(range(1, 11)))
     parser.add_argument("--sizes", type=float, nargs="+", default=list(SIZES))
-    parser.add_argument("--places", type=int, nargs="+", default=[1, 2, 3])
+    parser.add_argument("--places", type=int, nargs="+", default=[1, 2, 3, 5], help="joints, or bases")
     parser.add_argument("--figures", action="store_true", help="print the table, run nothing")
     options = parser.parse_args()
     known = {row["key"] for row in read_rows(options.out)}
@@ -114,7 +115,9 @@ def main() -> int:
             with options.out.open("a") as file:
                 file.write(json.dumps(row, default=float) + "\n")
             named = ", ".join(
-                f"{f['effect']} {f['joint'] or ''} {f['parameters'][0]['value']:.3g}" if f["parameters"] else f["effect"]
+                f"{f['effect']} {f['joint'] or ''} {f['parameters'][0]['value']:.3g}"
+                if f["parameters"]
+                else f["effect"]
                 for f in row["findings"]
             )
             print(f"{key}: {row['amount']:.3g} ({100 * row['shown']:.1f} %) -> {row['verdict']}: {named}", flush=True)

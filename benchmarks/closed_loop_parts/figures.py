@@ -13,19 +13,19 @@ Row = dict[str, Any]
 STATED = {
     "backlash": ("half_play", 2.0),
     "joint_elasticity": ("compliance", 1.0),
-    "base_compliance": ("compliance_1", 1.0),
     "spring": ("stiffness", 1.0),
 }
 QUANTILE = 1.96
 
 
 def is_right(row: Row) -> bool:
-    """Returns whether the first finding is the hidden effect at its joint."""
+    """Returns whether the first finding is the hidden effect at its joint; for a base, the generic correction of it."""
     if not row["findings"]:
         return False
     first = row["findings"][0]
-    place = None if row["kind"] == "base_compliance" else row["place"]
-    return bool(first["effect"] == row["kind"] and first["joint"] == place)
+    if row["kind"] == "base_compliance":
+        return bool((first.get("pattern") or "").startswith("pattern:leaning"))
+    return bool(first["effect"] == row["kind"] and first["joint"] == row["place"])
 
 
 def stated(row: Row) -> tuple[float, float, float] | None:

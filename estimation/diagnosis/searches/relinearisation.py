@@ -51,7 +51,12 @@ def relinearise(problem: Problem, members: Sequence[FittedEffect]) -> tuple[Prob
         members = [replace(m, group=problem.measured(m.hypothesis, m.shape)) for m in members]
         for i, member in enumerate(members):
             members[i] = refine(
-                problem, member.hypothesis, member.shape, accept_all_but(problem, members, i), effort=EFFORT, others=False
+                problem,
+                member.hypothesis,
+                member.shape,
+                accept_all_but(problem, members, i),
+                effort=EFFORT,
+                others=False,
             )
         members = [remeasure(problem, m, accept_all_but(problem, members, i)) for i, m in enumerate(members)]
         before, torques = torques, [dense(problem, m.hypothesis, m.shape) @ m.coefficients for m in members]

@@ -47,7 +47,7 @@ LEAST, MOST = 1 / 2, 2.0
 """Factors on the gap from the crossing time. The size of the impacts is known to this factor; the crossing time, which
 grows with the cube root of the gap, is known better."""
 HOVERS = 0.05
-"""Fraction of its RMS that a load must exceed on the new side to have changed sign, for the crossing times of a scan."""
+"""Fraction of its RMS that a load must exceed on the new side to count as a crossing of the scan."""
 
 INEXACT = 0.2
 """Relative error of the formula, because links rebound differently and drives yield to the impact."""

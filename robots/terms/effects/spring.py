@@ -39,10 +39,10 @@ class Spring(StaticJointEffect):
     """tau = (p + c1 s + c2 s^2 + c3 s^3) ds/dq, s the deflection of the spring at joint position q.
 
     A cable or a torsion spring has s = q minus the middle of the joint's range. Its p is the base model's offset. A
-    linear one has c2 = c3 = 0. A balancer is fixed to both links, at the distances r a and a from the joint. It has s = (L - 1) / r with the length
-    L = sqrt(1 + r^2 - 2 r cos(q - q0)) over a. At the dead centre q0 its ends are nearest. Its c3 is zero, because two
-    orders and the lever's nonlinearity fit a gas spring. The part of the torque proportional to sin(q) or cos(q) is the
-    same as gravity on a level base, and becomes part of the base model.
+    linear one has c2 = c3 = 0. A balancer is fixed to both links, at the distances r a and a from the joint. It has
+    s = (L - 1) / r with the length L = sqrt(1 + r^2 - 2 r cos(q - q0)) over a. At the dead centre q0 its ends are
+    nearest. Its c3 is zero, because two orders and the lever's nonlinearity fit a gas spring. The part of the torque
+    proportional to sin(q) or cos(q) is the same as gravity on a level base, and becomes part of the base model.
     """
 
     name: ClassVar[str] = "spring"

@@ -298,7 +298,10 @@ def test_the_experiment_starts_from_the_arm_itself(problem):
 @pytest.mark.slow
 def test_a_tilted_base_counts_with_the_parameters_that_it_shows(problem):
     """With a tilted base, the first joint's first moments, which level logs do not determine, are fitted, too."""
-    causes = [_guess(problem, "spring", 1, (0.0, 0.0, 3.0), 0.02), _guess(problem, "torque_constant_error", 1, (), 0.02)]
+    causes = [
+        _guess(problem, "spring", 1, (0.0, 0.0, 3.0), 0.02),
+        _guess(problem, "torque_constant_error", 1, (), 0.02),
+    ]
     grams = Grams(problem, causes)
     names = {column.name for column in grams.base.columns} - {c.name for c in problem.baseline.base.columns}
     assert names == {"mPx_1", "mPy_1"}

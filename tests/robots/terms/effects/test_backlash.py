@@ -57,7 +57,9 @@ def test_a_link_flies_between_its_flanks_as_an_integrator_says(frequency: float)
     t = np.arange(0.0, 5.0, 0.004)
 
     def push(at: float) -> float:
-        return float(900.0 * np.sin(2 * np.pi * frequency * at + 0.4) + 250.0 * np.cos(2 * np.pi * 2.3 * frequency * at))
+        return float(
+            900.0 * np.sin(2 * np.pi * frequency * at + 0.4) + 250.0 * np.cos(2 * np.pi * 2.3 * frequency * at)
+        )
 
     expected = _integrated(t, push)
     position = _lag(t, np.array([push(at) for at in t]))

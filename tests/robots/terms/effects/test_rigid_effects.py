@@ -222,7 +222,9 @@ def test_a_gear_of_known_compliance_has_a_resonance(now, seen, twin):
         np.testing.assert_allclose([rotor for _, rotor, _ in scanned], [0.0] * count + [half] * count, rtol=0.01)
         stiff = pytest.approx(wanted[2], rel=0.01)
         likely = elastic.likely(bare, joint, (1.0, 0.0, 0.1), np.array([1 / wanted[2]]))
-        every = {(s, rotor, damping) for s in (stiff.expected, None) for rotor in (0.0, None) for damping in (0.05, None)}
+        every = {
+            (s, rotor, damping) for s in (stiff.expected, None) for rotor in (0.0, None) for damping in (0.05, None)
+        }
         assert len(likely) == len(every) - 1
         assert likely[0] == (stiff, 0.0, 0.05)
         assert (None, None, None) not in likely
