@@ -197,28 +197,30 @@ def said_by(report: GateReport) -> frozenset[str]:
     return frozenset(said)
 
 
-def trials(robots: tuple[str, ...], kinds: tuple[str, ...], seeds: int) -> Iterator[Trial]:
+def trials(robots: tuple[str, ...], kinds: tuple[str, ...], seeds: range) -> Iterator[Trial]:
     """Runs all trials."""
     for name in robots:
         robot = described(name)
-        told = replace(robot, friction=np.zeros((robot.n, 4)))
+        without_friction = replace(robot, friction=np.zeros((robot.n, 4)))
         for kind in kinds:
-            for seed in range(seeds):
-                yield Trial(name, kind, seed, said_by(check_log(told, log_of(robot, kind, seed))))
+            for seed in seeds:
+                yield Trial(name, kind, seed, said_by(check_log(without_friction, log_of(robot, kind, seed))))
 
 
 def main() -> None:
     """Prints the share of each kind that is named, and of right logs that are named wrongly."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--seeds", type=int, default=20)
+    parser.add_argument("--first-seed", type=int, default=0)
     parser.add_argument("--robots", nargs="*", default=ROBOTS)
     parser.add_argument("--kinds", nargs="*", default=KINDS)
     chosen = parser.parse_args()
+    seeds = range(chosen.first_seed, chosen.first_seed + chosen.seeds)
     warnings.simplefilter("ignore")
     print(f"{platform.processor() or platform.machine()}, Python {platform.python_version()}; {chosen.seeds} seeds")
     started = time.perf_counter()
     right: Counter[tuple[str, str]] = Counter()
-    for trial in trials(tuple(chosen.robots), tuple(chosen.kinds), chosen.seeds):
+    for trial in trials(tuple(chosen.robots), tuple(chosen.kinds), seeds):
         right[trial.robot, trial.kind] += trial.right
         if not trial.right:
             print(f"  {trial.robot}, {trial.kind}, seed {trial.seed}: said {sorted(trial.said)}", flush=True)

@@ -118,7 +118,13 @@ class TorqueModel:
         return casadi.Function("adjoint", [*inputs, weights], gradients)
 
     @builds_expressions
-    def _evaluator(self, columns: Sequence[int] | None, backend: str) -> BatchFunction:
+    def evaluator(self, columns: Sequence[int] | None = None, backend: str = "auto") -> BatchFunction:
+        """Gives the evaluator of `regressor`, built once.
+
+        Args:
+            columns: indices of the columns wanted; all by default.
+            backend: see `robots.batch.batch_function`.
+        """
         key = (None if columns is None else tuple(int(c) for c in columns), backend)
         evaluators: dict[object, BatchFunction] = self.__dict__.setdefault("_evaluators", {})
         if key not in evaluators:
@@ -149,7 +155,7 @@ class TorqueModel:
             Y (N, n, p'); ``Y.reshape(N * n, p')`` goes sample by sample, joint by joint.
         """
         arrays = [np.atleast_2d(np.asarray(array, dtype=float)) for array in (q, dq, ddq)]
-        return self._evaluator(columns, backend)(*arrays, out=None if out is None else (out,))[0]
+        return self.evaluator(columns, backend)(*arrays, out=None if out is None else (out,))[0]
 
     def torque(
         self,

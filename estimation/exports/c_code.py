@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -60,20 +62,40 @@ def c_code(model: Model, *, prefix: str = "robot") -> str:
         prefix: of the functions' names.
 
     Raises:
-        InputError: a model with extensions, which stand for more than its regressor.
+        InputError: a model with extensions, which stand for more than its regressor, or a prefix that is none in C.
     """
     if model.extensions:
         raise InputError(
             "a model with extensions cannot be exported as C code", remedy="export the base model (from oed identify)"
         )
-    torque, gravity = _functions(model, prefix)
-    options: dict[str, Any] = {"with_header": False, "casadi_int": "int", "verbose": False}
-    generator = casadi.CodeGenerator(f"{prefix}_model", options)
-    generator.add(torque)
-    generator.add(gravity)
+    check_prefix(prefix)
+    source, work = generated(f"{prefix}_model", _functions(model, prefix))
     head = HEAD.format(name=model.robot.name, version=VERSION, prefix=prefix, n=model.robot.n)
-    work = max(1, torque.sz_w(), gravity.sz_w())
-    return head + generator.dump() + WRAPPER.format(prefix=prefix, work=work)
+    return head + source + WRAPPER.format(prefix=prefix, work=work)
+
+
+def generated(name: str, functions: Sequence[casadi.Function]) -> tuple[str, int]:
+    """Writes CasADi functions as C99, and gives the size of their work vector.
+
+    Args:
+        name: of the unit; it prefixes what is static in it.
+        functions: to be called as ``NAME(in, out, 0, work, 0)``, with arrays of pointers.
+    """
+    options: dict[str, Any] = {"with_header": False, "casadi_int": "int", "verbose": False}
+    generator = casadi.CodeGenerator(name, options)
+    for function in functions:
+        generator.add(function)
+    return generator.dump(), max(1, *(function.sz_w() for function in functions))
+
+
+def check_prefix(prefix: str) -> None:
+    """Refuses what cannot begin a name in C.
+
+    Raises:
+        InputError: other than letters, digits and underscores, or a digit first.
+    """
+    if not re.fullmatch(r"[A-Za-z_]\w*", prefix, flags=re.ASCII):
+        raise InputError(f"{prefix!r} is no name in C", allowed="letters, digits and underscores, no digit first")
 
 
 def _functions(model: Model, prefix: str) -> tuple[casadi.Function, casadi.Function]:

@@ -17,6 +17,7 @@ from oed.cli.commands.doctor import doctor
 from oed.cli.commands.effects import effects
 from oed.cli.commands.example import example
 from oed.cli.commands.export import export
+from oed.cli.commands.force import force
 from oed.cli.commands.identify import identify
 from oed.cli.commands.pareto import pareto
 from oed.cli.commands.payload import payload
@@ -46,6 +47,7 @@ FUNCTIONS = (
     predict,
     compare,
     payload,
+    force,
     example,
     robot,
     robots,

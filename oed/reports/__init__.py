@@ -8,6 +8,7 @@ from oed.reports.pages.design_report import design_page, save_design_report
 from oed.reports.pages.diagnosis_limits import limits_page, save_limits_report
 from oed.reports.pages.diagnosis_report import diagnosis_page, save_diagnosis_report
 from oed.reports.pages.estimate_report import estimate_page, save_estimate_report
+from oed.reports.pages.forces.force_report import force_page, save_force_report
 from oed.reports.pages.pareto_report import pareto_page, save_pareto_report
 from oed.reports.pages.payload_report import payload_page, save_payload_report
 from oed.reports.pages.prediction_report import prediction_page
@@ -39,6 +40,7 @@ __all__ = [
     "diagnosis_page",
     "error_bars_picture",
     "estimate_page",
+    "force_page",
     "friction_picture",
     "limits_page",
     "margins_picture",
@@ -55,6 +57,7 @@ __all__ = [
     "save_design_report",
     "save_diagnosis_report",
     "save_estimate_report",
+    "save_force_report",
     "save_limits_report",
     "save_pareto_report",
     "save_payload_report",

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
+from collections.abc import Callable
 
 import casadi
 import numpy as np
@@ -65,6 +66,29 @@ class BatchFunction(ABC):
         outputs = self._outputs(samples // size, None)
         self._sum(samples // size, size, arrays, outputs)
         return outputs
+
+    def bound(self, arguments: tuple[Array, ...], out: tuple[Array, ...]) -> Callable[[], None]:
+        """Checks arrays once, and gives a call that evaluates them where they lie: for one sample many times.
+
+        Args:
+            arguments: one C-ordered array (N, k) of float64 per input.
+            out: arrays (N, r, c) to write into.
+
+        Returns:
+            Reads the arguments as they are now and fills the outputs.
+
+        Raises:
+            InputError: arrays of the wrong shape, or that would have to be copied.
+        """
+        arrays, samples = self._checked(arguments)
+        for position, (array, given) in enumerate(zip(arrays, arguments, strict=True)):
+            if array is not given:
+                raise InputError(f"argument {position + 1} is not a C-ordered array of float64")
+        outputs = self._outputs(samples, out)
+        return self._bound(samples, arrays, outputs)
+
+    def _bound(self, samples: int, arguments: list[Array], outputs: tuple[Array, ...]) -> Callable[[], None]:
+        return lambda: self._evaluate(samples, arguments, outputs)
 
     def _checked(self, arguments: tuple[Array, ...]) -> tuple[list[Array], int]:
         """The arguments as C-ordered arrays, and how many samples they hold."""

@@ -10,7 +10,7 @@ import platform
 import shutil
 import subprocess
 import tempfile
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from functools import cache
 from pathlib import Path
 
@@ -51,6 +51,15 @@ class CompiledFunction(BatchFunction):
 
     def _evaluate(self, samples: int, arguments: list[Array], outputs: tuple[Array, ...]) -> None:
         self._all(ctypes.c_longlong(samples), _pointers(arguments), _pointers(outputs))
+
+    def _bound(self, samples: int, arguments: list[Array], outputs: tuple[Array, ...]) -> Callable[[], None]:
+        call, count = self._all, ctypes.c_longlong(samples)
+        pointers = _pointers(arguments), _pointers(outputs)
+
+        def run(_kept: tuple[object, ...] = (arguments, outputs)) -> None:
+            call(count, *pointers)
+
+        return run
 
     def _sum(self, groups: int, size: int, arguments: list[Array], outputs: tuple[Array, ...]) -> None:
         counts = ctypes.c_longlong(groups), ctypes.c_longlong(size)

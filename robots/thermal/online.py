@@ -200,14 +200,9 @@ class OnlineFriction:
         Returns:
             Friction torque at this velocity and temperature [N m or N]: what friction compensation adds.
         """
-        cold, around = self.cold(dq), self.model.ambient if ambient is None else ambient
-        power = max(cold * dq, 0.0)
+        cold = self.cold(dq)
         torque = cold * self.factor
-        before = self.state
-        self.state, heat = self._advance(self.short, before, power, around, drives, T3)
-        self.heat += heat * self.short.period
-        self._power += power
-        self._count += 1
+        self._heat(max(cold * dq, 0.0), ambient, drives, T3)
         if measured is not None and np.isfinite(measured) and abs(dq) > self.observer.slowest:
             self._cross += measured * cold
             self._square += cold * cold
@@ -216,6 +211,31 @@ class OnlineFriction:
             self._correct()
             self._clear()
         return torque
+
+    def heat_by(self, power: float, *, ambient: float | None = None, drives: float = 1.0, T3: float = 0.0) -> float:
+        """Advances by one period without a measurement, where the friction's power is known.
+
+        Args:
+            power: of the friction at T0, mean of the period [W].
+            ambient: ambient temperature [degC]; that of the model by default.
+            drives: 1 where the drives are powered.
+            T3: reading of the thermocouple, if there is one [degC].
+
+        Returns:
+            Friction over that at T0 after it.
+        """
+        self._heat(max(power, 0.0), ambient, drives, T3)
+        if self._count == self.steps:
+            self._correct()
+            self._clear()
+        return self.factor
+
+    def _heat(self, power: float, ambient: float | None, drives: float, T3: float) -> None:
+        around = self.model.ambient if ambient is None else ambient
+        self.state, heat = self._advance(self.short, self.state, power, around, drives, T3)
+        self.heat += heat * self.short.period
+        self._power += power
+        self._count += 1
 
     def _feedback(self, step: Step, power: float) -> tuple[float, float]:
         """Slope of the heat with the mean temperature of a step [W/K], and the implicit denominator."""

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.fft import irfft, next_fast_len, rfft
 from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
@@ -66,10 +67,9 @@ class ImpulseResponse:
         free = np.linalg.svd(ends)[2][2:].T
         inside = np.abs(at) <= half[-1]
         whole = np.stack([np.where(inside, part, 0.0) @ free for part in (way, speed, force)])
-        f = np.fft.rfftfreq(4 * len(x), dx)
-        kept = np.fft.irfft(
-            np.fft.rfft(whole, 4 * len(x), axis=1) * low_pass_gain(np.asarray(f), cutoff)[:, None], axis=1
-        )
+        length = next_fast_len(4 * len(x), real=True)
+        gain = low_pass_gain(np.asarray(np.fft.rfftfreq(length, dx)), cutoff)
+        kept = irfft(rfft(whole, length, axis=1) * gain[:, None], length, axis=1)
         return ImpulseResponse(x, whole - kept[:, : len(x)])
 
     def at(self, times: Array) -> Array:

@@ -10,7 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from estimation.gate.candidates.candidate_fits import STANDARD, CandidateFits, Meaning
-from estimation.gate.candidates.described_torques import described_torques, scales
+from estimation.gate.candidates.torque_evidence import joint_evidence
+from estimation.gate.candidates.torque_hypotheses import hypotheses
 from estimation.gate.check import Check
 from estimation.gate.context import Context, Stage
 from estimation.gate.finding import Finding
@@ -165,8 +166,13 @@ def _sizes(context: Context) -> list[_Cause]:
     described = np.asarray(context.robot.inertia, dtype=float).ravel()
     if not np.isfinite(described).all() or not described.any():
         return []
-    factors = scales(described_torques(context.fitted), context.robot.n)
-    return [_Cause("size", Meaning(tau_factor=factors))] if (factors != 1.0).any() else []
+    evidence = joint_evidence(context.fitted)
+    for best in hypotheses(context.robot, evidence)[:1] if evidence else []:
+        if best.odds > 0 and best.kind in ("current", "motor", "percent", "unit"):
+            factors = np.ones(context.robot.n)
+            factors[list(best.joints)] = 1.0 / np.array(best.factors)
+            return [_Cause("size", Meaning(tau_factor=factors))]
+    return []
 
 
 def _best(fits: CandidateFits, causes: list[_Cause], before: float) -> tuple[_Cause, float] | None:

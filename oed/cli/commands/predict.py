@@ -3,19 +3,15 @@
 from __future__ import annotations
 
 from contextlib import ExitStack
-from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated
 
 import typer
 
 from oed.cli.console import Console
+from oed.cli.heat import AmbientOption, BeforeOption, heat_of
 from oed.cli.options import ForceOption, JsonOption, MappingOption, QuietOption
 from oed.cli.set_up import GravityOption, PayloadOption, TorqueIsOption, with_known_setup, with_torque_meaning
-
-if TYPE_CHECKING:
-    from estimation.models.model import Model
-    from robots.signals import Log
 
 
 def predict(
@@ -25,21 +21,8 @@ def predict(
     payload: PayloadOption = None,
     gravity: GravityOption = None,
     torque_is: TorqueIsOption = None,
-    before: Annotated[
-        list[Path] | None,
-        typer.Option(
-            "--before",
-            help="Thermal model: a log, or a folder of logs, of the robot's motion before this log. Repeatable.",
-            show_default=False,
-        ),
-    ] = None,
-    ambient: Annotated[
-        float | None,
-        typer.Option(
-            help="Thermal model: ambient temperature of logs that do not state it [degC].",
-            show_default=False,
-        ),
-    ] = None,
+    before: BeforeOption = None,
+    ambient: AmbientOption = None,
     out: Annotated[Path, typer.Option("--out", help="CSV file to write: torques and their 95 % bands.")] = Path(
         "predicted.csv"
     ),
@@ -74,7 +57,7 @@ def predict(
             (recorded,) = with_torque_meaning(robot, with_known_setup([read], payload, gravity), torque_is)
             progress.start("predicting", None)
             later, clock = clock_shift(identified, recorded)
-            heat = _heat(model, identified, recorded, before or [], ambient, mapping, later)
+            heat = heat_of(model, identified, recorded, before or [], ambient, mapping, later)
             result = run(identified, recorded, later=later, **heat.options)
             result.save(out, force=force)
             if page_file is not None:
@@ -86,55 +69,3 @@ def predict(
     )
     words = {"heat": heat.assumed or None, "clock": clock or None}
     console.result(summary, {"file": str(out), **result.to_dict(), **words})
-
-
-@dataclass(frozen=True, kw_only=True)
-class _Heat:
-    """Thermal inputs of a prediction, and a sentence on the assumed initial state."""
-
-    options: dict[str, Any] = field(default_factory=dict)
-    assumed: str = ""
-
-
-def _heat(
-    path: Path,
-    model: Model,
-    log: Log,
-    before: list[Path],
-    ambient: float | None,
-    mapping: Path | None,
-    later: float,
-) -> _Heat:
-    import json as codec
-
-    from estimation import read_logs
-    from estimation.predictions.prediction import warmed
-    from estimation.thermal import start_temperatures, thermal_from_dict
-    from robots.common.errors import InputError
-
-    file = path / "model.json" if path.is_dir() else path
-    thermal = thermal_from_dict(model, codec.loads(file.read_text(encoding="utf-8")))
-    robot = model.robot
-    names, kinds = robot.joint_names, robot.chain.kinds
-    earlier = read_logs(before, n=robot.n, mapping=mapping, joints=names, kinds=kinds) if before else []
-    if thermal is None:
-        if ambient is not None:
-            raise InputError(
-                "the model has no thermal part", file=file, remedy="remove --ambient, or use a model of `oed thermal`"
-            )
-        placed, assumed = warmed(model, earlier, log, later)
-        return _Heat(options={"before": placed}, assumed=assumed)
-    if ambient is not None and not -30.0 <= ambient <= 60.0:
-        raise InputError(f"--ambient {ambient}", allowed="-30 to 60 degC")
-    start = None
-    if before:
-        start = start_temperatures(thermal, earlier, float(log.t[0]), ambient=ambient)
-        assumed = (
-            f"thermal friction: initial temperatures computed from {len(earlier)} earlier logs; the first is assumed "
-            f"to start cold"
-        )
-    else:
-        assumed = (
-            "thermal friction: the robot is assumed cold at the start; give earlier logs with --before if it was warm"
-        )
-    return _Heat(options={"thermal": thermal, "start": start, "ambient": ambient}, assumed=assumed)

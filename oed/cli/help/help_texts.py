@@ -7,7 +7,7 @@ COMMANDS = {
     "Experiments": ("design", "pareto", "retime", "campaign", "export"),
     "Robot and virtual robot": ("stream", "record", "controller", "simulate"),
     "Models": ("check", "identify", "thermal", "predict", "payload"),
-    "Diagnosis": ("diagnose", "compare", "monitor"),
+    "Diagnosis": ("diagnose", "compare", "monitor", "force"),
 }
 """Commands by purpose; those that are not listed come last."""
 
@@ -21,6 +21,8 @@ OPTIONS = {
             "log",
             "without",
             "held_out",
+            "healthy",
+            "calibration",
             "before",
             "own_clocks",
             "mapping",
@@ -83,6 +85,10 @@ EXAMPLES = {
     "payload": (
         "oed payload --robot ur10 --log with.csv --without without.csv --to urscript --out payload",
         "oed payload --model model --log with.csv --to franka kuka --out payload",
+    ),
+    "force": (
+        "oed force --model model --log log.csv --healthy healthy.csv --out forces",
+        "oed force --model model --log log.csv --calibration forces/forces.json --out other",
     ),
     "example": ("oed example --out example",),
     "robots": ("oed robots",),

@@ -39,7 +39,7 @@ def test_two_functions_never_build_at_once():
 
 
 @pytest.mark.parametrize(
-    "function", [sensitivities._evaluator, static._evaluator, static._row_evaluator, TorqueModel._evaluator]
+    "function", [sensitivities._evaluator, static._evaluator, static._row_evaluator, TorqueModel.evaluator]
 )
 def test_what_a_diagnosis_builds_in_threads_is_built_alone(function):
     """Every builder that its threads reach is wrapped."""

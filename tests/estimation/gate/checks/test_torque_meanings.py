@@ -37,7 +37,7 @@ def columns():
 )
 def test_each_kind_is_named(columns, name, kind):
     """One seed of the benchmark on two robots, descriptions 20 % off: fixed logs, no chance."""
-    (trial,) = columns.trials((name,), (kind,), 1)
+    (trial,) = columns.trials((name,), (kind,), range(1))
     assert trial.right, trial.said
 
 

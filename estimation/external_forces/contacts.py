@@ -1,0 +1,169 @@
+"""Contacts: samples beyond the threshold, joined to events with time, force and place."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from estimation.external_forces.localisation import Place
+from estimation.external_forces.residuals.signals import Signals
+from estimation.external_forces.thresholds.calibrations import Calibration, Observed
+from estimation.external_forces.wrenches import tool_load
+from robots.common.plain import all_finite, finite
+from robots.common.stretches import spans
+from robots.geometry.chain import Chain
+
+Array = NDArray[np.float64]
+
+# Samples that stand for a longer contact where its first and last moment are sought.
+MOST_ROWS = 400
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Contact:
+    """One contact.
+
+    Attributes:
+        detected: when the statistic passed the threshold [s].
+        start: when the torque began [s], the most likely time.
+        end: when it ended [s].
+        peak: largest statistic over the threshold.
+        force: mean force at the tool, in the base frame, if there is no moment (3,) [N].
+        covariance: of it (3, 3) [N2].
+        torque: mean external joint torque (n,) [N m or N].
+        place: where it acts.
+        extrapolates: whether the model extrapolates at that time.
+    """
+
+    detected: float
+    start: float
+    end: float
+    peak: float
+    force: Array
+    covariance: Array
+    torque: Array
+    place: Place
+    extrapolates: bool
+
+    @property
+    def magnitude(self) -> float:
+        """Size of the mean force [N]."""
+        return float(np.linalg.norm(self.force))
+
+    @property
+    def magnitude_deviation(self) -> float:
+        """Standard deviation of the size [N]; infinite where the joints do not feel some direction."""
+        if not np.isfinite(self.covariance).all():
+            return float("inf")
+        along = self.force / max(self.magnitude, np.finfo(float).tiny)
+        return float(np.sqrt(max(float(along @ self.covariance @ along), 0.0)))
+
+    def to_dict(self) -> dict[str, Any]:
+        """Writes it as plain data."""
+        return {
+            "detected": self.detected,
+            "start": self.start,
+            "end": self.end,
+            "peak_over_threshold": self.peak,
+            "force": self.force.tolist(),
+            "force_standard_deviation": all_finite(np.sqrt(np.diag(self.covariance))),
+            "magnitude": self.magnitude,
+            "magnitude_standard_deviation": finite(self.magnitude_deviation),
+            "torque": self.torque.tolist(),
+            "link": self.place.link,
+            "reacting_joints": list(self.place.reacting),
+            "tool": self.place.tool,
+            "extrapolates": self.extrapolates,
+        }
+
+
+def find_contacts(
+    chain: Chain, signals: Signals, observed: Observed, calibration: Calibration
+) -> tuple[NDArray[np.bool_], tuple[Contact, ...]]:
+    """Finds the contacts of a log.
+
+    Args:
+        chain: the robot's joints.
+        signals: of the log.
+        observed: the same, filtered and scaled.
+        calibration: of a healthy robot.
+
+    Returns:
+        Where (N,) the statistic is beyond the threshold, and the contacts. Exceedances closer than independent peaks
+        belong to one contact.
+    """
+    beyond = observed.statistic > calibration.threshold.value
+    contacts = []
+    for first, last in _joined(beyond, signals.t, max(calibration.threshold.separation, calibration.constant)):
+        contacts.append(_contact(chain, signals, observed, calibration, first, last))
+    return beyond, tuple(contacts)
+
+
+def _joined(beyond: NDArray[np.bool_], t: Array, separation: float) -> list[tuple[int, int]]:
+    """Runs of exceedances as (first, last + 1), those closer than `separation` [s] in one."""
+    runs: list[tuple[int, int]] = []
+    for first, last in spans(beyond):
+        if runs and t[first] - t[runs[-1][1] - 1] < separation:
+            runs[-1] = (runs[-1][0], last)
+        else:
+            runs.append((first, last))
+    return runs
+
+
+def _contact(
+    chain: Chain, signals: Signals, observed: Observed, calibration: Calibration, first: int, last: int
+) -> Contact:
+    errors = calibration.errors
+    peak = first + int(np.argmax(observed.statistic[first:last]))
+    covariance = errors.covariance(observed.deviation[peak])
+    start, end = _window(signals, observed, calibration, first, last, peak, covariance)
+    rows = slice(start, end)
+    torque = signals.external[rows].mean(axis=0)
+    jacobian = signals.jacobian[rows, :3].mean(axis=0)
+    mean = errors.covariance(observed.deviation[rows]).mean(axis=0)
+    force, spread = tool_load(torque[None], mean[None], jacobian[None])
+    place = calibration.localiser.locate(
+        chain, signals.q[peak], observed.residual[peak], covariance, signals.jacobian[peak]
+    )
+    # Each step's torque is the mean since the sample before.
+    return Contact(
+        detected=float(signals.t[first]),
+        start=float(signals.t[max(start - 1, 0)]),
+        end=float(signals.t[end - 1]),
+        peak=float(observed.statistic[peak] / calibration.threshold.value),
+        force=force[0],
+        covariance=spread[0],
+        torque=torque,
+        place=place,
+        extrapolates=bool(signals.extrapolates[rows].any()),
+    )
+
+
+def _window(
+    signals: Signals,
+    observed: Observed,
+    calibration: Calibration,
+    first: int,
+    last: int,
+    peak: int,
+    covariance: Array,
+) -> tuple[int, int]:
+    """Most likely (first, last + 1) of a constant torque in the pattern of the peak, in noise of one level.
+
+    It maximises (sum of the projected torque)^2 / length over all windows about the exceedances.
+    """
+    around = max(round(3.0 * calibration.constant / signals.period), 1)
+    low, high = max(first - around, 1), min(last + around // 3, len(signals.t))
+    weights = np.linalg.solve(covariance, observed.residual[peak])
+    series = signals.external[low:high] @ weights
+    step = max(1, len(series) // MOST_ROWS)
+    sums = np.concatenate([[0.0], np.cumsum(series)])[::step]
+    lengths = np.arange(len(sums))
+    length = lengths[None, :] - lengths[:, None]
+    gain = (sums[None, :] - sums[:, None]) * np.sign(series.sum() or 1.0)
+    score = np.where((length > 0) & (gain > 0), gain**2 / np.maximum(length, 1), 0.0)
+    begin, stop = np.unravel_index(int(np.argmax(score)), score.shape)
+    return low + step * int(begin), low + max(step * int(stop), step * int(begin) + 1)

@@ -1,0 +1,147 @@
+"""The verb: external forces and contacts of a log, by an identified model."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+import numpy as np
+
+from estimation.external_forces.contacts import find_contacts
+from estimation.external_forces.residuals.dynamics import dynamics_of, require_inertia
+from estimation.external_forces.residuals.filters import filtered
+from estimation.external_forces.residuals.signals import Signals, Velocity, signals_of
+from estimation.external_forces.result import ForceEstimate
+from estimation.external_forces.thresholds.calibrations import Calibration, calibrate_signals, observe
+from estimation.external_forces.thresholds.fit_checks import check_fit
+from estimation.external_forces.wrenches import tool_load
+from estimation.logs.provenance import are_same_log, describe_logs
+from estimation.models.model import Model
+from estimation.predictions.prediction import Prediction, predict
+from robots.common.errors import InputError
+from robots.common.progress import SILENT, Progress
+from robots.signals import Log
+from robots.terms.situations.flange_body import require_flange
+
+BANDWIDTH = 4.0
+"""Default bandwidth of the observer [Hz]: a push of 0.2 s is five of its time constants."""
+
+Predictor = Callable[[Log], Prediction]
+
+
+def estimate_forces(
+    model: Model,
+    log: Log,
+    *,
+    healthy: Sequence[Log] = (),
+    calibration: Calibration | None = None,
+    false_alarms: float = 1.0,
+    bandwidth: float = BANDWIDTH,
+    tool: Sequence[float] | None = None,
+    velocity: Velocity = "smoothed",
+    predictor: Predictor | None = None,
+    progress: Progress | None = None,
+) -> ForceEstimate:
+    """Estimates the external forces of a log, and finds contacts.
+
+    Args:
+        model: an identified model.
+        log: with positions and torque.
+        healthy: logs without contacts, from which the threshold follows. Without any the log itself serves: what looks
+            like a contact is left out of it.
+        calibration: of an earlier call, instead of `healthy`.
+        false_alarms: an hour, on a healthy robot.
+        bandwidth: of the observer [Hz].
+        tool: position (3,) of the tool point in the flange's frame [m]; the flange by default.
+        velocity: ``smoothed``, from smoothed positions, or ``logged``, the log's columns dq1..
+        predictor: predicts the torques of a log; `predict` with this model by default. One with heat is
+            ``lambda log: predict(model, log, thermal=...)``.
+        progress: receives the progress.
+
+    Returns:
+        Forces with their uncertainty at each sample, and the contacts.
+
+    Raises:
+        InputError: a model without inertial parameters, a robot without a flange, a log of another number of joints,
+            without torque or asked-for velocities, or too short.
+        NotIdentifiableError: the model does not fit the log.
+    """
+    require_inertia(model)
+    require_flange(model.robot)
+    if velocity not in ("smoothed", "logged"):
+        raise InputError(f"velocity {velocity!r}", allowed="smoothed or logged")
+    if not 0.0 < bandwidth < np.inf:
+        raise InputError(f"a bandwidth of {bandwidth} Hz", allowed="a positive number")
+    if calibration is not None:
+        bandwidth, velocity = calibration.bandwidth, calibration.velocity
+    run, bar = predictor or (lambda own: predict(model, own)), progress or SILENT
+    bar.start("external forces", float(len(healthy) + 1))
+    warnings: list[str] = []
+
+    def prepared(own: Log, done: int) -> Signals:
+        bar.update(float(done), own.name)
+        prediction = run(own)
+        if prediction.measured is None:
+            raise InputError("the log has no torque", file=own.metadata.get("file"), remedy="record tau1.. or i1..")
+        dynamics = dynamics_of(model, gravity=own.gravity, payload=own.payload, tool=tool)
+        signals = signals_of(model, dynamics, own, prediction, bandwidth, velocity)
+        found = check_fit(signals, prediction.band, str(own.metadata.get("file") or own.name))
+        if found and not done:
+            warnings.append(found)
+        return signals
+
+    signals = prepared(log, 0)
+    known = model.provenance.get("logs", ())
+    in_fit = any(are_same_log(own, other) for own in describe_logs(healthy) for other in known)
+    if in_fit:
+        warnings.append(
+            "the model was fitted to a log of --healthy: the parameters' errors are added to its residual; a log that "
+            "the fit has not seen gives a lower threshold"
+        )
+    if calibration is None:
+        calibration = calibrate_signals(
+            model,
+            [prepared(own, k) for k, own in enumerate(healthy, start=1)] or [signals],
+            bandwidth=bandwidth,
+            velocity=velocity,
+            false_alarms=false_alarms,
+            own=not healthy,
+            in_fit=in_fit,
+        )
+    if calibration.own:
+        warnings.append("the threshold comes from this log itself: a contact in most of it would be missed (--healthy)")
+    bar.finish()
+    return forces_of(model, signals, calibration, warnings)
+
+
+def forces_of(model: Model, signals: Signals, calibration: Calibration, warnings: Sequence[str] = ()) -> ForceEstimate:
+    """Gives the forces and contacts of prepared signals.
+
+    Args:
+        model: the identified model.
+        signals: of the log.
+        calibration: of a healthy robot.
+        warnings: for the result.
+    """
+    observed = observe(signals, calibration.errors, calibration.bandwidth)
+    covariance = calibration.errors.covariance(observed.deviation)
+    force, force_spread = tool_load(observed.residual, covariance, signals.jacobian[:, :3])
+    wrench, wrench_spread = tool_load(observed.residual, covariance, signals.jacobian)
+    flagged, contacts = find_contacts(model.robot.chain, signals, observed, calibration)
+    return ForceEstimate(
+        robot=model.robot.name,
+        joint_names=model.robot.joint_names,
+        t=signals.t,
+        torque=observed.residual,
+        direct=filtered(signals.direct, signals.t, calibration.constant, signals.begins, from_zero=True),
+        deviation=observed.deviation,
+        statistic=observed.statistic / calibration.threshold.value,
+        force=force,
+        force_deviation=np.sqrt(np.einsum("tkk->tk", force_spread)),
+        wrench=wrench,
+        wrench_deviation=np.sqrt(np.einsum("tkk->tk", wrench_spread)),
+        extrapolates=np.asarray(signals.extrapolates.any(axis=1)),
+        flagged=flagged,
+        contacts=contacts,
+        calibration=calibration,
+        warnings=tuple(warnings),
+    )

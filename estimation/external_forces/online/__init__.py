@@ -1,0 +1,1 @@
+"""The observer sample by sample: in Python, and as C."""

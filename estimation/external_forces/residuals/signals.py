@@ -1,0 +1,161 @@
+"""What an observer sees of a log: external torque by the momentum and by inverse dynamics, before the filter."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from estimation.external_forces.residuals.dynamics import Dynamics
+from estimation.external_forces.residuals.filters import external_torque, filtered, restarts, time_constant
+from estimation.external_forces.residuals.friction_levels import friction_excess
+from estimation.models.model import Model
+from estimation.predictions.checked_motions import smoother_of
+from estimation.predictions.prediction import Prediction
+from estimation.preprocessing import Smoother
+from robots.common.errors import InputError
+from robots.signals import Log
+
+Array = NDArray[np.float64]
+Velocity = Literal["smoothed", "logged"]
+
+# Time constants that a log must last.
+SHORTEST = 10.0
+# Time constants after a start in which nothing is judged.
+SETTLING = 3.0
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Signals:
+    """Signals of a log for the observer.
+
+    Attributes:
+        t: times (N,) [s].
+        q: positions (N, n).
+        dq: velocities (N, n).
+        torque: measured joint torque (N, n) [N m or N].
+        friction: by the model, cold (N, n) [N m or N].
+        variance: of the torque by the parameters' errors (N, n) [(N m)^2].
+        jacobian: of the tool point in the base frame (N, 6, n).
+        external: external torque by the momentum, not filtered (N, n) [N m or N].
+        direct: external torque by inverse dynamics, not filtered (N, n) [N m or N].
+        excess: of the friction over the model's, as a share of it (N, n).
+        extrapolates: where (N, n) the prediction extrapolates.
+        begins: where (N,) the observer begins anew.
+    """
+
+    t: Array
+    q: Array
+    dq: Array
+    torque: Array
+    friction: Array
+    variance: Array
+    jacobian: Array
+    external: Array
+    direct: Array
+    excess: Array
+    extrapolates: NDArray[np.bool_]
+    begins: NDArray[np.bool_]
+
+    @property
+    def period(self) -> float:
+        """Usual time step [s]."""
+        return float(np.median(np.diff(self.t)))
+
+
+def signals_of(
+    model: Model, dynamics: Dynamics, log: Log, prediction: Prediction, bandwidth: float, velocity: Velocity
+) -> Signals:
+    """Evaluates the momentum and the torques of a log.
+
+    Args:
+        model: the identified model.
+        dynamics: of it, with the log's gravity and payload.
+        log: as it was read.
+        prediction: of this log by the model, with heat and extensions.
+        bandwidth: of the observer [Hz].
+        velocity: ``smoothed``, of the prediction's motion, or ``logged``, the log's own.
+
+    Raises:
+        InputError: a log without torque, without velocities where they are asked for, or too short.
+    """
+    file = log.metadata.get("file")
+    if prediction.measured is None:
+        raise InputError("the log has no torque", file=file, remedy="record tau1.. or i1.. with the positions")
+    motion, constant = prediction.motion, time_constant(bandwidth)
+    if motion.duration < SHORTEST * constant:
+        raise InputError(
+            f"a log of {motion.duration:.2g} s",
+            file=file,
+            allowed=f"{SHORTEST * constant:.2g} s or more at a bandwidth of {bandwidth:g} Hz",
+        )
+    q, dq, ddq = motion.q, motion.dq, motion.ddq
+    cold = model.torque(q, dq, ddq, gravity=log.gravity, payload=log.payload)
+    begins = _unsettled(motion.t, restarts(motion.t, constant), constant, smoother_of(model, prediction.cutoff))
+    if velocity == "logged":
+        q, dq = logged_motion(log, motion.t)
+        ddq = filtered(_differences(dq, motion.t, begins), motion.t, constant, begins)
+    momentum, rest, friction, jacobian = dynamics(q, dq)
+    # What the model adds to its terms, heat and extensions, acts at the joints as friction does.
+    beta = rest + friction + (prediction.predicted - cold)
+    external = external_torque(motion.t, momentum, prediction.measured - beta, begins)
+    # As the external torque, the mean of each step.
+    mean = np.concatenate([friction[:1], (friction[1:] + friction[:-1]) / 2.0])
+    excess = friction_excess(motion.t, external, mean, begins)
+    nothing = np.zeros(motion.q.shape, dtype=bool)
+    return Signals(
+        t=motion.t,
+        q=q,
+        dq=dq,
+        torque=prediction.measured,
+        friction=friction,
+        variance=dynamics.variance(q, dq, ddq),
+        jacobian=jacobian,
+        external=np.where(begins[:, None], 0.0, external + excess * mean),
+        direct=prediction.predicted - prediction.measured + excess * friction,
+        excess=excess,
+        extrapolates=nothing if prediction.extrapolates is None else prediction.extrapolates,
+        begins=begins,
+    )
+
+
+def logged_motion(log: Log, t: Array) -> tuple[Array, Array]:
+    """Gives the logged positions and velocities (N, n) at some of the log's times.
+
+    Raises:
+        InputError: a log without velocities.
+    """
+    if log.dq is None:
+        raise InputError(
+            "the log has no velocities",
+            file=log.metadata.get("file"),
+            allowed="columns dq1..dqn",
+            remedy="use velocities from smoothed positions: leave --velocity out",
+        )
+    return tuple(np.column_stack([np.interp(t, log.t, column) for column in x.T]) for x in (log.q, log.dq))  # type: ignore[return-value]
+
+
+def _unsettled(t: Array, begins: NDArray[np.bool_], constant: float, smoother: Smoother) -> NDArray[np.bool_]:
+    """Marks samples (N,) near the ends of each part, where smoothed positions are not to be trusted.
+
+    At the start filters of the recorder settle as well: the observer waits for some of its time constants.
+    """
+    result = np.zeros(len(t), dtype=bool)
+    edges = [*np.flatnonzero(begins).tolist(), len(t)]
+    for first, last in pairwise(edges):
+        own = t[first:last]
+        # The momentum's change feels the smoothing's end for a period of its cut-off.
+        edge = max(smoother.edge(float(own[-1] - own[0])), 1.0 / smoother.cutoff)
+        result[first:last] = (own < own[0] + max(edge, SETTLING * constant)) | (own > own[-1] - edge)
+    return result
+
+
+def _differences(x: Array, t: Array, begins: NDArray[np.bool_]) -> Array:
+    """Backward differences (N, n), zero where the observer begins."""
+    slope = np.zeros_like(x)
+    slope[1:] = np.diff(x, axis=0) / np.diff(t)[:, None]
+    slope[begins] = 0.0
+    return slope

@@ -1,0 +1,155 @@
+"""Forces of a log: contacts, and force and moment at the tool at each sample."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from estimation.external_forces.contacts import Contact
+from estimation.external_forces.thresholds.calibrations import Calibration
+from robots.common.files import write_atomic
+from robots.common.tables.table_files import write_table
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+Array = NDArray[np.float64]
+
+FORMAT = "robot-oed forces"
+FORMAT_VERSION = 1
+AXES = ("x", "y", "z")
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class ForceEstimate:
+    """External forces of one log.
+
+    Attributes:
+        robot: its name.
+        joint_names: names (n,).
+        t: times (N,) [s].
+        torque: external joint torque by the momentum observer (N, n) [N m or N].
+        direct: the same by inverse dynamics and the observer's filter (N, n) [N m or N].
+        deviation: standard deviation of `torque` on a healthy robot (N, n) [N m or N].
+        statistic: squared distance of the torque from zero over the threshold (N,): a contact where it exceeds 1.
+        force: at the tool in the base frame, if there is no moment (N, 3) [N].
+        force_deviation: standard deviation of its components (N, 3) [N].
+        wrench: force and moment at the tool in the base frame (N, 6) [N, N m].
+        wrench_deviation: standard deviation of its components (N, 6); infinite where the joints do not feel one.
+        extrapolates: where (N,) the model extrapolates.
+        flagged: where (N,) the statistic is beyond the threshold.
+        contacts: in the order of time.
+        calibration: error model and threshold.
+        warnings: limitations of the result.
+    """
+
+    robot: str
+    joint_names: tuple[str, ...]
+    t: Array
+    torque: Array
+    direct: Array
+    deviation: Array
+    statistic: Array
+    force: Array
+    force_deviation: Array
+    wrench: Array
+    wrench_deviation: Array
+    extrapolates: NDArray[np.bool_]
+    flagged: NDArray[np.bool_]
+    contacts: tuple[Contact, ...]
+    calibration: Calibration
+    warnings: tuple[str, ...] = ()
+
+    @property
+    def duration(self) -> float:
+        """From the first to the last sample [s]."""
+        return float(self.t[-1] - self.t[0])
+
+    def summary(self) -> str:
+        """Says what was found, a line per contact."""
+        threshold = self.calibration.threshold
+        count = len(self.contacts)
+        found = "no contact" if not count else "one contact" if count == 1 else f"{count} contacts"
+        lines = [
+            f"{found} in {self.duration:.4g} s; threshold for {threshold.rate:g} false alarms per hour, from "
+            f"{threshold.peaks} independent peaks in {threshold.seconds:.3g} s"
+        ]
+        if count:
+            lines.append("  start [s]  duration [s]  force at the tool [N]  x, y, z [N]            where")
+        for contact in self.contacts:
+            sd = contact.magnitude_deviation
+            size = f"{contact.magnitude:.3g} ± {sd:.2g}" if np.isfinite(sd) else f"{contact.magnitude:.3g}"
+            parts = ", ".join(f"{value:.3g}" for value in contact.force)
+            where = contact.place.text(self.joint_names)
+            lines.append(
+                f"  {contact.start:9.4g}  {contact.end - contact.start:12.3g}  {size:>21}  {parts:22}  {where}"
+            )
+        median = np.median(self.force_deviation, axis=0)
+        if np.isfinite(median).any():
+            words = ", ".join(f"{value:.2g}" if np.isfinite(value) else "unknown" for value in median)
+            lines.append(f"median standard deviation of the force at the tool: {words} N along x, y, z of the base")
+        else:
+            lines.append("the joints do not feel all directions of a force at the tool, so its size is not known")
+        return "\n".join([*lines, *self.warnings])
+
+    def to_dict(self) -> dict[str, Any]:
+        """Gives contacts and settings as plain data."""
+        finite = np.where(np.isfinite(self.force_deviation), self.force_deviation, np.nan)
+        return {
+            "format": FORMAT,
+            "format_version": FORMAT_VERSION,
+            "robot": self.robot,
+            "samples": len(self.t),
+            "duration": self.duration,
+            "contacts": [contact.to_dict() for contact in self.contacts],
+            "flagged": float(self.flagged.mean()),
+            "extrapolates": float(self.extrapolates.mean()),
+            "force_standard_deviation": [
+                None if np.isnan(column).all() else float(np.nanmedian(column)) for column in finite.T
+            ],
+            "calibration": self.calibration.to_dict(),
+            "warnings": list(self.warnings),
+        }
+
+    def to_frame(self) -> pd.DataFrame:
+        """Gives the samples as a table, see `save`."""
+        import pandas as pd
+
+        return pd.DataFrame(self._columns())
+
+    def save(self, folder: str | Path, *, force: bool = False) -> None:
+        """Writes ``forces.csv`` and ``forces.json`` into a folder.
+
+        The table has t, contact (0 or 1), statistic (1 is the threshold), extrapolates, the force fx.. at the tool if
+        there is no moment, force and moment wfx.., wmx.., each with _sd, and the external joint torques tau_ext1..
+
+        Raises:
+            InputError: a file is there, and force is not given.
+        """
+        folder = Path(folder)
+        units = {"t": "s", **{f"f{k}{end}": "N" for k in AXES for end in ("", "_sd")}}
+        write_table(folder / "forces.csv", self._columns(), {"content": "external forces"}, units=units, force=force)
+        text = json.dumps(self.to_dict(), indent=2, allow_nan=False) + "\n"
+        write_atomic(folder / "forces.json", text, force=force)
+
+    def _columns(self) -> dict[str, Array]:
+        columns = {"t": self.t, "contact": self.flagged.astype(float), "statistic": self.statistic}
+        columns["extrapolates"] = self.extrapolates.astype(float)
+        wrench = [f"w{what}{axis}" for what in "fm" for axis in AXES]
+        loads = (
+            ([f"f{axis}" for axis in AXES], self.force, self.force_deviation),
+            (wrench, self.wrench, self.wrench_deviation),
+        )
+        for names, values, deviations in loads:
+            for k, name in enumerate(names):
+                columns[name], columns[f"{name}_sd"] = values[:, k], deviations[:, k]
+        for j in range(self.torque.shape[1]):
+            columns[f"tau_ext{j + 1}"] = self.torque[:, j]
+            columns[f"tau_ext{j + 1}_sd"] = self.deviation[:, j]
+            columns[f"direct{j + 1}"] = self.direct[:, j]
+        return columns

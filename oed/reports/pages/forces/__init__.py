@@ -1,0 +1,1 @@
+"""Pages of external forces and contacts."""
