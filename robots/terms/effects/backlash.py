@@ -51,6 +51,8 @@ HOVERS = 0.05
 
 INEXACT = 0.2
 """Relative error of the formula, because links rebound differently and drives yield to the impact."""
+CROSSED = 0.1
+"""Relative error of the gap by the crossing times: the motor answers during the crossing."""
 UNEXPLAINED = 0.25
 """Fraction of the effect that the formula may leave."""
 SMALLEST = 5e-7
@@ -78,7 +80,7 @@ class Backlash(Effect):
     gear_load: ClassVar[GearLoad] = GearLoad.FEELS
     above_band: ClassVar[AboveBand] = AboveBand.COUNTS
     shapes: ClassVar[tuple[Shape, ...]] = (
-        Shape("gap_crossed", "rad", 1e-7, 0.2, "log"),
+        Shape("gap_crossed", "rad", 1e-7, 0.2, "log", inexact=CROSSED),
         Shape("crossed_at", "N m", -np.inf, np.inf, "linear", (0.0,), default=0.0),
         ROTOR,
         Shape("landing", "s", BRIEFEST, 0.1, "log", (LANDS,), default=LANDS),
