@@ -176,7 +176,7 @@ def attack_client(robot: Robot, count: int, end: float) -> None:
     thread = threading.Thread(target=shake_hands)
     thread.start()
     endpoint = Endpoint(host="127.0.0.1", state_port=server.getsockname()[1])
-    recorder = Recorder(open_link(endpoint, endpoint.state_port), robot, DEFAULT, 10.0)
+    recorder = Recorder(open_link(endpoint, endpoint.state_port), robot, DEFAULT, 10.0, 10.0)
     thread.join()
     while sent < count and time.monotonic() < end:
         for _ in range(BURST):

@@ -75,7 +75,7 @@ def run_of(model: Model, label: str, file: str | Path = "") -> Run:
     logs: Sequence[Mapping[str, Any]] = model.provenance.get("logs", ())
     start = float(logs[0]["start"]) if logs and logs[0].get("start") is not None else None
     names = [*reversed(Path(file).parts[-2:]), label, *(str(log.get("name", "")) for log in logs[:1])]
-    date = start if start is not None and start >= ABSOLUTE else _date_in(names)
+    date = start if start is not None and start >= ABSOLUTE else date_in(names)
     n, weights = model.robot.n, np.array([float(log.get("samples", 1)) for log in logs])
     rows = [
         [number(value, np.nan) for value in log["temperature"]] if log.get("temperature") else [np.nan] * n
@@ -173,7 +173,8 @@ def _require_covariance(file: Path) -> None:
         )
 
 
-def _date_in(names: Sequence[str]) -> float | None:
+def date_in(names: Sequence[str]) -> float | None:
+    """Finds the first date in some names [s since 1970]; None without one."""
     for name in names:
         for found in _DATE.finditer(name):
             year, month, day, hour, minute = (int(part or 0) for part in found.groups())

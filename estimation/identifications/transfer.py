@@ -119,7 +119,11 @@ class Transfer:
         spread, costs = self.comparison.spread, []
         solver = _Solver(self.comparison.estimator, fitted.total, trial)
         for split in self.splits:
-            values = solver.solve(_sum(fitted, split.fitted))
+            part = _sum(fitted, split.fitted)
+            if not part.square.any():
+                # The robot rests in all of it.
+                continue
+            values = solver.solve(part)
             unseen = _sum(judged, split.judged)
             error = np.sqrt(unseen.residual(values) / np.maximum(unseen.count, 1))
             costs.append(float(np.log(np.clip(error / spread, 1e-9, 1.0)).mean()))
@@ -136,6 +140,8 @@ class Transfer:
         found: list[Contradiction] = []
         for log in logs.tolist():
             own = _sum(fitted, self._source == log)
+            if not own.square.any():
+                continue
             rows = np.maximum(own.count, 1)
             errors = [np.sqrt(own.residual(values) / rows) for values in (solver.solve(own), together)]
             alone, beside = (error / self.comparison.spread for error in errors)
@@ -151,9 +157,12 @@ class Transfer:
         fitted, joints = self.comparison.of_trial(blocks.fitted, trial), len(self.comparison.spread)
         solver = _Solver(self.comparison.estimator, fitted.total, trial)
         rows, block = self._thinned(trial)
-        held = np.zeros((len(GROWTHS), joints))
+        held, judged = np.zeros((len(GROWTHS), joints)), 0
         for split in self.splits:
             part = _sum(fitted, split.fitted)
+            if not part.square.any():
+                continue
+            judged += 1
             values, covariance = solver.solve(part), solver.covariance(part)
             seen, unseen = split.fitted[block], split.judged[block]
             for joint, (Y, used, tau) in enumerate(rows):
@@ -163,9 +172,9 @@ class Transfer:
                 width = np.hypot(level, NORMAL_95 * np.outer(GROWTHS, _deviation(Y[unseen], covariance, used)))
                 known = np.isfinite(error[unseen])
                 held[:, joint] += (error[unseen] <= width)[:, known].mean(axis=1) if known.any() else 1.0
-        share = held / max(len(self.splits), 1)
+        share = held / max(judged, 1)
         first = np.where((share >= HELD).any(axis=0), (share >= HELD).argmax(axis=0), len(GROWTHS) - 1)
-        growth = np.array(GROWTHS)[first] if self.splits else np.ones(joints)
+        growth = np.array(GROWTHS)[first] if judged else np.ones(joints)
         covariance = solver.covariance(fitted.total)
         open_ = [_deviation(Y, covariance, used) for Y, used, _ in rows]
         return Band(growth, covariance, np.array([np.quantile(part, LARGEST) for part in open_]))

@@ -234,21 +234,27 @@ def load_model(path: str | Path) -> Model:
     except FileNotFoundError:
         raise InputError("no such file", file=file, remedy="give a model.json, or the folder that holds one") from None
     except (OSError, UnicodeDecodeError, json.JSONDecodeError) as error:
-        raise InputError(f"cannot be read as JSON: {error}", file=file) from error
+        message = "give the model.json of oed identify or oed diagnose, or the folder that holds one"
+        raise InputError(f"is not a model file ({error})", file=file, remedy=message) from error
     if not isinstance(data, dict) or data.get("format") != FORMAT:
         raise InputError("is not a model file", file=file, allowed=f'"format": "{FORMAT}"')
     version = data.get("format_version")
     if not isinstance(version, int) or version > FORMAT_VERSION:
         raise InputError(f"format version {version!r}", file=file, allowed=f"up to {FORMAT_VERSION}")
     try:
-        return _from_dict(data)
+        return model_from_dict(data)
     except InputError as error:
         raise InputError(error.problem, file=file, allowed=error.allowed, remedy=error.remedy) from error
     except (AttributeError, KeyError, TypeError, ValueError) as error:
         raise InputError(f"is damaged ({type(error).__name__}: {error})", file=file) from error
 
 
-def _from_dict(data: Mapping[str, Any]) -> Model:
+def model_from_dict(data: Mapping[str, Any]) -> Model:
+    """Reads what `Model.to_dict` gives.
+
+    Raises:
+        InputError: parameters that do not belong to the terms, or are not finite.
+    """
     terms = tuple(build_term(term) for term in data["terms"])
     torque_model = TorqueModel(build_robot(data["robot"]), terms)
     index = {name: i for i, name in enumerate(torque_model.names)}

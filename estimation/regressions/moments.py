@@ -106,10 +106,11 @@ class Moments:
         return np.maximum(self.square - 2 * self.cross @ parameters + quadratic, 0.0)
 
     def level(self, parameters: Array) -> Array:
-        """Gives each joint's residual RMS (n,) [N m or N], floored where a fit is exact."""
+        """Gives each joint's residual RMS (n,) [N m or N], floored where a fit is exact or a joint has no torque."""
         rows = np.maximum(self.count, 1)
-        floor = 1e-6 * self.square / rows
-        return np.sqrt(np.maximum(self.residual(parameters) / rows, np.maximum(floor, np.finfo(float).tiny)))
+        torque = self.square / rows
+        floor = np.maximum(1e-6 * torque, 1e-12 * float(torque.max()) + np.finfo(float).tiny)
+        return np.sqrt(np.maximum(self.residual(parameters) / rows, floor))
 
 
 def solve_all(gram: Array, cross: Array, square: Array, ridge: float, pull: GaussianPrior | None) -> Array:

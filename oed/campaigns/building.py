@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
+import os
 from concurrent.futures import Executor
 from dataclasses import replace
-from os import PathLike
 
 import numpy as np
 from numpy.typing import NDArray
@@ -37,7 +37,7 @@ def campaign(
     robot: Robot,
     *,
     programme: Programme | None = None,
-    design: Design | str | PathLike[str] | None = None,
+    design: Design | str | os.PathLike[str] | None = None,
     velocity_fraction: float = 1.0,
     torque_margin: float = 0.1,
     collision: bool = True,
@@ -96,8 +96,11 @@ def campaign(
     excitation, home = None, limits.home
     bodies = collision_model(robot) if collision else None
     if plan.cycles:
-        if design is None:
-            design = design_experiment(
+        made: Design | str | os.PathLike[str]
+        if design is not None:
+            made = design
+        else:
+            made = design_experiment(
                 robot,
                 limits=LimitOptions(
                     velocity_fraction=velocity_fraction,
@@ -108,7 +111,7 @@ def campaign(
                 progress=progress,
             )
             notes.append("The excitation comes from a quick search. For a better one, run oed design and use --design.")
-        excitation, remarks = excitation_stage(robot, design)
+        excitation, remarks = excitation_stage(robot, made)
         notes += remarks
         home = excitation.motion.q[0]
         excitation = checked(excitation, robot, home, torque)
@@ -150,6 +153,12 @@ def campaign(
         cold_friction=cold_friction,
         torque_margin=torque_margin,
         notes=tuple(notes),
+        settings={
+            "velocity_fraction": velocity_fraction,
+            "collision": collision,
+            "seed": seed,
+            "design": os.path.abspath(design) if isinstance(design, str | os.PathLike) else None,
+        },
     )
 
 

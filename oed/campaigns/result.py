@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, field
 from functools import cached_property
 from os import PathLike
 from pathlib import Path
@@ -50,6 +50,7 @@ class Campaign:
         cold_friction: friction of the cold robot over that of the description, for the expected temperatures.
         torque_margin: share of the torque limits that friction and warm-up stages leave free.
         notes: what a user should know: what was shortened, what could not be checked.
+        settings: options of the planning that show nowhere else, as plain data.
     """
 
     robot: Robot
@@ -62,6 +63,7 @@ class Campaign:
     cold_friction: float
     torque_margin: float
     notes: tuple[str, ...] = ()
+    settings: Mapping[str, Any] = field(default_factory=dict)
 
     @property
     def stages_by_name(self) -> dict[str, Stage]:
@@ -126,20 +128,14 @@ class Campaign:
 
     def summary(self) -> str:
         """Lists the stages, the expected heating, and notes."""
-        programme = self.programme
         lines = [f"{self.robot.name}: {self.duration / 60:.1f} min, {self.cycles} cycles, {self.samples} samples"]
         for stage in self.stages:
-            tightest = stage.tightest
-            left = (
-                ""
-                if tightest is None
-                else (
-                    f", tightest limit: {tightest.quantity} of joint {tightest.joint}, "
-                    f"{100 * tightest.slack_fraction:.2f} % left"
-                )
-            )
+            left, tightest = "", stage.tightest
+            if tightest is not None:
+                share = 100 * tightest.slack_fraction
+                left = f", tightest limit: {tightest.quantity} of joint {tightest.joint}, {share:.2f} % left"
             lines.append(f"  {stage.file:18} {stage.duration:8.3f} s{left}")
-        if programme.cycles:
+        if self.programme.cycles:
             heating = next(slot.cycle for slot in self.slots if slot.phase == "heating")
             joules = ", ".join(f"{value / 1e3:.1f}" for value in self.cycle_heat[heating - 1])
             lines.append(f"  friction heat of the first heating cycle, kJ per joint: {joules}")
@@ -194,6 +190,7 @@ class Campaign:
             "home": self.home.tolist(),
             "programme": self.programme.to_dict(),
             "torque_margin": self.torque_margin,
+            "settings": dict(self.settings),
             "stages": [
                 {
                     **stage.to_dict(self.robot.limits),
@@ -271,6 +268,8 @@ class Campaign:
                 cold_friction=expected["cold_friction"],
                 torque_margin=data["torque_margin"],
                 notes=tuple(data["notes"]),
+                # Older files lack this entry.
+                settings=data.get("settings", {}),
             )
         except (OSError, UnicodeDecodeError, json.JSONDecodeError, KeyError, TypeError) as error:
             raise InputError(f"is damaged, or no campaign: {type(error).__name__} {error}", file=file) from error

@@ -17,8 +17,11 @@ from oed.cli.commands.doctor import doctor
 from oed.cli.commands.effects import effects
 from oed.cli.commands.example import example
 from oed.cli.commands.export import export
+from oed.cli.commands.fleet import fleet
 from oed.cli.commands.force import force
 from oed.cli.commands.identify import identify
+from oed.cli.commands.loop import loop
+from oed.cli.commands.monitor import monitor
 from oed.cli.commands.pareto import pareto
 from oed.cli.commands.payload import payload
 from oed.cli.commands.predict import predict
@@ -39,6 +42,7 @@ FUNCTIONS = (
     record,
     controller,
     campaign,
+    loop,
     simulate,
     check,
     identify,
@@ -46,6 +50,8 @@ FUNCTIONS = (
     diagnose,
     predict,
     compare,
+    monitor,
+    fleet,
     payload,
     force,
     example,

@@ -24,6 +24,25 @@ HandshakeOption = Annotated[
 PatienceOption = Annotated[
     float, typer.Option("--patience", help="Longest silence of the controller before giving up [s].")
 ]
+PointsOption = Annotated[str, typer.Option("--points", help="full: JOINT_TRAJ_PT_FULL, short: JOINT_TRAJ_PT.")]
+DownloadOption = Annotated[
+    bool, typer.Option("--download", help="Send all points at once, without replies; the robot starts afterwards.")
+]
+WindowOption = Annotated[
+    int, typer.Option("--window", help="Points on their way at once, if the controller's replies repeat the point.")
+]
+StartToleranceOption = Annotated[
+    float, typer.Option("--start-tolerance", help="Farthest pose from the first point [rad or m].")
+]
+NoPingOption = Annotated[bool, typer.Option("--no-ping", help="Send no pings: some controllers know none.")]
+SpeedOption = Annotated[
+    float, typer.Option("--speed", help="How many times faster than real time the controller to test against plays.")
+]
+LINK_OPTIONS = (
+    *("transport", "motion_port", "state_port", "byte_order", "real_bytes", "handshake"),
+    *("points", "download", "window", "patience", "start_tolerance", "no_ping", "speed"),
+)
+"""Parameters that concern the way to a controller."""
 
 
 def wire_format(byte_order: str, real_bytes: int) -> WireFormat:
@@ -69,3 +88,27 @@ def endpoint(
         form=wire_format(byte_order, real_bytes),
         handshake=one_byte(handshake),
     )
+
+
+def refuse_without_host(context: typer.Context, host: str) -> None:
+    """Refuses options of the way to a controller where none is played on.
+
+    Args:
+        context: of the command.
+        host: the option that names the controller.
+
+    Raises:
+        InputError: naming the options.
+    """
+    from robots.common.errors import InputError
+
+    given = [f"--{name.replace('_', '-')}" for name in LINK_OPTIONS if is_given(context, name)]
+    if given:
+        verb = "does" if len(given) == 1 else "do"
+        raise InputError(f"{', '.join(given)} {verb} not apply without {host}", remedy=f"add {host} HOST")
+
+
+def is_given(context: typer.Context, name: str) -> bool:
+    """Whether an option stands on the command line."""
+    source = context.get_parameter_source(name)
+    return source is not None and source.name == "COMMANDLINE"

@@ -4,16 +4,11 @@ from __future__ import annotations
 
 import typer
 
+from oed.cli.links import is_given
 from robots.common.errors import InputError
 
 MEANINGLESS = ("essential", "after", "task", "offset", "discriminate")
 """Options that concern parameters which a payload design counts as known."""
-
-
-def is_given(context: typer.Context, name: str) -> bool:
-    """Whether an option stands on the command line."""
-    source = context.get_parameter_source(name)
-    return source is not None and source.name == "COMMANDLINE"
 
 
 def refuse_beside_payload(context: typer.Context) -> None:

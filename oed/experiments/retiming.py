@@ -7,17 +7,18 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from oed.criteria import criterion as choose_criterion
 from oed.experiments.checks import usable_limits
 from oed.experiments.quality import design_model, measure
 from oed.experiments.results.retimed import RetimedExperiment, torque_use
 from oed.experiments.safety_checks.margins import measured_margins
+from oed.retiming import Retimed, retime_with_stops
 from oed.retiming import retime as retime_by_toppra
-from oed.retiming import retime_with_stops
 from robots.base_parameters import find_base_parameters
 from robots.common.errors import InputError
+from robots.limits import Limits
 from robots.regressor import TorqueModel
 from robots.robot import Robot
 from robots.signals import Motion
@@ -30,7 +31,7 @@ METHODS = ("toppra", "ruckig")
 
 def retime(
     robot: Robot,
-    motion: Motion,
+    motion: Motion | ArrayLike,
     *,
     method: str = "toppra",
     criterion: str = "cond",
@@ -38,11 +39,14 @@ def retime(
     velocity_scale: float = 0.02,
     tolerance: float = 0.01,
 ) -> RetimedExperiment:
-    """Runs through the path of a motion as fast as the robot's limits allow.
+    """Runs through the path of a motion, or through waypoints, as fast as the robot's limits allow.
+
+    Through waypoints ``toppra`` lays a smooth path that stops only where it turns back. It is compared with straight
+    moves that stop at each waypoint.
 
     Args:
         robot: the robot; its torque limits count where its nominal dynamics are described.
-        motion: the path, with its present timing.
+        motion: the path, with its present timing; or waypoints (W, n) [rad or m].
         method: ``toppra`` follows the path; ``ruckig`` moves straight from vertex to vertex and stops at each.
         criterion: what to compare, see `oed.design`.
         friction: the model whose parameters are meant.
@@ -53,36 +57,63 @@ def retime(
         The new motion and the criterion before and after.
 
     Raises:
-        InputError: an unknown method or criterion, a motion of another number of joints.
+        InputError: an unknown method or criterion, a motion of another number of joints, or waypoints that are not
+            two or more finite points.
         InfeasibleError: a path that no timing makes possible.
     """
     if method not in METHODS:
         raise InputError(f"retiming method {method!r}", allowed=", ".join(METHODS))
-    if motion.n != robot.n:
-        raise InputError(f"a motion of {motion.n} joints", allowed=f"{robot.n}, as {robot.name} has")
+    stops = None if isinstance(motion, Motion) else _with_stops(robot, motion)
+    given = motion if isinstance(motion, Motion) else stops.motion  # type: ignore[union-attr]
+    if given.n != robot.n:
+        raise InputError(f"a motion of {given.n} joints", allowed=f"{robot.n}, as {robot.name} has")
     chosen = choose_criterion(criterion)
     settings: dict[str, Any] = {"friction": friction, "velocity_scale": velocity_scale, "rotor": True, "offset": False}
     model = design_model(robot, settings)
     base = find_base_parameters(model)
-    # The path may go to the ends of the ranges; speed and its derivatives keep the reserve of a design.
-    limits = replace(usable_limits(robot.limits), lower=robot.limits.lower, upper=robot.limits.upper)
+    limits = _limits(robot)
     if method == "toppra":
         rigid, losses = _dynamics(model)
         retimed = retime_by_toppra(motion, limits, period=robot.period, inverse_dynamics=rigid, friction=losses)
     else:
         retimed = retime_with_stops(motion, limits, period=robot.period, tolerance=tolerance)
+    if stops is not None:
+        retimed = replace(retimed, duration_before=stops.duration_after, usage_before=stops.usage)
     return RetimedExperiment(
         robot=robot,
         base=base,
         criterion=chosen.name,
-        before=measure("before", base, motion),
+        before=measure("before", base, given),
         after=measure("after", base, retimed.motion),
         retimed=retimed,
-        torque_before=torque_use(base, motion),
+        torque_before=torque_use(base, given),
         torque_after=torque_use(base, retimed.motion),
         margins=measured_margins(robot, retimed.motion, base),
         settings=settings,
     )
+
+
+def move_with_stops(robot: Robot, waypoints: ArrayLike) -> Motion:
+    """Moves straight from waypoint to waypoint and stops at each: what `retime` compares waypoints with.
+
+    Args:
+        robot: the robot.
+        waypoints: (W, n) [rad or m].
+
+    Raises:
+        InputError: waypoints that are not two or more finite points of the robot's joints.
+        InfeasibleError: a waypoint outside the position limits, a zero limit, or waypoints that are all the same.
+    """
+    return _with_stops(robot, waypoints).motion
+
+
+def _with_stops(robot: Robot, waypoints: ArrayLike) -> Retimed:
+    return retime_with_stops(waypoints, _limits(robot), period=robot.period)
+
+
+def _limits(robot: Robot) -> Limits:
+    """The path may go to the ends of the ranges; speed and its derivatives keep the reserve of a design."""
+    return replace(usable_limits(robot.limits), lower=robot.limits.lower, upper=robot.limits.upper)
 
 
 def _dynamics(

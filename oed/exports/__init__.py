@@ -3,9 +3,18 @@
 from oed.exports.forms import FORMS as CONTROLLER_FORMS
 from oed.exports.forms import ExportOptions
 from oed.exports.trajectory_csv import read_trajectory, write_trajectory
+from oed.exports.waypoints import read_waypoints
 from oed.exports.writing import export_trajectory
 
 FORMS = ("csv", *CONTROLLER_FORMS)
 """The forms in which a trajectory goes to a controller."""
 
-__all__ = ["CONTROLLER_FORMS", "FORMS", "ExportOptions", "export_trajectory", "read_trajectory", "write_trajectory"]
+__all__ = [
+    "CONTROLLER_FORMS",
+    "FORMS",
+    "ExportOptions",
+    "export_trajectory",
+    "read_trajectory",
+    "read_waypoints",
+    "write_trajectory",
+]

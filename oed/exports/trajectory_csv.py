@@ -20,7 +20,7 @@ Array = NDArray[np.float64]
 QUANTITIES = ("q", "dq", "ddq")
 RATES = {"q": "", "dq": "/s", "ddq": "/s2"}
 LENGTHS = {"rad": 1.0, "deg": float(np.pi / 180.0), "m": 1.0, "mm": 1e-3}
-_JOINT_COLUMN = re.compile(r"(q|dq|ddq)([1-9]\d*)")
+JOINT_COLUMN = re.compile(r"(q|dq|ddq)([1-9]\d*)")
 
 
 def write_trajectory(
@@ -92,11 +92,11 @@ def read_trajectory(path: str | PathLike[str], *, n: int | None = None) -> tuple
         InputError: a missing column, an unknown unit, an empty cell or NaN, time that runs backward or unevenly, or
             velocities and accelerations that are not the derivatives of the positions; with column and line.
     """
-    table = read_table(path, wanted=lambda name: name == "t" or _JOINT_COLUMN.fullmatch(name) is not None)
+    table = read_table(path, wanted=lambda name: name == "t" or JOINT_COLUMN.fullmatch(name) is not None)
     count = _count_joints(table, n)
-    t = _column(table, "t")
+    t = read_column(table, "t")
     q, dq, ddq = (
-        np.column_stack([_lengths(table, quantity, joint + 1) for joint in range(count)]) for quantity in QUANTITIES
+        np.column_stack([read_lengths(table, quantity, joint + 1) for joint in range(count)]) for quantity in QUANTITIES
     )
     _check_time(t, table)
     motion = Motion(t, q, dq, ddq)
@@ -111,7 +111,7 @@ def _kinds(table: Table, count: int) -> dict[str, list[str]]:
 
 
 def _count_joints(table: Table, n: int | None) -> int:
-    found = [int(match[2]) for match in map(_JOINT_COLUMN.fullmatch, table.names) if match is not None]
+    found = [int(match[2]) for match in map(JOINT_COLUMN.fullmatch, table.names) if match is not None]
     count = n or max(found, default=0)
     if count == 0:
         raise InputError("no joint columns", file=table.path, allowed="t,q1..qn,dq1..dqn,ddq1..ddqn")
@@ -133,7 +133,12 @@ def _count_joints(table: Table, n: int | None) -> int:
     return count
 
 
-def _column(table: Table, name: str) -> Array:
+def read_column(table: Table, name: str) -> Array:
+    """Reads numbers from a column.
+
+    Raises:
+        InputError: text or a number that is not finite, with its line.
+    """
     values = table.columns[name]
     if table.is_text(name):
         raise InputError(f"found {values[0]!r}", file=table.path, column=name, row=table.line(0), allowed="numbers")
@@ -149,10 +154,14 @@ def _column(table: Table, name: str) -> Array:
     return values
 
 
-def _lengths(table: Table, quantity: str, joint: int) -> Array:
-    """Positions [rad or m], velocities or accelerations of a joint, counted from 1."""
+def read_lengths(table: Table, quantity: str, joint: int) -> Array:
+    """Reads positions [rad or m], velocities or accelerations of a joint, counted from 1.
+
+    Raises:
+        InputError: text, a number that is not finite, or an unknown unit.
+    """
     name = f"{quantity}{joint}"
-    values, unit = _column(table, name), table.units.get(name)
+    values, unit = read_column(table, name), table.units.get(name)
     if unit is None:
         return values
     length, rate = re.sub(r"[\s*^]", "", unit), RATES[quantity]

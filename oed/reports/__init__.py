@@ -9,6 +9,7 @@ from oed.reports.pages.diagnosis_limits import limits_page, save_limits_report
 from oed.reports.pages.diagnosis_report import diagnosis_page, save_diagnosis_report
 from oed.reports.pages.estimate_report import estimate_page, save_estimate_report
 from oed.reports.pages.forces.force_report import force_page, save_force_report
+from oed.reports.pages.loops.loop_report import loop_page, save_loop_report
 from oed.reports.pages.pareto_report import pareto_page, save_pareto_report
 from oed.reports.pages.payload_report import payload_page, save_payload_report
 from oed.reports.pages.prediction_report import prediction_page
@@ -43,6 +44,7 @@ __all__ = [
     "force_page",
     "friction_picture",
     "limits_page",
+    "loop_page",
     "margins_picture",
     "parameter_picture",
     "pareto_page",
@@ -59,6 +61,7 @@ __all__ = [
     "save_estimate_report",
     "save_force_report",
     "save_limits_report",
+    "save_loop_report",
     "save_pareto_report",
     "save_payload_report",
     "save_png",

@@ -38,9 +38,10 @@ def retime_with_stops(path: Motion | ArrayLike, limits: Limits, *, period: float
         InfeasibleError: a vertex outside the position limits, a zero limit, or a path that does not move.
     """
     points = path.q if isinstance(path, Motion) else np.array(path, dtype=np.float64)
-    if points.ndim != 2 or points.shape[0] < 2 or points.shape[1] != limits.lower.size:
+    right = points.ndim == 2 and points.shape[0] >= 2 and points.shape[1] == limits.lower.size
+    if not (right and np.isfinite(points).all()):
         raise InputError(
-            f"found a path of shape {points.shape}", allowed=f"two or more points of {limits.lower.size} joints"
+            f"found a path of shape {points.shape}", allowed=f"two or more finite points of {limits.lower.size} joints"
         )
     if tolerance <= 0.0:
         raise InputError(f"found the tolerance {tolerance} rad or m", allowed="a positive number")

@@ -122,7 +122,7 @@ def truth_of(case: Case) -> Truth:
     return Truth(effects=case.effects, before=float((told.before / size).sum()), after=float((told.after / size).sum()))
 
 
-@pytest.mark.slow
+@pytest.mark.longer
 def test_two_effects_are_both_found_by_the_command(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """``oed diagnose``, given files of t, q and tau, names both of two effects and nothing else."""
     case = PAIR.draw()
@@ -183,7 +183,7 @@ def test_what_swings_at_the_flange_is_told_with_its_frequency() -> None:
     assert "swings at" in finding["sentence"]
 
 
-@pytest.mark.slow
+@pytest.mark.longer
 def test_swapped_labels_break_the_score() -> None:
     """A step of friction, Stribeck friction and nothing are told; were labels swapped, each would be judged wrong."""
     cases = [(*examined(hide), hide.ratio) for hide in LABELLED]

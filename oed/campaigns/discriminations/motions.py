@@ -143,6 +143,10 @@ class ExperimentBuilder:
             groups[-1].append(part)
         return tuple(self._run(group, kind) for group in groups)
 
+    def run_alone(self, part: Part, kind: str) -> Run:
+        """Makes a run of one stage, without the reference; it raises as `runs` does."""
+        return self._run([part], kind)
+
     def _run(self, parts: Items[Part], kind: str) -> Run:
         segments: list[Segment] = []
         names: list[str] = []

@@ -2,12 +2,33 @@
 
 from __future__ import annotations
 
+import os
+import sys
+from collections.abc import Mapping
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from oed.cli.console import Console
+from oed.cli.links import (
+    ByteOrderOption,
+    DownloadOption,
+    HandshakeOption,
+    MotionPortOption,
+    NoPingOption,
+    PatienceOption,
+    PointsOption,
+    RealBytesOption,
+    SpeedOption,
+    StartToleranceOption,
+    StatePortOption,
+    TransportOption,
+    WindowOption,
+    endpoint,
+    is_given,
+    refuse_without_host,
+)
 from oed.cli.options import (
     ForceOption,
     JointsOption,
@@ -26,8 +47,12 @@ from oed.cli.options import (
     robot_from,
 )
 
+if TYPE_CHECKING:
+    from oed.campaigns import Campaign
+
 
 def campaign(
+    context: typer.Context,
     robot: RobotOption,
     cycles: Annotated[
         int, typer.Option(help="Heating cycles per run; each one is excitation, friction and warm-up.")
@@ -65,6 +90,30 @@ def campaign(
     ] = 1.0,
     seed: SeedOption = 0,
     workers: WorkersOption = None,
+    run: Annotated[
+        str | None,
+        typer.Option(
+            "--run",
+            help=(
+                "Play the campaign on the controller at this host, and record each stage. The campaign is planned if "
+                "--out holds none yet. After an interruption the same command goes on."
+            ),
+            show_default=False,
+        ),
+    ] = None,
+    transport: TransportOption = "udp",
+    motion_port: MotionPortOption = 11000,
+    state_port: StatePortOption = 11002,
+    byte_order: ByteOrderOption = "little",
+    real_bytes: RealBytesOption = 4,
+    handshake: HandshakeOption = "0x8E",
+    points: PointsOption = "full",
+    download: DownloadOption = False,
+    window: WindowOption = 1,
+    patience: PatienceOption = 2.0,
+    start_tolerance: StartToleranceOption = 0.01,
+    no_ping: NoPingOption = False,
+    speed: SpeedOption = 1.0,
     out: OutOption = Path("campaign"),
     tip: TipOption = None,
     joints: JointsOption = None,
@@ -75,17 +124,21 @@ def campaign(
     json: JsonOption = False,
     quiet: QuietOption = False,
 ) -> None:
-    """Plans a measurement campaign that warms the robot up.
+    """Plans a measurement campaign that warms the robot up, and plays it with --run.
 
-    Writes campaign.json, one CSV file for each stage, and report.html.
+    Writes campaign.json, one CSV file for each stage, and report.html; with --run also run.json and a log for each
+    stage in the folder logs.
     """
     console = Console(json=json, quiet=quiet)
     with console.working() as progress:
-        from oed.campaigns import Programme
-        from oed.campaigns import campaign as run
+        from oed.campaigns import Campaign, Programme
+        from oed.campaigns import campaign as plan
         from oed.reports import save_campaign_report
+        from robots.common.errors import InputError
         from robots.common.files import ResultFolder
 
+        if run is None:
+            refuse_without_host(context, "--run")
         programme = Programme(
             cycles=cycles,
             cycle_time=cycle_time,
@@ -95,27 +148,111 @@ def campaign(
             cooling=cooling,
             power_on=power_on,
         )
-        names = ["campaign.json", "report.html", *(f"{name}.csv" for name in programme.stage_names)]
-        with ResultFolder(out, force, names=names) as folder:
-            result = run(
-                robot_from(robot, tip, joints, lock, unlimited=unlimited),
-                programme=programme,
-                design=design,
-                velocity_fraction=velocity_fraction,
-                torque_margin=torque_margin,
-                collision=collision,
-                ambient=ambient,
-                cold_friction=cold_friction,
-                seed=seed,
-                workers=workers,
-                progress=progress,
+        described = robot_from(robot, tip, joints, lock, unlimited=unlimited)
+        place = None
+        if run is not None:
+            place = endpoint(run, transport, motion_port, state_port, byte_order, real_bytes, handshake)
+        if place is not None and (out / "campaign.json").exists():
+            if force:
+                raise InputError(
+                    "--force with --run would plan the campaign again",
+                    file=out,
+                    remedy="leave out --force to go on, or choose another folder",
+                )
+            result = Campaign.load(out, described)
+            _refuse_other_settings(
+                context,
+                out,
+                result,
+                {
+                    **programme.to_dict(),
+                    "duty": list(programme.duties),
+                    "ambient": ambient,
+                    "cold_friction": cold_friction,
+                    "torque_margin": torque_margin,
+                    "velocity_fraction": velocity_fraction,
+                    "collision": collision,
+                    "seed": seed,
+                    "design": None if design is None else os.path.abspath(design),
+                },
             )
-            result.save(folder.path("campaign.json").parent)
-            save_campaign_report(result, folder, png=png)
-    data = result.to_dict()
-    for stage in data["stages"]:
-        del stage["segments"], stage["plateaus"]
-    console.result(f"{result.summary()}\nwritten to {out.resolve()}", data)
+        else:
+            names = ["campaign.json", "report.html", *(f"{name}.csv" for name in programme.stage_names)]
+            with ResultFolder(out, force, names=names) as folder:
+                result = plan(
+                    described,
+                    programme=programme,
+                    design=design,
+                    velocity_fraction=velocity_fraction,
+                    torque_margin=torque_margin,
+                    collision=collision,
+                    ambient=ambient,
+                    cold_friction=cold_friction,
+                    seed=seed,
+                    workers=workers,
+                    progress=progress,
+                )
+                result.save(folder.path("campaign.json").parent)
+                save_campaign_report(result, folder, png=png)
+        data = result.to_dict()
+        for stage in data["stages"]:
+            del stage["segments"], stage["plateaus"]
+        summary = f"{result.summary()}\nwritten to {out.resolve()}"
+        if place is not None:
+            from oed.campaigns.runs import run_campaign
+            from oed.controllers import StreamOptions
+            from oed.controllers.interrupts import terminate_as_interrupt
+
+            options = StreamOptions(
+                points=points,  # type: ignore[arg-type]
+                download=download,
+                window=window,
+                patience=patience,
+                start_tolerance=start_tolerance,
+                ping=not no_ping,
+            )
+            try:
+                with terminate_as_interrupt():
+                    played = run_campaign(
+                        out,
+                        place,
+                        robot=described,
+                        options=options,
+                        speed=speed,
+                        collision=collision,
+                        progress=progress,
+                    )
+            except KeyboardInterrupt:
+                print("oed: interrupted; the robot was ordered to stop; the same command goes on", file=sys.stderr)
+                raise SystemExit(130) from None
+            summary, data = played.summary(), played.to_dict()
+    console.result(summary, data)
+
+
+def _refuse_other_settings(context: typer.Context, out: Path, planned: Campaign, given: Mapping[str, Any]) -> None:
+    """Refuses options on the command line with which the campaign in the folder was not planned.
+
+    Raises:
+        InputError: naming the first one.
+    """
+    from robots.common.errors import InputError
+
+    programme = planned.programme.to_dict()
+    stored = {
+        **programme,
+        "duty": programme["duties"],
+        "ambient": planned.ambient,
+        "cold_friction": planned.cold_friction,
+        "torque_margin": planned.torque_margin,
+        **planned.settings,
+    }
+    for name, value in given.items():
+        if is_given(context, name) and stored.get(name) != value:
+            raise InputError(
+                f"the campaign was planned with another --{name.replace('_', '-')}: {stored.get(name, 'not known')}",
+                file=out / "campaign.json",
+                remedy="leave the option out to go on, or choose another folder",
+            )
 
 
 def _duties(text: str) -> tuple[float, ...]:

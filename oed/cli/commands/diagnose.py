@@ -26,6 +26,7 @@ from oed.cli.options import (
     robot_from,
 )
 from oed.cli.set_up import GravityOption, PayloadOption, TorqueIsOption, with_known_setup, with_torque_meaning
+from oed.cli.unfit_models import NEAREST, unfit_of
 from robots.common.progress import Progress
 
 if TYPE_CHECKING:
@@ -277,8 +278,13 @@ def _diagnosis(
                     stated = {"robot": robot.name, "experiment": following.kind}
                     write_trajectory(path, motion, stated, kinds=robot.chain.kinds)
             save_diagnosis_report(result, folder, png=png)
+            lines, data = [result.summary()], result.to_dict()
+            unfit = unfit_of(result.model, both)
+            if unfit is not None:
+                unfit.nearest.save(folder.path(NEAREST))
+                lines.append(f"  {unfit.summary()} It is written to {NEAREST}.")
+                data["unfit_for_simulation"] = unfit.to_dict()
         # The diagnosis is kept, even if no file can state its model.
-        lines, data = [result.summary()], result.to_dict()
         if urdf is not None:
             streams[urdf].write(urdf_text(result.model, robot).encode())
         if mjcf is not None:

@@ -27,7 +27,10 @@ def export(
         str,
         typer.Option(
             "--to",
-            help="Format: csv, ros, ros-goal, moveit-limits, simple-message, urscript, kuka, abb or franka.",
+            help=(
+                "Format: csv, ros, ros-goal, rosbag, mcap, moveit-limits, simple-message, urscript, kuka, abb or "
+                "franka."
+            ),
         ),
     ] = "csv",
     out: Annotated[

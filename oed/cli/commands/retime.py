@@ -21,7 +21,9 @@ from oed.cli.options import (
 
 
 def retime(
-    trajectory: Annotated[Path, typer.Argument(help="A trajectory.csv.", show_default=False)],
+    trajectory: Annotated[
+        Path, typer.Argument(help="A trajectory.csv, or a CSV of waypoints: q1..qn without t.", show_default=False)
+    ],
     method: Annotated[
         str,
         typer.Option(
@@ -52,27 +54,34 @@ def retime(
     json: JsonOption = False,
     quiet: QuietOption = False,
 ) -> None:
-    """Retimes a trajectory within the robot's limits.
+    """Retimes a trajectory, or times a list of waypoints, within the robot's limits.
 
     Writes trajectory.csv, design.json and report.html.
     """
     console = Console(json=json, quiet=quiet)
     with console.working() as progress:
         from oed.experiments import retime as run
-        from oed.exports import read_trajectory
+        from oed.experiments.retiming import move_with_stops
+        from oed.exports import read_trajectory, read_waypoints
         from oed.reports import save_retime_report
         from robots.common.errors import InputError
         from robots.common.files import ResultFolder
 
         with ResultFolder(out, force, names=["trajectory.csv", "design.json", "report.html"]) as folder:
-            motion, metadata = read_trajectory(trajectory)
-            named = robot or metadata.get("robot")
-            if not named:
+            described = robot_from(robot) if robot else None
+            points = read_waypoints(trajectory, None if described is None else described.n)
+            if points is None:
+                motion, metadata = read_trajectory(trajectory)
+                if described is None and metadata.get("robot"):
+                    described = robot_from(str(metadata["robot"]))
+            if described is None:
                 raise InputError("the file does not name its robot", file=trajectory, remedy="give --robot")
+            if points is not None:
+                motion = move_with_stops(described, points)
             progress.start(f"retiming by {method}", None)
             result = run(
-                robot_from(str(named)),
-                motion,
+                described,
+                motion if points is None else points,
                 method=method,
                 criterion=criterion,
                 friction=friction,

@@ -11,13 +11,18 @@ import typer
 from oed.cli.console import Console
 from oed.cli.links import (
     ByteOrderOption,
+    DownloadOption,
     HandshakeOption,
     HostOption,
     MotionPortOption,
+    NoPingOption,
     PatienceOption,
+    PointsOption,
     RealBytesOption,
+    StartToleranceOption,
     StatePortOption,
     TransportOption,
+    WindowOption,
     endpoint,
 )
 from oed.cli.options import (
@@ -48,22 +53,16 @@ def stream(
     byte_order: ByteOrderOption = "little",
     real_bytes: RealBytesOption = 4,
     handshake: HandshakeOption = "0x8E",
-    points: Annotated[str, typer.Option("--points", help="full: JOINT_TRAJ_PT_FULL, short: JOINT_TRAJ_PT.")] = "full",
-    download: Annotated[
-        bool, typer.Option("--download", help="Send all points at once, without replies; the robot starts afterwards.")
-    ] = False,
-    window: Annotated[
-        int, typer.Option("--window", help="Points on their way at once, if the controller's replies repeat the point.")
-    ] = 1,
+    points: PointsOption = "full",
+    download: DownloadOption = False,
+    window: WindowOption = 1,
     reply_time: Annotated[
         float, typer.Option("--reply-time", help="UDP: send a point again after so long without a reply [s].")
     ] = 0.1,
     patience: PatienceOption = 2.0,
-    start_tolerance: Annotated[
-        float, typer.Option("--start-tolerance", help="Farthest pose from the first point [rad or m].")
-    ] = 0.01,
+    start_tolerance: StartToleranceOption = 0.01,
     robot_id: Annotated[int, typer.Option("--robot-id", help="Number of the robot at its controller.")] = 0,
-    no_ping: Annotated[bool, typer.Option("--no-ping", help="Send no pings: some controllers know none.")] = False,
+    no_ping: NoPingOption = False,
     ignore_status: Annotated[
         bool, typer.Option("--ignore-status", help="Start in spite of a reported error, e-stop or manual mode.")
     ] = False,

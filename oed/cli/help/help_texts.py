@@ -5,9 +5,9 @@ from __future__ import annotations
 COMMANDS = {
     "First steps": ("example", "robots", "robot", "effects", "doctor"),
     "Experiments": ("design", "pareto", "retime", "campaign", "export"),
-    "Robot and virtual robot": ("stream", "record", "controller", "simulate"),
+    "Robot and virtual robot": ("stream", "record", "loop", "controller", "simulate"),
     "Models": ("check", "identify", "thermal", "predict", "payload"),
-    "Diagnosis": ("diagnose", "compare", "monitor", "force"),
+    "Diagnosis": ("diagnose", "compare", "monitor", "fleet", "force"),
 }
 """Commands by purpose; those that are not listed come last."""
 
@@ -19,6 +19,8 @@ OPTIONS = {
         *(
             "trajectory",
             "log",
+            "log_dir",
+            "state",
             "without",
             "held_out",
             "healthy",
@@ -62,7 +64,14 @@ EXAMPLES = {
         "oed controller --robot er3a --plant plant.yaml",
         "oed controller --robot er3a --replies echo --lose 0.05 --double 0.05 --late 0.05",
     ),
-    "campaign": ("oed campaign --robot er3a --design experiment --out campaign",),
+    "campaign": (
+        "oed campaign --robot er3a --design experiment --out campaign",
+        "oed campaign --robot er3a --out campaign --run 192.168.0.10",
+    ),
+    "loop": (
+        "oed loop --robot er3a --host 192.168.0.10 --out loop",
+        "oed loop --robot er3a --host 127.0.0.1 --design experiment --experiments 3 --out loop",
+    ),
     "simulate": (
         "oed simulate --trajectory experiment/trajectory.csv --out log.csv",
         "oed simulate --trajectory experiment/trajectory.csv --plant plant.yaml --seed 1 --out log.csv",
@@ -82,6 +91,11 @@ EXAMPLES = {
         "oed compare monday/model.json friday/model.json --out compared",
         "oed compare logs/day1.csv logs/day2.csv logs/day3.csv --robot er3a --out compared",
     ),
+    "monitor": (
+        "oed monitor --model thermal --log day1.csv day2.csv day3.csv --out monitored",
+        "oed monitor --model model --log-dir logs --state robot7.state --out monitored --force",
+    ),
+    "fleet": ("oed fleet logs_of_all_robots --model model --workers 4 --out fleet",),
     "payload": (
         "oed payload --robot ur10 --log with.csv --without without.csv --to urscript --out payload",
         "oed payload --model model --log with.csv --to franka kuka --out payload",

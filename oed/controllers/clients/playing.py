@@ -18,6 +18,7 @@ from oed.controllers.clients.result import StreamResult
 from oed.controllers.errors import ControllerError
 from oed.controllers.interrupts import signals_held
 from oed.controllers.links import Endpoint, open_link
+from oed.controllers.recording.clock import ClockAnchor
 from oed.controllers.recording.log_file import check_log_path
 from oed.controllers.recording.recorder import Recorder
 from oed.exports.simple_message import trajectory_points
@@ -39,6 +40,9 @@ def stream(
     log: str | PathLike[str] | None = None,
     options: StreamOptions | None = None,
     metadata: Mapping[str, Any] | None = None,
+    header: Mapping[str, Any] | None = None,
+    anchor: ClockAnchor | None = None,
+    needs_torque: bool = False,
     file: str | PathLike[str] | None = None,
     dry_run: bool = False,
     force: bool = False,
@@ -56,6 +60,9 @@ def stream(
         log: CSV file for the feedback; needed but for a dry run.
         options: how it is sent.
         metadata: what the trajectory's file says of itself.
+        header: further entries of the log's header.
+        anchor: the end of the log whose clock this one continues.
+        needs_torque: refuse a controller whose feedback carries neither torque nor current.
         file: the trajectory's file, for messages.
         dry_run: check everything, send no point and write nothing.
         force: whether an existing log may be replaced.
@@ -76,22 +83,33 @@ def stream(
         if log is None:
             raise InputError("no log file for the feedback", remedy="give one")
         check_log_path(log, force)
-    recorder = Recorder(open_link(endpoint, endpoint.state_port), robot, endpoint.form, options.patience)
-    known = {"robot": robot.name, "source": f"feedback of {endpoint.place(endpoint.state_port)}", "tool": VERSION}
+    recorder = Recorder(
+        open_link(endpoint, endpoint.state_port), robot, endpoint.form, options.patience, endpoint.connect_time
+    )
+    source = f"feedback of {endpoint.place(endpoint.state_port)}"
+    known = {"robot": robot.name, "source": source, "tool": VERSION, **(header or {})}
     requests: Requests | None = None
     rows, note, begin, ended = 0, "", time.monotonic(), "interrupted"
     try:
         pose = recorder.wait_for_feedback()
-        if not options.ignore_status:
-            check_status(recorder.status, endpoint.place(endpoint.state_port))
         check_start(motion.q[0], pose[: robot.n], options.start_tolerance, pose[robot.n :])
         with open_link(endpoint, endpoint.motion_port) as link:
+            if needs_torque and not recorder.has_torque:
+                raise ControllerError(
+                    f"the feedback of {endpoint.place(endpoint.state_port)} carries neither torque nor current",
+                    remedy="a controller program must send them (message type 9015)",
+                )
             requests = Requests(link, endpoint.form, options)
-            for _ in range(PINGS if options.ping else 0):
-                requests.ping()
+            for number in range(PINGS if options.ping else 0):
+                requests.ping(None if number else max(options.patience, endpoint.connect_time))
+            if not options.ignore_status and status_problem(recorder.status) is not None:
+                # The error of an interrupted motion ends with the link of the next client.
+                check_status(recorder.renewed_status(), endpoint.place(endpoint.state_port))
+            if not options.ignore_status and recorder.status is not None and recorder.status.in_motion == 1:
+                raise ControllerError("the robot is moving", remedy="wait for the end of its motion")
             if not dry_run:
                 assert log is not None
-                recorder.begin(log, known, force=force)
+                recorder.begin(log, known, anchor=anchor, delay=requests.traffic.delay, force=force)
                 begin = time.monotonic()
                 try:
                     _play(motion, robot, requests, recorder, options, progress)
@@ -140,6 +158,7 @@ def stream(
         status={} if recorder.status is None else asdict(recorder.status),
         dry_run=dry_run,
         note=note,
+        anchor=None if dry_run else recorder.anchor(),
     )
 
 

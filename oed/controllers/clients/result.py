@@ -5,6 +5,8 @@ from __future__ import annotations
 from dataclasses import asdict, dataclass
 from typing import Any
 
+from oed.controllers.recording.clock import ClockAnchor
+
 
 @dataclass(frozen=True, kw_only=True)
 class StreamResult:
@@ -26,6 +28,7 @@ class StreamResult:
         status: what the controller reports; empty where it reports nothing.
         dry_run: whether nothing was sent.
         note: what went wrong without harm.
+        anchor: end of the log, for one that continues its clock.
     """
 
     robot: str
@@ -43,6 +46,7 @@ class StreamResult:
     status: dict[str, int]
     dry_run: bool
     note: str = ""
+    anchor: ClockAnchor | None = None
 
     def to_dict(self) -> dict[str, Any]:
         """Gives all fields as plain data."""

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from oed.controllers.errors import ControllerError, LinkError
 from oed.controllers.links import Link
+from oed.controllers.recording.clock import ClockAnchor
 from oed.controllers.recording.feedback import RANKS, Layout, is_valid, layout_of, stamp_of
 from oed.controllers.recording.log_file import FeedbackLog
 from oed.controllers.recording.statistics import Statistics
@@ -28,6 +29,9 @@ LOOK = 0.3
 BACKWARD = 1.0
 """A controller whose time goes back by more than this has restarted [s]."""
 
+RENEWED = 0.3
+"""How long a state is waited for that was reported after a given moment [s]: states come ten a second."""
+
 REST = 1e-5
 """Positions that change by less are at rest [rad or m]."""
 
@@ -40,19 +44,23 @@ class Recorder:
         robot: whose joints report.
         form: of the messages.
         patience: longest silence [s].
+        connect_time: how long the first feedback is waited for [s].
     """
 
-    def __init__(self, link: Link, robot: Robot, form: WireFormat, patience: float) -> None:
-        self._link, self._robot, self._form, self._patience = link, robot, form, patience
+    def __init__(self, link: Link, robot: Robot, form: WireFormat, patience: float, connect_time: float) -> None:
+        self._link, self._robot, self._form = link, robot, form
+        self._patience, self._connect_time = patience, connect_time
         self._lock = threading.Lock()
         self._end = threading.Event()
         self._heard = threading.Event()
         self._layout: Layout | None = None
         self._log: FeedbackLog | None = None
         self._last_stamp: float | None = None
+        self._offset = 0.0
         self._problem: str | None = None
         self.statistics = Statistics()
         self.status: Status | None = None
+        self._status_count = 0
         self.positions: Array | None = None
         """All ten reals of the last feedback."""
         self.stamp: float | None = None
@@ -67,15 +75,15 @@ class Recorder:
         """Waits for the first feedback and returns its ten positions.
 
         Raises:
-            LinkError: none within the patience.
+            LinkError: none within the time to connect.
         """
         begin = time.monotonic()
-        while time.monotonic() - begin < self._patience and self.error is None and not self._heard.is_set():
+        while time.monotonic() - begin < self._connect_time and self.error is None and not self._heard.is_set():
             self._heard.wait(0.05)
         self.check()
         if self.positions is None:
             raise LinkError(
-                f"no feedback from {self._link.place} within {self._patience:g} s"
+                f"no feedback from {self._link.place} within {self._connect_time:g} s"
                 + (f"; what came is no message: {self._problem}" if self._problem else ""),
                 remedy="check the state port and the message format",
             )
@@ -98,12 +106,35 @@ class Recorder:
                 f"{self._link.place} is silent for {silence:.1f} s", remedy="check the controller and the network"
             )
 
-    def begin(self, path: str | PathLike[str], metadata: Mapping[str, Any], *, force: bool = False) -> None:
+    @property
+    def has_torque(self) -> bool:
+        """Whether the feedback carries torque or current."""
+        return self._layout is not None and bool(self._layout.effort)
+
+    def renewed_status(self) -> Status | None:
+        """Waits for a state that is reported from now on; gives the last one where none comes in time."""
+        count, end = self._status_count, time.monotonic() + RENEWED
+        # The next one may have been on its way already.
+        while self._status_count < count + 2 and time.monotonic() < end and self.error is None:
+            time.sleep(0.01)
+        return self.status
+
+    def begin(
+        self,
+        path: str | PathLike[str],
+        metadata: Mapping[str, Any],
+        *,
+        anchor: ClockAnchor | None = None,
+        delay: float | None = None,
+        force: bool = False,
+    ) -> None:
         """Begins to write a log.
 
         Args:
             path: the file.
             metadata: what is known at the beginning.
+            anchor: the end of the log whose clock this one continues.
+            delay: of a message [s]. Where feedback carries no time, a row's time is that of its arrival less this.
             force: whether an existing file may be replaced.
 
         Raises:
@@ -112,13 +143,26 @@ class Recorder:
         assert self._layout is not None
         units = ["m" if joint.kind == "prismatic" else "rad" for joint in self._robot.chain.joints]
         layout = self._layout
+        assert self.stamp is not None
+        late = 0.0 if layout.stamped else delay or 0.0
+        offset = -late if anchor is None else anchor.offset_of(self.stamp, time.time())
         known = {**metadata, "clock": "controller" if layout.stamped else "arrival", "complete": False}
+        if late:
+            known["delay_removed"] = late
+        if offset != -late:
+            known["clock_offset"] = offset + late
         log = FeedbackLog(path, layout.columns, layout.units(units), known, digits=layout.digits, force=force)
         with self._lock:
             self.statistics = Statistics()
             self.statistics.stamped = layout.stamped
             self._last_stamp = None
+            self._offset = offset
             self._log = log
+
+    def anchor(self) -> ClockAnchor | None:
+        """Gives the end of the log, for one that continues its clock; None without rows."""
+        end = self.statistics.end
+        return None if end is None else ClockAnchor(t=end, unix=time.time(), offset=self._offset)
 
     def finish(self, metadata: Mapping[str, Any]) -> int:
         """Ends the log and the thread, and closes the link.
@@ -174,6 +218,7 @@ class Recorder:
         self.last_heard = now
         if isinstance(message, Status):
             self.status = message
+            self._status_count += 1
             return
         if type(message) not in RANKS:
             return
@@ -197,7 +242,7 @@ class Recorder:
         self._heard.set()
         with self._lock:
             if self._log is not None:
-                t = now if stamp is None else stamp
+                t = (now if stamp is None else stamp) + self._offset
                 self.statistics.add(t, now)
                 self._log.append(t, self._layout.row(message))  # type: ignore[arg-type]
 

@@ -87,7 +87,7 @@ def record(
         raise InputError(f"a duration of {duration} s", allowed="above 0")
     check_log_path(log, force)
     place = endpoint.place(endpoint.state_port)
-    recorder = Recorder(open_link(endpoint, endpoint.state_port), robot, endpoint.form, patience)
+    recorder = Recorder(open_link(endpoint, endpoint.state_port), robot, endpoint.form, patience, endpoint.connect_time)
     rows, note, begin, ended, interrupted = 0, "", time.monotonic(), "interrupted", False
     try:
         recorder.wait_for_feedback()

@@ -59,6 +59,11 @@ class Statistics:
             self.lost += max(0, round(step / self._period) - 1)
 
     @property
+    def end(self) -> float | None:
+        """Time stamp of the last row [s]; None without rows."""
+        return None if self._last is None else self._last[0]
+
+    @property
     def period(self) -> float | None:
         """The usual time between two rows [s]."""
         if self._period is None and self._steps:

@@ -73,7 +73,6 @@ class Player:
         self._refilling = False
         self._numbers: list[int] = []
         self._ahead: list[Sample] = []
-        self._standing: Sample | None = None
         self.accepted = self.played_trajectories = 0
 
     @property
@@ -160,7 +159,7 @@ class Player:
         self._refilling = False
         sample = self._next()
         if sample is not None:
-            self.pose, self._standing = sample.q, None
+            self.pose = sample.q
             return sample
         buffer = self._buffer
         if buffer.at_rest:
@@ -247,11 +246,8 @@ class Player:
         self._ahead = [Sample(*row) for row in zip(seen, dq, ddq, torques, strict=True)]
 
     def _stand(self) -> Sample:
-        if self._standing is None:
-            tau = None if self._robot is None else self._robot.stand(self.pose)
-            zero = np.zeros_like(self.pose)
-            self._standing = Sample(self.pose, zero, zero, tau)
-        return self._standing
+        zero = np.zeros_like(self.pose)
+        return Sample(self.pose, zero, zero, None if self._robot is None else self._robot.stand(self.pose))
 
 
 def _even(buffer: PointBuffer) -> bool:

@@ -30,19 +30,26 @@ class VirtualRobot:
     def __init__(self, plant: Plant, period: float, seed: int = 0) -> None:
         self._plant = plant
         self._period = period
-        self._rng = np.random.default_rng(seed)
+        self._seed, self._trajectories = seed, 0
+        self._rng = self._resting = np.random.default_rng(seed)
         static = all(isinstance(effect, PlantEffect) and effect.static for effect in plant.effects)
         warm = any(isinstance(getattr(effect, "term", None), HeatEffect) for effect in plant.effects)
         self._memory = 2 if static else int((HEAT_HISTORY if warm else HISTORY) / period)
         self._pieces: list[HeatPiece] = []
-        self._coloured = self._rng.standard_normal(plant.robot.n)
-        self._squares, self._count = np.zeros(plant.robot.n), 0
+        self._standing: tuple[Array, Array] | None = None
         self.begin(0.0)
 
     def begin(self, clock: float) -> None:
-        """Begins a trajectory at a time of the controller's clock [s]: joints are unstrained, heat remains."""
+        """Begins a trajectory at a time of the controller's clock [s]: joints are unstrained, heat remains.
+
+        Its noise is that of its number, however long the robot stood before.
+        """
         self._start = clock
         self._past: Motion | None = None
+        self._trajectories += 1
+        self._rng = np.random.default_rng([self._seed, self._trajectories])
+        self._coloured = self._rng.standard_normal(self._plant.robot.n)
+        self._squares, self._count = np.zeros(self._plant.robot.n), 0
 
     def encoders(self, q: Array) -> Array:
         """Rounds positions (m, n) as the encoders do."""
@@ -71,24 +78,26 @@ class VirtualRobot:
                 warmth = replace(warmth, t=warmth.t - self._start)
         tau = self._plant.torque(whole, warmth)[-len(new) :]
         self._past = whole.slice(-min(self._memory, len(whole)), None)
-        return self._measured(tau)
-
-    def stand(self, q: Array) -> Array:
-        """Gives the measured torque (n,) of a robot that stands at positions (n,)."""
-        motion = Motion(np.zeros(1), q[None], np.zeros((1, len(q))), np.zeros((1, len(q))))
-        model = self._plant.model
-        return self._measured(model.torque(motion.q, motion.dq, motion.ddq, self._plant.parameters))[0]
-
-    def _measured(self, tau: Array) -> Array:
-        """Adds noise that is coloured across pieces; its level follows the torque's RMS so far."""
-        sensors = self._plant.sensors
         self._squares = self._squares + (tau**2).sum(axis=0)
         self._count += len(tau)
+        return self._measured(tau, self._rng)
+
+    def stand(self, q: Array) -> Array:
+        """Gives the measured torque (n,) of a robot that stands at positions (n,); its noise differs each time."""
+        if self._standing is None or not np.array_equal(self._standing[0], q):
+            zero = np.zeros((1, len(q)))
+            self._standing = (q, self._plant.model.torque(q[None], zero, zero, self._plant.parameters))
+        return self._measured(self._standing[1], self._resting)[0]
+
+    def _measured(self, tau: Array, rng: np.random.Generator) -> Array:
+        """Adds noise that is coloured across pieces; its level follows the RMS of the trajectory's torque so far."""
+        sensors = self._plant.sensors
         if not sensors.torque_noise:
             return tau
-        level = sensors.torque_noise * np.sqrt(self._squares / self._count)
+        squares = self._squares / self._count if self._count else (tau**2).mean(axis=0)
+        level = sensors.torque_noise * np.sqrt(squares)
         rho = np.exp(-self._period / sensors.correlation_time) if sensors.correlation_time else 0.0
-        white, drive = self._rng.standard_normal((2, *tau.shape))
+        white, drive = np.moveaxis(rng.standard_normal((len(tau), 2, tau.shape[1])), 1, 0)
         noise = np.empty_like(tau)
         for k in range(len(tau)):
             self._coloured = rho * self._coloured + np.sqrt(1 - rho**2) * drive[k]

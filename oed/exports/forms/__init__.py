@@ -8,12 +8,24 @@ from oed.exports.forms.franka import Franka
 from oed.exports.forms.kuka import Kuka
 from oed.exports.forms.moveit_limits import MoveItLimits
 from oed.exports.forms.ros import Ros, RosGoal
+from oed.exports.forms.rosbag import Mcap, Rosbag
 from oed.exports.forms.simple_message import SimpleMessageReplay
 from oed.exports.forms.urscript import UrScript
 
 FORMS: dict[str, Form] = {
     form.name: form
-    for form in (Ros(), RosGoal(), MoveItLimits(), SimpleMessageReplay(), UrScript(), Kuka(), Abb(), Franka())
+    for form in (
+        Ros(),
+        RosGoal(),
+        Rosbag(),
+        Mcap(),
+        MoveItLimits(),
+        SimpleMessageReplay(),
+        UrScript(),
+        Kuka(),
+        Abb(),
+        Franka(),
+    )
 }
 """All forms but the trajectory file itself, by name."""
 

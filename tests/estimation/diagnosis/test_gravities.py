@@ -139,6 +139,7 @@ def test_the_extended_model_predicts_on_the_base_as_described_and_as_tilted(
         assert np.all(predict(model, log).nrmse < 0.03)
 
 
+@pytest.mark.longer
 def test_a_tilt_that_was_not_told_is_not_taken_for_nothing(upright: Robot, build: Build) -> None:
     """With the known tilt, logs predict each other to the noise; without it, the gate states the gravity that fits.
 

@@ -192,5 +192,5 @@ def test_bytes_are_no_model(tmp_path):
     """A binary file is refused as one that is no JSON."""
     path = tmp_path / "model.json"
     path.write_bytes(b"\xff\xfe\x00")
-    with pytest.raises(InputError, match="cannot be read as JSON"):
+    with pytest.raises(InputError, match="is not a model file"):
         load_model(path)

@@ -28,6 +28,7 @@ def estimate(four_duties: Callable[[int], list[ThermalRun]]) -> ThermalEstimate:
     return fit_thermal(four_duties(7), alpha=TRUTH["alpha"])
 
 
+@pytest.mark.longer
 def test_errors_are_those_of_the_cramer_rao_bound(four_duties: Callable[[int], list[ThermalRun]]) -> None:
     """Over seeds the errors are the least possible ones, and the 95 % intervals hold the truth.
 

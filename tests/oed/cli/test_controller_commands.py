@@ -2,17 +2,19 @@
 
 from __future__ import annotations
 
-import json
+import os
 import re
 import signal
 import subprocess
 import sys
-from collections.abc import Iterator
+import threading
+import time
 from pathlib import Path
 
 import pytest
 
 from estimation import read_log
+from oed.controllers import ControllerOptions, VirtualController
 from oed.exports import write_trajectory
 from robots.loading import load_robot
 from tests.oed.controllers.conftest import swing
@@ -26,43 +28,46 @@ def start(*arguments: object) -> subprocess.Popen[str]:
     return subprocess.Popen(words, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
 
 
-@pytest.fixture
-def controller(robot: Path) -> Iterator[tuple[str, str]]:
-    """Start a controller at free ports; give their numbers."""
-    process = start("controller", "--robot", robot, "--motion-port", 0, "--state-port", 0, "--json")
-    assert process.stderr is not None
-    ports = None
-    while ports is None:
-        line = process.stderr.readline()
-        assert line, "the controller ended"
-        ports = re.search(r"motion port (\d+), state port (\d+)", line)
-    yield ports[1], ports[2]
-    process.send_signal(signal.SIGTERM)
-    out, _ = process.communicate(timeout=120)
-    assert process.returncode == 0
-    assert json.loads(out)["malformed"] == 0
-
-
-def test_interrupted_stream(robot: Path, controller, tmp_path: Path) -> None:
+def test_interrupted_stream(robot: Path, run, tmp_path: Path) -> None:
     """Ctrl-C stops the robot and keeps what was recorded; the controller is free for the next client at once."""
     described = load_robot(robot)
     write_trajectory(tmp_path / "trajectory.csv", swing(described, 1500))
-    place = ["--host", "127.0.0.1", "--state-port", controller[1]]
-    line = ["stream", tmp_path / "trajectory.csv", "--robot", robot, "--motion-port", controller[0], *place]
-    process = start(*line, "--log", tmp_path / "log.csv")
-    while not (tmp_path / "log.csv").exists() or (tmp_path / "log.csv").stat().st_size < 20_000:
-        assert process.poll() is None
-    process.send_signal(signal.SIGINT)
-    _, err = process.communicate(timeout=120)
-    assert process.returncode == 130
-    assert [line[:4] for line in err.splitlines() if not line.startswith("note")] == ["oed:"]
-    assert "the robot was ordered to stop" in err
-    assert len(read_log(tmp_path / "log.csv", 2)) > 50
+    options = ControllerOptions(motion_port=0, state_port=0)
+    with VirtualController(described, options=options) as controller:
+        place = ["--host", "127.0.0.1", "--state-port", controller.state_port]
+        line = ["stream", tmp_path / "trajectory.csv", "--robot", robot, "--motion-port", controller.motion_port]
+        process = start(*line, *place, "--log", tmp_path / "log.csv", "--patience", "20")
+        while not (tmp_path / "log.csv").exists() or (tmp_path / "log.csv").stat().st_size < 20_000:
+            assert process.poll() is None
+            time.sleep(0.01)
+        process.send_signal(signal.SIGINT)
+        _, err = process.communicate(timeout=120)
+        assert process.returncode == 130
+        assert [line[:4] for line in err.splitlines() if not line.startswith("note")] == ["oed:"]
+        assert "the robot was ordered to stop" in err
+        assert not controller.player.moving
+        assert len(read_log(tmp_path / "log.csv", 2)) > 50
 
-    done = start("record", "--robot", robot, *place, "--log", tmp_path / "second.csv", "--duration", 0.3, "--json")
-    out, err = done.communicate(timeout=120)
-    assert done.returncode == 0, err
-    assert json.loads(out)["rows"] == len(read_log(tmp_path / "second.csv", 2)) > 20
+        second = ["--log", tmp_path / "second.csv", "--duration", 0.3, "--json"]
+        done = run("record", "--robot", robot, *place, *second)
+        assert done.code == 0, done.err
+        assert done.data["rows"] == len(read_log(tmp_path / "second.csv", 2)) > 20
+
+
+def test_controller_ends_on_demand(robot: Path, run) -> None:
+    """An order to terminate ends the controller with its summary and exit code 0; its ports are printed first."""
+
+    def terminate() -> None:
+        usual = signal.getsignal(signal.SIGTERM)
+        while signal.getsignal(signal.SIGTERM) == usual:
+            time.sleep(0.01)
+        os.kill(os.getpid(), signal.SIGTERM)
+
+    threading.Thread(target=terminate).start()
+    done = run("controller", "--robot", robot, "--motion-port", 0, "--state-port", 0, "--json")
+    assert done.code == 0
+    assert re.search(r"motion port \d+, state port \d+", done.err)
+    assert (done.data["points"], done.data["malformed"]) == (0, 0)
 
 
 @pytest.mark.parametrize(

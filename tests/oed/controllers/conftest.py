@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from oed.controllers import ControllerOptions, Endpoint, Faults, VirtualController
+from oed.controllers import ControllerOptions, Endpoint, Faults, StreamOptions, VirtualController
 from oed.controllers.clients import ending
 from oed.controllers.recording import recorder
 from robots.loading import load_robot
@@ -18,6 +18,8 @@ from robots.signals import Motion
 from tests.oed.cli.conftest import ROBOT
 
 PERIOD = 0.004
+PATIENT = StreamOptions(patience=20.0)
+"""For motions that should end well: a busy computer may keep a reply back, and nothing waits for the end of this."""
 
 
 @pytest.fixture(autouse=True)
@@ -66,7 +68,8 @@ def controllers(robot: Robot) -> Iterator[Callable[..., tuple[VirtualController,
             state_port=controller.state_port,
             form=options.form,
             handshake=options.handshake,
-            connect_time=3.0,
+            # A busy computer may take its time to answer; no test waits for its end.
+            connect_time=20.0,
             handshake_interval=0.1,
         )
         return controller, endpoint

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-import subprocess
-import sys
+import resource
 from pathlib import Path
 
 import numpy as np
@@ -12,7 +11,7 @@ import pytest
 from estimation import read_log
 from oed.controllers.recording.log_file import FeedbackLog
 from oed.controllers.recording.statistics import Statistics
-from robots.common.errors import InputError
+from robots.common.errors import InputError, OedError
 
 COLUMNS = ["t", "q1", "q2"]
 UNITS = {"t": "s", "q1": "rad", "q2": "rad"}
@@ -54,32 +53,26 @@ def test_existing_file_stays(tmp_path: Path) -> None:
     assert path.read_text() != "kept"
 
 
-FULL_DISK = """
-import resource, sys
-from oed.controllers.recording.log_file import FeedbackLog
-from robots.common.errors import OedError
-resource.setrlimit(resource.RLIMIT_FSIZE, (20_000, 20_000))
-log = FeedbackLog(sys.argv[1], ["t", "q1", "q2"], {}, {"complete": False})
-try:
+def write_until_full(log: FeedbackLog) -> None:
+    """Append rows to a log until the disk is full."""
     for k in range(100_000):
         log.append(0.004 * k, [k / 3, -k / 7])
         if k % 50 == 0:
             log.flush()
-except OedError as error:
-    print(error)
-log.close()
-"""
 
 
-@pytest.mark.slow
 def test_full_disk(tmp_path: Path) -> None:
     """On a full disk recording ends with one message, and the log is whole up to its last line."""
     path = tmp_path / "log.csv"
-    done = subprocess.run(
-        [sys.executable, "-c", FULL_DISK, str(path)], capture_output=True, text=True, check=False, timeout=120
-    )
-    assert "recording stopped" in done.stdout
-    assert done.stderr == ""
+    log = FeedbackLog(path, COLUMNS, UNITS, {"complete": False})
+    before = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (20_000, before[1]))
+    try:
+        with pytest.raises(OedError, match="recording stopped"):
+            write_until_full(log)
+        log.close()
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, before)
     read = read_log(path, 2, torque=False)
     assert 15_000 < path.stat().st_size <= 20_000
     np.testing.assert_array_equal(read.q[:, 0], np.arange(len(read)) / 3)

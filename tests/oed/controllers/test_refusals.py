@@ -25,7 +25,7 @@ from oed.controllers import (
 from oed.exports.simple_message import WireFormat
 from robots.common.errors import InputError
 from robots.signals import Motion
-from tests.oed.controllers.conftest import swing
+from tests.oed.controllers.conftest import PATIENT, swing
 
 SHORT = StreamOptions(patience=0.4)
 NOWHERE = Endpoint(host="127.0.0.1", motion_port=9, state_port=9, connect_time=0.2, handshake_interval=0.1)
@@ -159,8 +159,9 @@ def test_another_protocol(transport, robot, log: Path) -> None:
 def test_wrong_byte_order_is_named(robot, controllers, log: Path) -> None:
     """A controller with another byte order leads to a message that names it."""
     _, endpoint = controllers(form=WireFormat(byte_order="big"))
+    place = replace(endpoint, form=WireFormat(), connect_time=1.0)
     with pytest.raises(LinkError, match="big byte order"):
-        stream(swing(robot), robot, replace(endpoint, form=WireFormat()), log=log, options=SHORT)
+        stream(swing(robot), robot, place, log=log, options=SHORT)
 
 
 @pytest.mark.slow
@@ -170,7 +171,11 @@ def test_two_clients(transport, robot, controllers, tmp_path: Path) -> None:
     motion = swing(robot, 500)
     controller, endpoint = controllers(transport=transport, speed=1.0)
     results = []
-    first = threading.Thread(target=lambda: results.append(stream(motion, robot, endpoint, log=tmp_path / "first.csv")))
+
+    def play() -> None:
+        results.append(stream(motion, robot, endpoint, log=tmp_path / "first.csv", options=PATIENT))
+
+    first = threading.Thread(target=play)
     first.start()
     while controller.points < 50:
         assert first.is_alive()

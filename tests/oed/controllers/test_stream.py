@@ -5,17 +5,19 @@ from __future__ import annotations
 import re
 import threading
 import time
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
+from numpy.typing import NDArray
 
 from estimation import read_log
 from oed.controllers import ControllerError, LinkError, StreamOptions, stream
 from oed.exports.simple_message import WireFormat
 from robots.plants import Sensors, nominal_plant, simulate
 from robots.signals import Log, Motion
-from tests.oed.controllers.conftest import swing
+from tests.oed.controllers.conftest import PATIENT, PERIOD, swing
 
 pytestmark = pytest.mark.slow
 
@@ -24,11 +26,23 @@ REAL = 2e-7
 """Rounding of a real of 4 bytes, relative."""
 
 
-def moving_part(log: Log, motion: Motion) -> Log:
-    """The rows of the log that belong to the trajectory: it begins one sample before the first that moves."""
-    first = int(np.flatnonzero(np.abs(log.q - motion.q[0]).max(axis=1) > 1e-9)[0])
-    start = first - int(np.flatnonzero(np.abs(motion.q - motion.q[0]).max(axis=1) > 1e-9)[0])
-    return log.rows(slice(start, start + len(motion)))
+def samples_of(log: Log, motion: Motion, seen: float = 2e-6) -> tuple[Log, NDArray[np.intp]]:
+    """The rows of the log that belong to the trajectory, and the samples of the trajectory that they are.
+
+    Time stamps count samples, so rows that were lost on the way leave gaps and shift nothing. The first row that moved
+    is one of the first samples; which one, its position says.
+
+    Args:
+        log: on the controller's clock.
+        motion: the trajectory; its first joint moves one way at its beginning.
+        seen: movement that a position shows for sure, above the rounding of its real [rad].
+    """
+    first = int(np.flatnonzero(np.abs(log.q[:, 0] - motion.q[0, 0]) > seen)[0])
+    begin = motion.q[: len(motion) // 3, 0]
+    sample = int(np.abs(begin - log.q[first, 0]).argmin())
+    numbers = sample + np.rint((log.t - log.t[first]) / PERIOD).astype(np.intp)
+    rows = np.flatnonzero((numbers >= 0) & (numbers < len(motion)))
+    return log.rows(slice(int(rows[0]), int(rows[-1]) + 1)), numbers[rows]
 
 
 @pytest.mark.parametrize("transport", ["udp", "tcp"])
@@ -37,15 +51,19 @@ def test_every_point_is_played_in_order(transport, points, robot, controllers, l
     """Positions of the log are those of the trajectory, all of them, once and in order, on the controller's clock."""
     motion = swing(robot)
     controller, endpoint = controllers(plant=nominal_plant(robot, sensors=EXACT), transport=transport)
-    result = stream(motion, robot, endpoint, log=log, options=StreamOptions(points=points))
+    result = stream(motion, robot, endpoint, log=log, options=replace(PATIENT, points=points))
     assert (result.sent, result.stopped, controller.points) == (300, True, 300)
     read = read_log(log, robot.n)
-    part = moving_part(read, motion)
-    np.testing.assert_allclose(part.q, motion.q, rtol=REAL, atol=1e-7)
-    np.testing.assert_allclose(np.diff(part.t), 0.004, atol=1e-9)
+    part, samples = samples_of(read, motion)
+    np.testing.assert_allclose(part.q, motion.q[samples], rtol=REAL, atol=1e-7)
+    np.testing.assert_allclose(np.diff(part.t), 0.004 * np.diff(samples), atol=1e-9)
     assert read.metadata["robot"] == robot.name
     assert read.metadata["complete"] is True
-    assert read.metadata["feedback"]["lost"] == 0
+    # A busy computer may lose datagrams, and none by TCP. Each that is lost is counted.
+    missing = np.rint(np.diff(read.t) / 0.004).astype(int).sum() - (len(read) - 1)
+    assert read.metadata["feedback"]["lost"] == missing
+    assert missing == 0 or transport == "udp"
+    assert missing < 0.2 * len(read)
     assert 0 < read.metadata["message_delay"] < 0.5
 
 
@@ -54,11 +72,13 @@ def test_torque_is_that_of_the_virtual_robot(robot, controllers, log: Path) -> N
     motion = swing(robot)
     plant = nominal_plant(robot, sensors=EXACT)
     _, endpoint = controllers(plant=plant)
-    stream(motion, robot, endpoint, log=log)
+    stream(motion, robot, endpoint, log=log, options=PATIENT)
     expected = simulate(plant, motion).tau
     assert expected is not None
-    measured = moving_part(read_log(log, robot.n), motion).tau
-    np.testing.assert_allclose(measured, expected, rtol=1e-6, atol=1e-5 * np.abs(expected).max())
+    part, samples = samples_of(read_log(log, robot.n), motion)
+    assert len(samples) > 0.8 * len(motion)
+    assert part.tau is not None
+    np.testing.assert_allclose(part.tau, expected[samples], rtol=1e-6, atol=1e-5 * np.abs(expected).max())
 
 
 @pytest.mark.parametrize("form", [WireFormat(byte_order="big", real_bytes=8)])
@@ -66,8 +86,10 @@ def test_other_formats(form: WireFormat, robot, controllers, log: Path) -> None:
     """With reals of 8 bytes positions are exact, in the other byte order too."""
     motion = swing(robot, 200, 0.2)
     _, endpoint = controllers(plant=nominal_plant(robot, sensors=EXACT), form=form)
-    stream(motion, robot, endpoint, log=log)
-    np.testing.assert_array_equal(moving_part(read_log(log, robot.n), motion).q, motion.q)
+    stream(motion, robot, endpoint, log=log, options=PATIENT)
+    part, samples = samples_of(read_log(log, robot.n), motion)
+    assert len(samples) > 0.8 * len(motion)
+    np.testing.assert_array_equal(part.q, motion.q[samples])
 
 
 @pytest.mark.parametrize("transport", ["udp", "tcp"])
@@ -75,17 +97,22 @@ def test_download(transport, robot, controllers, log: Path) -> None:
     """A downloaded trajectory begins after its last point, and is played whole."""
     motion = swing(robot)
     controller, endpoint = controllers(transport=transport, plant=nominal_plant(robot, sensors=EXACT))
-    result = stream(motion, robot, endpoint, log=log, options=StreamOptions(download=True))
+    result = stream(motion, robot, endpoint, log=log, options=replace(PATIENT, download=True))
     assert (result.sent, controller.points) == (300, 300)
-    np.testing.assert_allclose(moving_part(read_log(log, robot.n), motion).q, motion.q, rtol=REAL, atol=1e-7)
+    part, samples = samples_of(read_log(log, robot.n), motion)
+    assert len(samples) > 0.8 * len(motion)
+    np.testing.assert_allclose(part.q, motion.q[samples], rtol=REAL, atol=1e-7)
 
 
 def test_thesis_feedback(robot, controllers, log: Path) -> None:
     """A controller that sends positions only, and no status, gives a log with times of arrival."""
     motion = swing(robot)
     _, endpoint = controllers(feedback="position", status=False, handshake=0xFF, speed=2.0)
-    stream(motion, robot, endpoint, log=log)
+    stream(motion, robot, endpoint, log=log, options=PATIENT)
     read = read_log(log, robot.n, torque=False)
+    # Times are those of the measurement: of the arrival less half the round trip of a ping.
+    assert 0 < read.metadata["delay_removed"] < 1.0
+    assert "clock_offset" not in read.metadata
     assert (read.tau, read.dq, read.metadata["clock"], read.metadata["feedback"]["lost"]) == (
         None,
         None,
@@ -101,7 +128,7 @@ def test_long_trajectory_under_faults(robot, controllers, log: Path) -> None:
     controller, endpoint = controllers(
         plant=nominal_plant(robot, sensors=EXACT), lose=0.05, double=0.05, late=0.05, reorder=0.05, replies="echo"
     )
-    result = stream(motion, robot, endpoint, log=log, options=StreamOptions(window=16))
+    result = stream(motion, robot, endpoint, log=log, options=replace(PATIENT, window=16))
     assert (result.sent, controller.points) == (600, 600)
     assert result.resent > 0
     read = read_log(log, robot.n)
@@ -121,7 +148,7 @@ def test_faults_without_sequence_numbers(robot, controllers, log: Path) -> None:
     controller, endpoint = controllers(lose=0.02, double=0.02, late=0.02, plant=nominal_plant(robot, sensors=EXACT))
     ended = ""
     try:
-        stream(motion, robot, endpoint, log=log)
+        stream(motion, robot, endpoint, log=log, options=PATIENT)
     except ControllerError as error:
         ended = str(error)
     assert controller.points == 300 if not ended else re.search("refuses point|reports the error", ended)
@@ -169,5 +196,5 @@ def test_two_trajectories_on_one_controller(robot, controllers, log: Path) -> No
     motion = swing(robot, 200, 0.2)
     controller, endpoint = controllers()
     for _ in range(2):
-        stream(motion, robot, endpoint, log=log, force=True)
+        stream(motion, robot, endpoint, log=log, options=PATIENT, force=True)
     assert controller.points == 400

@@ -93,7 +93,7 @@ def build(n: int) -> Case:
     return Case(n, Motion(t, q, dq, ddq), limits, measured, predicted)
 
 
-@pytest.fixture(scope="session", params=[1, 6, 7], ids=lambda n: f"{n} joints")
+@pytest.fixture(scope="session", params=[1, 7], ids=lambda n: f"{n} joints")
 def case(request: pytest.FixtureRequest) -> Case:
     return build(request.param)
 

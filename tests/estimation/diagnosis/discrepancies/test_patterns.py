@@ -80,7 +80,7 @@ def _lag_of_gauge(motion: Motion, size: float, tau: np.ndarray) -> np.ndarray:
 @pytest.mark.parametrize(
     ("stranger", "share", "pattern"),
     [
-        (_catch, 0.2, "pattern:spot:0:even"),
+        pytest.param(_catch, 0.2, "pattern:spot:0:even", marks=pytest.mark.longer),
         pytest.param(_grind, 0.2, "pattern:spot:0:odd", marks=pytest.mark.longer),
         (_swing, 0.1, "pattern:sway:0:even"),
         pytest.param(_rub, 0.1, "pattern:sway:0:odd", marks=pytest.mark.longer),
@@ -89,8 +89,8 @@ def _lag_of_gauge(motion: Motion, size: float, tau: np.ndarray) -> np.ndarray:
         pytest.param(_sag, 0.1, "pattern:supply:0:even", marks=pytest.mark.longer),
         pytest.param(_push, 0.1, "pattern:push:1:even", marks=pytest.mark.longer),
         pytest.param(_leak, 0.2, "pattern:ageing:0:even", marks=pytest.mark.longer),
-        (_buffer, 0.2, "pattern:stop:0:above"),
-        (_lag_of_gauge, 0.1, "pattern:hysteresis:0:even"),
+        pytest.param(_buffer, 0.2, "pattern:stop:0:above", marks=pytest.mark.longer),
+        pytest.param(_lag_of_gauge, 0.1, "pattern:hysteresis:0:even", marks=pytest.mark.longer),
     ],
 )
 def test_a_stranger_is_told_by_what_it_depends_on(

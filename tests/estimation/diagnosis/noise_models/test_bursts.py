@@ -57,7 +57,7 @@ def test_rows_that_do_not_count_are_no_measure() -> None:
     assert not find_bursts([noise * measured], measured, STEP).any()
 
 
-@pytest.mark.slow
+@pytest.mark.longer
 def test_a_hard_push_does_not_hide_in_its_own_noise(
     arm: Robot, arm_plant: Callable, fourier_motion: Callable[..., Motion]
 ) -> None:

@@ -88,7 +88,7 @@ def test_torque_that_is_late_is_told_by_each_joints_reversals(cases: Callable, s
     assert weights.sum() ** -0.5 < 5e-4
 
 
-@pytest.mark.slow
+@pytest.mark.longer
 def test_a_delay_is_named_that_only_reversals_tell(cases: Callable) -> None:
     """A delay of a third of a sample is named, although no rows near reversals count."""
     case, robot, log = cases(1006, True)

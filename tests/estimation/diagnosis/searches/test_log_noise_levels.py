@@ -100,7 +100,7 @@ def test_a_hand_that_moved_the_arm_is_found(data):
     assert finding.gain.nrmse_after < 0.6 * finding.gain.nrmse_before
 
 
-@pytest.mark.slow
+@pytest.mark.longer
 def test_logs_that_contradict_each_other_are_not_passed_over(data):
     """Two short runs that contradict each other give a note, whatever the verdict."""
     folder = data("simple_pendulum_dfki")

@@ -125,3 +125,39 @@ def test_simulate_plays_one_thing(run: Callable[..., Any], robot: Path, planned:
     done = run(*line)
     assert done.code == 2
     assert "either --trajectory or --campaign" in " ".join(done.err.split())
+
+
+@pytest.mark.slow
+def test_run_plans_and_goes_on(run, robot, tmp_path):
+    """With --run the campaign is planned once and played; other options than before are refused."""
+    from oed.controllers import ControllerOptions, VirtualController
+    from robots.loading import load_robot
+
+    plan = ["campaign", "--robot", robot, "--cycles", 0, "--cooling", 1, "--cycle-time", 60, "--out", tmp_path / "c"]
+    nobody = ["--run", "127.0.0.1", "--motion-port", 9, "--state-port", 9, "--transport", "tcp"]
+    done = run(*plan, *nobody)
+    assert done.code == 1
+    assert "0 of 1 stages are recorded; the same command goes on" in done.err
+    assert (tmp_path / "c" / "report.html").exists()
+    for options, problem in (
+        (["--cooling", 2], "planned with another --cooling: 1"),
+        (["--seed", 3], "planned with another --seed: 0"),
+        (["--duty", "50"], "planned with another --duty"),
+        (["--force"], "--force with --run would plan the campaign again"),
+    ):
+        changed = run(*plan, *options, *nobody)
+        assert (changed.code, problem in changed.err) == (2, True), changed.err
+    options = ControllerOptions(transport="tcp", motion_port=0, state_port=0, speed=20.0, wait_for_points=True)
+    with VirtualController(load_robot(robot), options=options) as controller:
+        ports = ["--motion-port", controller.motion_port, "--state-port", controller.state_port]
+        fast = ["--transport", "tcp", "--download", "--speed", 20, "--patience", 20]
+        done = run(*plan, "--run", "127.0.0.1", *ports, *fast, "--json")
+    assert done.code == 0, done.err
+    assert [stage["file"] for stage in done.data["stages"]] == ["logs/001_friction.csv"]
+    assert (tmp_path / "c" / "logs" / "001_friction.csv").exists()
+
+
+def test_options_of_the_link_need_a_host(run, robot, tmp_path):
+    """Without --run, options of the way to a controller are refused."""
+    done = run("campaign", "--robot", robot, "--transport", "tcp", "--speed", 2, "--out", tmp_path / "c")
+    assert (done.code, "--transport, --speed do not apply without --run" in done.err) == (2, True)

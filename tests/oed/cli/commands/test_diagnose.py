@@ -175,6 +175,7 @@ def test_bad_use_is_told(arguments, message, run, robot: Path, tmp_path: Path) -
     assert not (tmp_path / "out").exists()
 
 
+@pytest.mark.longer
 def test_logs_with_clocks_of_their_own(data: Callable[[str], Path], run: Callable[..., Any], tmp_path: Path) -> None:
     """Logs that overlap are put one after the other as --own-clocks does, and that is said; one log twice is refused.
 

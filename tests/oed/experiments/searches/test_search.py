@@ -225,6 +225,7 @@ def test_effort_out_of_range(wrong: dict) -> None:
         Effort(**wrong)
 
 
+@pytest.mark.longer
 def test_quick_effort_reaches_the_reference() -> None:
     """Even with quick effort, er3a reaches 28 over 52 columns and 180 over 64, unscaled, in SI units."""
     for friction, bound in REFERENCE.items():

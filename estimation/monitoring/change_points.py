@@ -1,0 +1,81 @@
+"""Change points of stored logs by PELT (Killick et al. 2012), from the package `ruptures` where it is installed."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from estimation.monitoring.control_charts.level_filter import CORRELATION_TIME
+
+Array = NDArray[np.float64]
+
+# More points than this are averaged in groups before the search.
+MOST_POINTS = 1500
+FEWEST_POINTS = 12
+
+
+@dataclass(frozen=True, kw_only=True)
+class ChangePoints:
+    """Change points of each joint's friction beyond what temperature explains.
+
+    Attributes:
+        points: joint (from 1), time [s], and change [%] of each.
+    """
+
+    points: tuple[tuple[int, float, float], ...]
+
+    def to_dict(self) -> list[dict[str, Any]]:
+        """Gives the points as plain data."""
+        return [{"joint": j, "time": time, "percent": percent} for j, time, percent in self.points]
+
+
+def find_change_points(history: dict[str, Array]) -> ChangePoints | None:
+    """Finds changes of the mean in the friction that temperature does not explain.
+
+    The penalty is that of the BIC, 2 log N per change (its size and its place), times the long-run variance of the
+    rest over its variance, because windows are correlated over `CORRELATION_TIME`.
+
+    Args:
+        history: see `History.table`.
+
+    Returns:
+        The change points; None where `ruptures` is not installed.
+    """
+    try:
+        import ruptures
+    except ImportError:
+        return None
+    found: list[tuple[int, float, float]] = []
+    for j in range(history["rest"].shape[1]):
+        known = np.isfinite(history["rest"][:, j])
+        t, y = history["start"][known], history["rest"][known, j]
+        group = -(-len(y) // MOST_POINTS)
+        count = len(y) // max(group, 1)
+        if count < FEWEST_POINTS:
+            continue
+        t, y = t[: count * group : group], y[: count * group].reshape(count, group).mean(axis=1)
+        # Half the squared differences of neighbours give the variance without the changes, but without the slow part:
+        # the spread about a running median has both.
+        local = y - _running_median(y)
+        noise = max(float(np.median(np.abs(local))) / 0.6745, 1e-6)
+        step = float(np.median(np.diff(t)))
+        correlation = float(np.exp(-step / CORRELATION_TIME))
+        penalty = 2 * np.log(count) * (1 + correlation) / (1 - correlation)
+        ends = ruptures.Pelt(model="l2", min_size=3, jump=1).fit(y / noise).predict(pen=penalty)
+        edges = [0, *ends]
+        means = [float(y[a:b].mean()) for a, b in pairwise(edges)]
+        found += [
+            (j + 1, float(t[edge]), float(100 * np.expm1(after - before)))
+            for edge, before, after in zip(edges[1:-1], means[:-1], means[1:], strict=True)
+        ]
+    return ChangePoints(points=tuple(sorted(found, key=lambda item: item[1])))
+
+
+def _running_median(y: Array, width: int = 31) -> Array:
+    width = min(width, len(y) - (len(y) + 1) % 2)
+    padded = np.pad(y, width // 2, mode="edge")
+    return np.asarray(np.median(np.lib.stride_tricks.sliding_window_view(padded, width), axis=1)[: len(y)])

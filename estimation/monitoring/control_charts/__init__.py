@@ -1,0 +1,1 @@
+"""Control charts: the healthy level of each quantity, thresholds, and steps fitted after an alarm."""

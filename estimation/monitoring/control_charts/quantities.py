@@ -1,0 +1,133 @@
+"""Monitored quantities: friction of each joint, offsets, the payload, and what all joints share."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.stats import chi2
+
+from estimation.monitoring.control_charts.change_fit import StepFit, fit_steps
+from estimation.monitoring.control_charts.charts import Chart
+from estimation.monitoring.control_charts.level_filter import LevelFilter
+
+Array = NDArray[np.float64]
+
+Group = Literal["friction", "offset", "payload", "common", "residual"]
+
+# The model error projects onto each direction with this share of the model's residual.
+SHARE = 0.5
+# A longer time between windows [s] is a pause.
+PAUSE = 30.0
+# Windows kept for dating and sizing a change.
+KEPT = 150
+
+
+@dataclass(frozen=True, eq=False)
+class Sample:
+    """One window of one quantity.
+
+    Attributes:
+        start: of the window [s].
+        end: of the window [s].
+        t: mean time [s].
+        y: measured value.
+        variance: of its noise.
+        features: (m,).
+    """
+
+    start: float
+    end: float
+    t: float
+    y: float
+    variance: float
+    features: Array
+
+
+class Quantity:
+    """One monitored quantity with its filter, its charts and its last windows.
+
+    Args:
+        group: what it is.
+        index: joint, or payload direction, counted from 0.
+        level: its healthy level.
+        chart: its charts.
+    """
+
+    def __init__(self, group: Group, index: int, level: LevelFilter, chart: Chart) -> None:
+        self.group, self.index, self.level, self.chart = group, index, level, chart
+        self.samples: list[Sample] = []
+        # Coefficients and covariance before each of the samples.
+        self.before: list[tuple[Array, Array]] = []
+        self.deviation = np.nan
+
+    def observe(self, sample: Sample, *, learn: bool) -> bool:
+        """Takes a window into account, and says whether a chart gives an alarm.
+
+        Args:
+            sample: the window.
+            learn: whether level and charts are updated; not so while an alarm is being confirmed.
+        """
+        self.samples.append(sample)
+        self.before.append((self.level.coefficients.copy(), self.level.covariance[:-1, :-1].copy()))
+        if len(self.samples) > KEPT:
+            del self.samples[0], self.before[0]
+        explained, unsure = self.level.explained(sample.features)
+        self.deviation = sample.y - explained
+        if not learn:
+            return False
+        self.level.predict(sample.t)
+        scatter = self.level.deviation
+        z = self.level.update(sample.features, sample.y, sample.variance)
+        return self.chart.update(z, self.deviation, scatter, sample.variance, unsure)
+
+    def step_alarm(self) -> bool:
+        """Tests for a step after any of the last pauses, by the likelihood ratio (Willsky and Jones 1976).
+
+        It finds what charts of single windows absorb: a change in a long pause, before which nothing is remembered but
+        the level. Tests at one window after another are correlated, so alarms are rarer than stated.
+        """
+        starts = np.array([s.start for s in self.samples])
+        ends = np.array([s.end for s in self.samples])
+        begins = 1 + np.flatnonzero(starts[1:] - ends[:-1] > PAUSE)
+        if not len(begins):
+            return False
+        return bool(self.steps(begins).gains.max() > chi2.isf(1.0 / self.chart.run_length, 1))
+
+    def steps(self, begins: NDArray[np.intp] | None = None) -> StepFit:
+        """Fits a step at each of the last windows, or at some of them."""
+        mean, covariance = self.before[0]
+        return fit_steps(
+            np.array([s.t for s in self.samples]),
+            np.array([s.y for s in self.samples]),
+            np.array([s.variance for s in self.samples]),
+            np.stack([s.features for s in self.samples]),
+            mean,
+            covariance,
+            self.level.deviation,
+            begins,
+        )
+
+    def to_dict(self) -> dict[str, Any]:
+        """Gives the state as plain data."""
+        return {
+            "group": self.group,
+            "index": self.index,
+            "level": self.level.to_dict(),
+            "chart": self.chart.to_dict(),
+            "samples": [[s.start, s.end, s.t, s.y, s.variance, s.features.tolist()] for s in self.samples],
+            "before": [[mean.tolist(), covariance.tolist()] for mean, covariance in self.before],
+        }
+
+    @classmethod
+    def from_dict(cls, data: dict[str, Any]) -> Quantity:
+        """Reads `to_dict`."""
+        found = cls(data["group"], data["index"], LevelFilter.from_dict(data["level"]), Chart(**data["chart"]))
+        found.samples = [
+            Sample(start, end, t, y, variance, np.array(features, dtype=float))
+            for start, end, t, y, variance, features in data["samples"]
+        ]
+        found.before = [(np.array(m, dtype=float), np.array(c, dtype=float)) for m, c in data["before"]]
+        return found

@@ -1,0 +1,380 @@
+"""The evaluation: window by window, from rows to quantities, charts, alarms and findings."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from estimation.monitoring.control_charts.bursts import BurstChart
+from estimation.monitoring.control_charts.charts import Chart
+from estimation.monitoring.control_charts.level_filter import LevelFilter
+from estimation.monitoring.control_charts.quantities import SHARE, Group, Quantity, Sample
+from estimation.monitoring.findings import Finding
+from estimation.monitoring.history import History
+from estimation.monitoring.naming import changes_at, name_changes
+from estimation.monitoring.settings import MonitorSettings
+from estimation.monitoring.windows.baseline import Baseline
+from estimation.monitoring.windows.heat import HeatState, common_change
+from estimation.monitoring.windows.projection import HIGHEST_ORDER, Colour, Window, project
+from estimation.monitoring.windows.window_rows import WindowRows, rows_of_window
+from robots.terms.base import force_unit
+
+Array = NDArray[np.float64]
+
+# Windows whose residual gives the colour of the noise.
+COLOUR_WINDOWS = 30
+# A friction factor with a larger relative standard error says nothing in its window.
+UNSURE = 0.25
+# A model without a stated residual: share of the torque.
+USUAL_RESIDUAL = 0.05
+# Windows between tests for steps, where no pause comes before.
+STEP_TESTS = 30
+# Windows in a row with a short force that are no short force any more.
+LASTING = 3
+# Relative noise of the log of a residual RMS, beyond what the model error makes.
+RESIDUAL_SCATTER, RESIDUAL_NOISE, RESIDUAL_SPREAD = 0.3, 0.1, 1.0
+
+
+@dataclass
+class Event:
+    """An alarm that is being confirmed.
+
+    Attributes:
+        time: end of the window with the alarm [s].
+        log: number of the log, from 0.
+        sources: indices of the quantities with an alarm.
+        windows: seen since.
+    """
+
+    time: float
+    log: int
+    sources: list[int]
+    windows: int = 0
+
+
+class Evaluation:
+    """State of a monitor besides rows that wait.
+
+    Args:
+        baseline: the model.
+        settings: of the monitor.
+        measured: whether joint temperatures are measured.
+        begin: time of the first row [s].
+    """
+
+    def __init__(self, baseline: Baseline, settings: MonitorSettings, *, measured: bool, begin: float) -> None:
+        kind = settings.heat
+        if kind == "auto":
+            kind = "model" if baseline.thermal is not None else "temperature" if measured else "common"
+        self.baseline, self.settings, self.measured, self.begin = baseline, settings, measured, begin
+        self.heat = HeatState(kind, baseline)
+        self.n = baseline.robot.n
+        self.end: float | None = None
+        self.first: float | None = None
+        self.quantities: list[Quantity] = []
+        self.history = History(self.n)
+        self.findings: list[Finding] = []
+        self.event: Event | None = None
+        self.forces: list[tuple[float, float, int, int, int]] = []
+        self.colour_sum = np.zeros((self.n, HIGHEST_ORDER + 1))
+        self.colour_rows = np.zeros(self.n)
+        self.colour_count = 0
+        self.bursts_in_row = 0
+        self.bursts = BurstChart(self._run_length(1))
+
+    def _run_length(self, count: int) -> float:
+        """Windows between false alarms of each of all tests: three of each quantity, and that of short forces."""
+        quantities = 3 * self.n + self.baseline.payload_count + 1
+        hours = self.settings.false_alarm_hours * (3 * quantities + 1) / count
+        return hours * 3600.0 / self.settings.window
+
+    def window(
+        self,
+        rows: Array,
+        start: float,
+        end: float,
+        *,
+        last: bool,
+        payload: Array | None,
+        gravity: Array | None,
+        logs: Sequence[str],
+    ) -> None:
+        """Evaluates one window.
+
+        Args:
+            rows: time, positions, torques, temperatures, ambient, with margins (N, 2 + 3 n).
+            start: of the window [s].
+            end: of the window [s].
+            last: whether a pause follows.
+            payload: that the recording states, or None.
+            gravity: that the recording states, or None.
+            logs: names of the recordings so far.
+        """
+        found = rows_of_window(self.baseline, rows, start, end, last=last, payload=payload, gravity=gravity)
+        if found is None:
+            return
+        if self.end is not None:
+            self.heat.advance(np.zeros(self.n), start - self.end, found.ambient)
+        self.heat.temperatures = found.temperatures
+        cold = np.maximum((found.directions.friction * found.dq).mean(axis=0), 0.0)
+        self.heat.advance(cold * self._expected(), (end - start) / 2, found.ambient)
+        window = self._project(found, start, end)
+        if self.first is None:
+            self.first = start
+            self._create(found, window)
+        factors = np.where(self._known(window), window.values[: self.n], self._expected())
+        burst = self.bursts.update(window.burst)
+        self.bursts_in_row = self.bursts_in_row + 1 if burst else 0
+        short = burst and self.bursts_in_row < LASTING
+        self._observe(window, len(logs) - 1, skip=short)
+        if short:
+            self._note_force(window, len(logs) - 1)
+        self.heat.advance(cold * factors, (end - start) / 2, found.ambient)
+        self.end = end
+        if self.event is None and (last or len(self.history.rows) % STEP_TESTS == 0):
+            self._test_steps(len(logs) - 1)
+        self._settle(logs)
+
+    def _test_steps(self, log: int) -> None:
+        """Opens an event where the last windows of a quantity hold a step; they have confirmed it already."""
+        sources = [index for index, q in enumerate(self.quantities) if q.step_alarm()]
+        if sources and self.end is not None:
+            self.event = Event(time=self.end, log=log, sources=sources, windows=self.settings.confirm)
+
+    def _expected(self) -> Array:
+        """Expected friction factors (n,): by heat and the level so far."""
+        found = np.ones(self.n)
+        for j in range(self.n):
+            features = self.heat.features(j)
+            if features is None:
+                continue
+            mean = self.quantities[j].level.coefficients if self.quantities else self.heat.prior[0]
+            found[j] = np.exp(np.clip(features @ mean, -3.0, 3.0))
+        return found
+
+    def _project(self, found: WindowRows, start: float, end: float) -> Window:
+        colour = Colour.fit(self.colour_sum / self.colour_count, self.colour_rows) if self.colour_count else None
+        speeds = self.baseline.speeds
+        usual = np.where(np.isfinite(speeds), speeds, np.abs(found.dq).max(axis=0))
+        window = project(
+            found.t,
+            found.dq,
+            found.tau,
+            found.directions,
+            colour=colour,
+            expected=self._expected(),
+            usual_speed=usual,
+            edges=(start, end),
+        )
+        if self.colour_count < COLOUR_WINDOWS:
+            self.colour_sum += window.colour
+            self.colour_rows += window.rows
+            self.colour_count += 1
+        return window
+
+    def _create(self, found: WindowRows, window: Window) -> None:
+        """Makes the quantities, with priors by the model's residual."""
+        n, run_length = self.n, self._run_length(1)
+        residual = np.where(
+            np.isfinite(self.baseline.residual), self.baseline.residual, USUAL_RESIDUAL * window.torque_rms
+        )
+        residual = np.maximum(residual, 1e-6 * max(float(window.torque_rms.max()), 1e-9))
+
+        def add(group: Group, index: int, mean: Array, spread: Array, scatter: float) -> None:
+            chart = Chart(window=self.settings.window, run_length=run_length)
+            self.quantities.append(Quantity(group, index, LevelFilter(mean, spread, scatter), chart))
+
+        mean, spread = self.heat.prior
+        for j in range(n):
+            scatter = min(SHARE * residual[j] / max(window.friction_rms[j], 1e-9), 0.3)
+            add("friction", j, mean, spread, scatter)
+        zero, one = np.zeros(1), np.ones(1)
+        for j in range(n):
+            add("offset", j, zero, residual[j] * one, SHARE * residual[j])
+        level = float(np.sqrt(np.mean(residual**2)))
+        for k in range(self.baseline.payload_count):
+            size = level / max(float(np.sqrt(np.mean(found.directions.payload[:, :, k] ** 2))), 1e-9)
+            add("payload", k, zero, size * one, SHARE * size)
+        common = max(self.heat.common_spread, 1e-9)
+        add("common", 0, zero, common * one, SHARE * common)
+        for j in range(n):
+            add("residual", j, np.log(residual[j]) * one, RESIDUAL_SPREAD * one, RESIDUAL_SCATTER)
+
+    def _known(self, window: Window) -> NDArray[np.bool_]:
+        """Joints (n,) whose friction factor the window determines."""
+        factor = window.values[: self.n]
+        error = np.sqrt(np.diag(window.covariance))[: self.n]
+        return np.asarray(window.determined[: self.n] & (factor > 0.05) & (error < UNSURE * np.abs(factor)))
+
+    def _observe(self, window: Window, log: int, *, skip: bool) -> None:
+        """Gives each quantity its value in the window."""
+        n, known = self.n, self._known(window)
+        error = np.sqrt(np.diag(window.covariance))
+        features = [self.heat.features(j) for j in range(n)]
+        known &= np.array([f is not None for f in features])
+        y = np.where(known, np.log(np.where(known, window.values[:n], 1.0)), np.nan)
+        noise = np.where(known, (error[:n] / np.where(known, window.values[:n], 1.0)) ** 2, np.nan)
+        explained, spread = np.zeros(n), np.full(n, np.nan)
+        for j in np.flatnonzero(known).tolist():
+            level = self.quantities[j].level
+            explained[j], unsure = level.explained(features[j])  # type: ignore[arg-type]
+            spread[j] = noise[j] + unsure + level.deviation**2
+        sensitivity = np.array([self.heat.sensitivity(j) for j in range(n)])
+        rest = y - explained
+        unknown = self.heat.common_spread
+        whole, whole_variance = common_change(rest, spread, sensitivity, unknown, None)
+        own = np.full(n, np.nan)
+        values: list[tuple[int, float, float, Array]] = []
+        for j in np.flatnonzero(known).tolist():
+            others, _ = common_change(rest, spread, sensitivity, unknown, j)
+            own[j] = y[j] - sensitivity[j] * others
+            values.append((j, own[j], float(noise[j]), np.asarray(features[j])))
+        one = np.ones(1)
+        for k in range(n + self.baseline.payload_count):
+            if window.determined[n + k]:
+                values.append((n + k, float(window.values[n + k]), float(error[n + k] ** 2), one))
+        place = 2 * n + self.baseline.payload_count
+        if unknown > 0 and known.any():
+            values.append((place, whole, whole_variance, one))
+        for j in range(n):
+            values.append((place + 1 + j, float(np.log(window.residual_rms[j])), RESIDUAL_NOISE**2, one))
+        heat = explained - np.array([q.level.coefficients[-1] for q in self.quantities[:n]]) + sensitivity * whole
+        baseline = self.baseline.residual
+        misfit = float(np.nanmedian(window.residual_rms / np.where(np.isfinite(baseline), baseline, np.nan)))
+        self.history.add(
+            window.start,
+            window.end,
+            log,
+            y,
+            np.sqrt(noise),
+            np.where(known, heat, np.nan),
+            y - heat,
+            misfit if np.isfinite(misfit) else 1.0,
+        )
+        if skip:
+            return
+        alarms = [
+            index
+            for index, value, variance, row in values
+            if self.quantities[index].observe(
+                Sample(window.start, window.end, window.t, value, variance, row), learn=self.event is None
+            )
+        ]
+        if self.event is not None:
+            self.event.windows += 1
+        elif alarms:
+            self.event = Event(time=window.end, log=log, sources=alarms)
+
+    def _note_force(self, window: Window, log: int) -> None:
+        """Keeps a short force until the windows after it tell whether something lasting began."""
+        felt = np.flatnonzero(np.abs(window.burst_joints) > 3.0)
+        link = int(felt.max()) + 1 if len(felt) else 0
+        self.forces.append((window.start, window.burst_at, log, link, self.heat_windows))
+
+    @property
+    def heat_windows(self) -> int:
+        """Windows so far."""
+        return len(self.history.rows)
+
+    def _settle(self, logs: Sequence[str]) -> None:
+        if self.event is not None and self.event.windows >= self.settings.confirm:
+            self.conclude(logs)
+        if self.event is None and self.forces:
+            kept = []
+            for force in self.forces:
+                # Two windows without an alarm after it: what acted is over.
+                if self.end is not None and self.end - force[0] > 3.5 * self.settings.window:
+                    self._report_force(force, logs)
+                else:
+                    kept.append(force)
+            self.forces = kept
+
+    def _report_force(self, force: tuple[float, float, int, int, int], logs: Sequence[str]) -> None:
+        _, at, log, link, _ = force
+        text = f", felt by the joints up to {link}" if link else ""
+        self.findings.append(
+            Finding(
+                kind="contact",
+                joint=None,
+                size=0.0,
+                low=0.0,
+                high=0.0,
+                unit="",
+                earliest=at - 0.5,
+                latest=at + 0.5,
+                detected=at,
+                sigmas=0.0,
+                log=logs[log],
+                text=text,
+            )
+        )
+
+    def conclude(self, logs: Sequence[str]) -> None:
+        """Ends the confirmation of an alarm: names what changed, takes it as the new level, and goes on."""
+        event, self.event = self.event, None
+        if event is None:
+            return
+        sources = [self.quantities[i] for i in event.sources]
+        changes = changes_at(self.quantities, sources, self.begin if self.first is None else self.first)
+        robot = self.baseline.robot
+        unit = "K" if self.heat.kind == "model" else "%"
+        found = name_changes(
+            changes,
+            joints=self.n,
+            units=[force_unit(robot, j) for j in range(self.n)],
+            common_unit=unit,
+            detected=event.time,
+            log=logs[event.log],
+        )
+        self.findings += found
+        if found:
+            # What acted in the window of the change is the change itself.
+            near = [f.earliest for f in found], [f.latest for f in found]
+            low, high = min(near[0]) - self.settings.window, max(near[1]) + self.settings.window
+            self.forces = [force for force in self.forces if not low <= force[1] <= high]
+        for change in changes:
+            q = change.quantity
+            q.level.restart(*q.before[change.window], change.size, change.error**2)
+            q.samples, q.before = [], []
+        for q in self.quantities:
+            q.chart.reset()
+
+    def to_dict(self) -> dict[str, Any]:
+        """Gives the state as plain data."""
+        event = self.event
+        return {
+            "measured": self.measured,
+            "begin": self.begin,
+            "end": self.end,
+            "first": self.first,
+            "heat": self.heat.to_dict(),
+            "quantities": [q.to_dict() for q in self.quantities],
+            "history": self.history.to_list(),
+            "findings": [f.to_state() for f in self.findings],
+            "event": None if event is None else [event.time, event.log, event.sources, event.windows],
+            "forces": [list(force) for force in self.forces],
+            "colour": [self.colour_sum.tolist(), self.colour_rows.tolist(), self.colour_count],
+            "bursts": self.bursts.to_dict(),
+            "bursts_in_row": self.bursts_in_row,
+        }
+
+    @classmethod
+    def from_dict(cls, data: dict[str, Any], baseline: Baseline, settings: MonitorSettings) -> Evaluation:
+        """Reads `to_dict`."""
+        found = cls(baseline, settings, measured=data["measured"], begin=data["begin"])
+        found.end, found.first = data["end"], data["first"]
+        found.heat = HeatState.from_dict(data["heat"], baseline)
+        found.quantities = [Quantity.from_dict(item) for item in data["quantities"]]
+        found.history = History.from_list(found.n, data["history"])
+        found.findings = [Finding(**item) for item in data["findings"]]
+        found.event = None if data["event"] is None else Event(*data["event"])
+        found.forces = [tuple(force) for force in data["forces"]]
+        total, rows, found.colour_count = data["colour"]
+        found.colour_sum, found.colour_rows = np.array(total, dtype=float), np.array(rows, dtype=float)
+        found.bursts = BurstChart(**data["bursts"])
+        found.bursts_in_row = data["bursts_in_row"]
+        return found

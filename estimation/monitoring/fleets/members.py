@@ -1,0 +1,86 @@
+"""The robots of a fleet: folders with logs, or files in one folder."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from os import PathLike
+from pathlib import Path
+
+from estimation.logs.formats import SUFFIXES, is_bag_folder
+from robots.common.errors import InputError
+
+MODEL = "model.json"
+# Folders of a partitioned data set are called column=value.
+PARTITION = "robot="
+
+
+@dataclass(frozen=True, kw_only=True)
+class Member:
+    """One robot.
+
+    Attributes:
+        name: of the robot.
+        files: its logs, by name.
+        model: its own model, where its folder holds one.
+    """
+
+    name: str
+    files: tuple[Path, ...]
+    model: Path | None = None
+
+
+def find_members(folder: str | PathLike[str]) -> list[Member]:
+    """Finds the robots of a fleet.
+
+    A sub-folder is a robot, with all logs below it, and with a `model.json` of its own if there is one. Folders of a
+    Parquet data set that is partitioned by robot are called ``robot=NAME``. A log directly in the folder is a robot of
+    that name.
+
+    Args:
+        folder: of the fleet.
+
+    Raises:
+        InputError: no folder, or no logs in it.
+    """
+    place = Path(folder)
+    if not place.is_dir():
+        raise InputError("no such folder", file=place, remedy="give the folder that holds the robots' logs")
+    members = []
+    for entry in sorted(place.iterdir()):
+        if entry.name.startswith("."):
+            continue
+        if _is_log(entry):
+            members.append(Member(name=entry.stem, files=(entry,)))
+        elif entry.is_dir():
+            files = tuple(sorted(_logs_below(entry)))
+            if files:
+                own = entry / MODEL
+                name = entry.name.removeprefix(PARTITION)
+                members.append(Member(name=name, files=files, model=own if own.is_file() else None))
+    if not members:
+        raise InputError(
+            "no logs in the folder",
+            file=place,
+            allowed="a folder per robot, or a log per robot: " + ", ".join(SUFFIXES),
+        )
+    names = [member.name for member in members]
+    twice = next((name for name in names if names.count(name) > 1), None)
+    if twice is not None:
+        raise InputError(f"two robots of the name {twice}", file=place, remedy="rename one of the folders or logs")
+    return members
+
+
+def _is_log(path: Path) -> bool:
+    return is_bag_folder(path) or (path.is_file() and path.suffix.lower() in SUFFIXES)
+
+
+def _logs_below(folder: Path) -> list[Path]:
+    found = []
+    for entry in folder.iterdir():
+        if entry.name.startswith("."):
+            continue
+        if _is_log(entry):
+            found.append(entry)
+        elif entry.is_dir():
+            found += _logs_below(entry)
+    return found

@@ -1,0 +1,107 @@
+"""Result of a fleet: rows, worst first."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from estimation.monitoring.fleets.robot_row import LIGHTS, RobotRow
+from robots.common.files import write_atomic
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+RESULT, TABLE = "fleet.json", "fleet.csv"
+FORMAT, FORMAT_VERSION = "robot-oed fleet", 1
+LISTED = 20
+
+
+@dataclass(frozen=True, kw_only=True)
+class FleetResult:
+    """All robots of a fleet.
+
+    Attributes:
+        rows: worst first.
+        resumed: robots that an earlier run had done.
+    """
+
+    rows: tuple[RobotRow, ...]
+    resumed: int = 0
+
+    def count(self, light: str) -> int:
+        """Number of robots with a light."""
+        return sum(row.light == light for row in self.rows)
+
+    @property
+    def light(self) -> str:
+        """The worst light."""
+        return self.rows[0].light
+
+    def verdict(self) -> str:
+        """Says in one sentence how many robots need what."""
+        red, amber, grey = (self.count(light) for light in ("red", "amber", "grey"))
+        robots = f"{len(self.rows)} robots" if len(self.rows) != 1 else "1 robot"
+        if not (red or amber or grey):
+            return f"{robots}: no change beyond what temperature explains."
+        parts = [f"{red} need action"] if red else []
+        parts += [f"{amber} to be watched"] if amber else []
+        parts += [f"{grey} without a usable log"] if grey else []
+        return f"{robots}: {', '.join(parts)}, {self.count('green')} without a finding."
+
+    def summary(self) -> str:
+        """Gives the verdict and the worst robots."""
+        lines = [self.verdict()]
+        shown = [row for row in self.rows if row.light != "green"]
+        for row in shown[:LISTED]:
+            lines.append(f"  {row.light:5}  {row.name}: {row.text}")
+        if len(shown) > LISTED:
+            lines.append(f"  and {len(shown) - LISTED} more")
+        count, left_out = sum(len(row.logs) for row in self.rows), sum(row.left_out for row in self.rows)
+        lines.append(f"  {count} logs, {left_out} left out; {self.resumed} robots were done before")
+        return "\n".join(lines)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Gives the result as plain data."""
+        return {
+            "format": FORMAT,
+            "format_version": FORMAT_VERSION,
+            "light": self.light,
+            "verdict": self.verdict(),
+            "counts": {light: self.count(light) for light in LIGHTS},
+            "resumed": self.resumed,
+            "robots": [row.to_dict() for row in self.rows],
+        }
+
+    def to_frame(self) -> pd.DataFrame:
+        """Gives a row per robot, worst first."""
+        import pandas as pd
+
+        return pd.DataFrame(
+            [
+                {
+                    "robot": row.name,
+                    "light": row.light,
+                    "finding": row.text,
+                    "since": row.since,
+                    "logs": len(row.logs),
+                    "left_out": row.left_out,
+                    "hours": row.hours,
+                    "heat_low_percent": row.heat[0],
+                    "heat_high_percent": row.heat[1],
+                }
+                for row in self.rows
+            ]
+        )
+
+    def save(self, folder: str | Path, *, force: bool = False) -> None:
+        """Writes `fleet.json` and `fleet.csv` into a folder.
+
+        Raises:
+            InputError: a file is there, and force is not given.
+        """
+        place = Path(folder)
+        text = json.dumps(self.to_dict(), indent=2, allow_nan=False)
+        write_atomic(place / RESULT, text + "\n", force=force)
+        write_atomic(place / TABLE, self.to_frame().to_csv(index=False), force=force)

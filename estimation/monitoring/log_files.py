@@ -1,0 +1,36 @@
+"""Logs from files of which some may be corrupt: each of those costs a row, not the run."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from os import PathLike
+from pathlib import Path
+
+from estimation.logs.mapping import LogMapping
+from estimation.logs.reading import read_log
+from estimation.monitoring.result import LogRow
+from robots.common.errors import InputError
+from robots.robot import Robot
+from robots.signals import Log
+
+
+def read_each(
+    files: Sequence[Path], robot: Robot, mapping: LogMapping | str | PathLike[str] | None = None
+) -> tuple[list[Log], list[LogRow]]:
+    """Reads logs one by one.
+
+    Args:
+        files: of the logs, in the order in which they were recorded.
+        robot: of the model.
+        mapping: of their columns, where they need one.
+
+    Returns:
+        The logs, and a row with the reason for each file that cannot be read.
+    """
+    logs, refused = [], []
+    for file in files:
+        try:
+            logs.append(read_log(file, mapping=mapping, joints=robot.joint_names, kinds=robot.chain.kinds))
+        except InputError as error:
+            refused.append(LogRow.left_out(file.stem, str(error)))
+    return logs, refused

@@ -1,0 +1,240 @@
+"""The object for streams: takes rows, gives findings, and is saved and loaded whole."""
+
+from __future__ import annotations
+
+import copy
+import json
+from collections.abc import Iterable
+from os import PathLike
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from estimation.models.model import model_from_dict
+from estimation.monitoring.evaluation import Evaluation
+from estimation.monitoring.findings import Finding
+from estimation.monitoring.settings import MonitorSettings
+from estimation.monitoring.windows.baseline import Baseline, baseline_of
+from estimation.monitoring.windows.stream_windows import StreamWindows
+from estimation.monitoring.windows.window_rows import settling
+from robots.common.errors import InputError
+from robots.common.files import existing_file, write_atomic
+from robots.common.parallel import one_blas_thread
+
+Array = NDArray[np.float64]
+
+FORMAT, FORMAT_VERSION = "robot-oed monitor", 1
+
+
+class Monitor:
+    """Follows a robot beside its identified model, and reports changes that temperature does not explain.
+
+    Results depend on the rows alone, not on how they are cut into chunks, nor on restarts.
+
+    Example:
+        ``monitor = Monitor(read_baseline("model")); findings = monitor.update(t, q, tau)``
+
+    Args:
+        baseline: the identified model of the healthy robot.
+        settings: windows, false-alarm rate and heat.
+
+    Raises:
+        InputError: settings that do not suit the model.
+    """
+
+    def __init__(self, baseline: Baseline, settings: MonitorSettings | None = None) -> None:
+        self.baseline = baseline
+        self.settings = settings or MonitorSettings()
+        n = baseline.robot.n
+        self._windows = StreamWindows(self.settings.window, settling(baseline.cutoff), 2 + 3 * n)
+        self._evaluation: Evaluation | None = None
+        self.logs: list[str] = []
+
+    @property
+    def findings(self) -> tuple[Finding, ...]:
+        """All findings so far, in the order of their alarms."""
+        return () if self._evaluation is None else tuple(self._evaluation.findings)
+
+    @property
+    def evaluation(self) -> Evaluation:
+        """What the windows gave so far.
+
+        Raises:
+            InputError: no row has come yet.
+        """
+        if self._evaluation is None:
+            raise InputError("the monitor has seen no motion", remedy="give it rows, or longer logs")
+        return self._evaluation
+
+    @property
+    def last(self) -> float | None:
+        """Time of the newest row [s]; None without rows."""
+        newest = self._windows.last
+        if newest is None and self._evaluation is not None:
+            return self._evaluation.end
+        return newest
+
+    def begin(self, log: str = "", *, payload: ArrayLike | None = None, gravity: ArrayLike | None = None) -> None:
+        """Begins a recording: what came before is ended.
+
+        Args:
+            log: its name.
+            payload: ten inertial parameters of what the flange carries in it, as `Log` has them; None for none.
+            gravity: in the base frame (3,) [m/s2]; None for the description's.
+        """
+        self._consume(self._windows.end())
+        self.logs.append(log)
+        self._payload = None if payload is None else np.asarray(payload, dtype=float)
+        self._gravity = None if gravity is None else np.asarray(gravity, dtype=float)
+
+    _payload: Array | None = None
+    _gravity: Array | None = None
+
+    def update(
+        self,
+        t: ArrayLike,
+        q: ArrayLike,
+        tau: ArrayLike,
+        *,
+        temperature: ArrayLike | None = None,
+        ambient: ArrayLike | None = None,
+    ) -> tuple[Finding, ...]:
+        """Takes rows of a stream, as many as there are.
+
+        Args:
+            t: increasing times (N,) [s], on the clock of all rows before.
+            q: positions (N, n) [rad or m].
+            tau: joint torques (N, n) [N m or N].
+            temperature: of the joints (N, n) [degC], where it is measured.
+            ambient: temperature of the surroundings (N,) [degC], where it is measured.
+
+        Returns:
+            New findings.
+
+        Raises:
+            InputError: arrays of other shapes, numbers that are not finite, or times that do not increase.
+        """
+        before = len(self.findings)
+        rows = self._rows(t, q, tau, temperature, ambient)
+        if not self.logs:
+            self.logs.append("")
+        if self._evaluation is None and len(rows):
+            measured = temperature is not None and bool(np.isfinite(np.asarray(temperature, dtype=float)).any())
+            self._evaluation = Evaluation(self.baseline, self.settings, measured=measured, begin=float(rows[0, 0]))
+        self._consume(self._windows.add(rows))
+        return self.findings[before:]
+
+    def copy(self) -> Monitor:
+        """A copy that goes its own way; the model is shared."""
+        return copy.deepcopy(self, {id(self.baseline): self.baseline})
+
+    def take(self, other: Monitor) -> None:
+        """Goes on from the state of a copy."""
+        self.__dict__.update(other.copy().__dict__)
+
+    def finish(self) -> tuple[Finding, ...]:
+        """Ends the recording, and concludes an alarm with the windows that there are.
+
+        Returns:
+            New findings.
+        """
+        before = len(self.findings)
+        self._consume(self._windows.end())
+        if self._evaluation is not None:
+            self._evaluation.conclude(self.logs)
+        return self.findings[before:]
+
+    def _consume(self, windows: Iterable[tuple[Array, float, float, bool]]) -> None:
+        for rows, start, end, last in windows:
+            if self._evaluation is not None:
+                with one_blas_thread():
+                    self._evaluation.window(
+                        rows, start, end, last=last, payload=self._payload, gravity=self._gravity, logs=self.logs
+                    )
+
+    def _rows(
+        self, t: ArrayLike, q: ArrayLike, tau: ArrayLike, temperature: ArrayLike | None, ambient: ArrayLike | None
+    ) -> Array:
+        n = self.baseline.robot.n
+        times = np.atleast_1d(np.asarray(t, dtype=float))
+        count = len(times)
+        parts: list[Array] = [times.reshape(count, 1)]
+        for name, value, width, needed in (
+            ("q", q, n, True),
+            ("tau", tau, n, True),
+            ("temp", temperature, n, False),
+            ("temp_env", ambient, 1, False),
+        ):
+            if value is None:
+                parts.append(np.full((count, width), np.nan))
+                continue
+            array = np.asarray(value, dtype=float)
+            array = array.reshape(count, -1) if array.size == count * width else array
+            if array.shape != (count, width):
+                raise InputError(f"shape {array.shape}", column=name, allowed=f"({count}, {width})")
+            if needed and not np.isfinite(array).all():
+                row = int(np.argmin(np.isfinite(array).all(axis=1))) + 1
+                raise InputError("a value that is not finite", column=name, row=row, remedy="leave the row out")
+            parts.append(array)
+        return np.column_stack(parts)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Gives model, settings and state as plain data."""
+        s = self.settings
+        return {
+            "format": FORMAT,
+            "format_version": FORMAT_VERSION,
+            "model": dict(self.baseline.source),
+            "settings": {
+                "window": s.window,
+                "false_alarm_hours": s.false_alarm_hours,
+                "heat": s.heat,
+                "confirm": s.confirm,
+            },
+            "logs": self.logs,
+            "payload": None if self._payload is None else self._payload.tolist(),
+            "gravity": None if self._gravity is None else self._gravity.tolist(),
+            "stream": self._windows.to_dict(),
+            "evaluation": None if self._evaluation is None else self._evaluation.to_dict(),
+        }
+
+    def save(self, path: str | PathLike[str], *, force: bool = True) -> None:
+        """Writes the state, whole or not at all; an older one is replaced.
+
+        Args:
+            path: the file.
+            force: whether an existing file is replaced.
+
+        Raises:
+            InputError: it cannot be written.
+        """
+        write_atomic(path, json.dumps(self.to_dict(), allow_nan=False), force=force)
+
+    @classmethod
+    def load(cls, path: str | PathLike[str]) -> Monitor:
+        """Reads a saved state; the monitor goes on as if it had never stopped.
+
+        Raises:
+            InputError: a missing or damaged file.
+        """
+        file = existing_file(Path(path))
+        try:
+            data = json.loads(file.read_text(encoding="utf-8"))
+            if data["format"] != FORMAT or data["format_version"] > FORMAT_VERSION:
+                raise InputError("is not a state of a monitor of this version", file=file)
+            found = cls(baseline_of(model_from_dict(data["model"]), data["model"]), MonitorSettings(**data["settings"]))
+            found.logs = list(data["logs"])
+            found._payload = None if data["payload"] is None else np.array(data["payload"], dtype=float)
+            found._gravity = None if data["gravity"] is None else np.array(data["gravity"], dtype=float)
+            found._windows.restore(data["stream"])
+            if data["evaluation"] is not None:
+                found._evaluation = Evaluation.from_dict(data["evaluation"], found.baseline, found.settings)
+        except (OSError, AttributeError, KeyError, TypeError, ValueError) as e:
+            raise InputError(
+                f"is not a state of a monitor, or is damaged ({type(e).__name__}: {e})",
+                file=file,
+                remedy="start the monitor anew from the logs",
+            ) from e
+        return found

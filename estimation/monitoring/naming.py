@@ -1,0 +1,195 @@
+"""From an alarm to findings: which quantities changed, when, by how much, and what that is called."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.stats import chi2
+
+from estimation.monitoring.control_charts.change_fit import StepFit
+from estimation.monitoring.control_charts.quantities import Quantity
+from estimation.monitoring.findings import NORMAL_95, Finding, Kind, relative
+from estimation.monitoring.windows.baseline import PAYLOAD
+
+Array = NDArray[np.float64]
+
+# Probability that any quantity without an alarm of its own is named beside one that has changed.
+BESIDE = 0.01
+# A step within so many windows of the first one has the same date.
+NEAR = 2
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Change:
+    """A quantity that changed.
+
+    Attributes:
+        quantity: it.
+        size: of the step, in its unit.
+        error: standard error of the size.
+        gain: twice the gain of the log likelihood.
+        earliest: of the date [s].
+        latest: of the date [s].
+        first: whether the step begins with the first of all windows.
+        window: index of the first changed window among the quantity's samples.
+    """
+
+    quantity: Quantity
+    size: float
+    error: float
+    gain: float
+    earliest: float
+    latest: float
+    first: bool
+    window: int
+
+    @property
+    def sigmas(self) -> float:
+        """Size over its standard error."""
+        return self.size / self.error
+
+
+def changes_at(quantities: Sequence[Quantity], sources: Sequence[Quantity], begin: float) -> list[Change]:
+    """Finds the quantities that changed.
+
+    Args:
+        quantities: all of them.
+        sources: those with an alarm.
+        begin: start of the first of all windows [s].
+
+    Returns:
+        The changes; none where the alarm is not confirmed.
+    """
+    fits = [(q, q.steps()) for q in quantities if len(q.samples) > 1]
+    critical = float(chi2.isf(BESIDE / max(len(fits), 1), 1))
+    own = [(q, fit, int(np.argmax(fit.gains))) for q, fit in fits if any(q is s for s in sources)]
+    own = [(q, fit, k) for q, fit, k in own if fit.gains[k] > critical]
+    if not own:
+        return []
+    quantity, _, k = max(own, key=lambda item: float(item[1].gains[item[2]]))
+    date = quantity.samples[k].start
+    found = []
+    for q, fit in fits:
+        alarmed = next((k for other, _, k in own if other is q), None)
+        starts = np.array([s.start for s in q.samples])
+        if alarmed is None:
+            place = int(np.searchsorted(starts, date - 1e-6))
+            if place >= len(starts):
+                continue
+            alarmed = fit.best(max(place - NEAR, 0), min(place + NEAR, len(starts) - 1))
+        if fit.gains[alarmed] > critical:
+            found.append(_change(q, fit, alarmed, begin))
+    return found
+
+
+def _change(q: Quantity, fit: StepFit, k: int, begin: float) -> Change:
+    first, last = fit.interval()
+    first, last = min(first, k), max(last, k)
+    # A change within a window makes it a mixture: the window before the first changed one may hold the change.
+    earliest = q.samples[first - 1].start if first else q.samples[0].start
+    return Change(
+        quantity=q,
+        size=float(fit.sizes[k]),
+        error=float(fit.errors[k]),
+        gain=float(fit.gains[k]),
+        earliest=earliest,
+        latest=q.samples[last].end,
+        first=k == 0 and q.samples[0].start <= begin + 1e-6,
+        window=k,
+    )
+
+
+def name_changes(
+    changes: Sequence[Change], *, joints: int, units: Sequence[str], common_unit: str, detected: float, log: str
+) -> list[Finding]:
+    """Gives changes their names.
+
+    A payload explains offsets. A residual that grows beside a named change belongs to it.
+
+    Args:
+        changes: of one event.
+        joints: number of joints.
+        units: of the offsets (n,).
+        common_unit: of what all joints share.
+        detected: time of the alarm [s].
+        log: name of the log.
+    """
+    by_group = {
+        group: [c for c in changes if c.quantity.group == group]
+        for group in ("friction", "offset", "payload", "common", "residual")
+    }
+    # One cause damages one joint or two; what all joints share is taken out before.
+    if len(by_group["friction"]) >= max(3, joints / 2):
+        worst = max(changes, key=lambda c: c.gain)
+        text = f": {len(changes)} quantities differ from the model at once"
+        return [_finding(worst, "misfit", None, (0.0, 0.0, 0.0), "", detected, log, text)]
+    found = []
+    for c in by_group["friction"]:
+        kind: Kind = "damage" if c.size > 0 else "friction_decrease"
+        found.append(_finding(c, kind, c.quantity.index + 1, relative(c.size, c.error), "%", detected, log))
+    payload = by_group["payload"]
+    if payload:
+        found.append(_payload(payload, detected, log))
+    else:
+        for c in by_group["offset"]:
+            j = c.quantity.index
+            found.append(_finding(c, "offset", j + 1, _interval(c), units[j], detected, log))
+    for c in by_group["common"]:
+        values = relative(c.size, c.error) if common_unit == "%" else _interval(c)
+        found.append(_finding(c, "heat", None, values, common_unit, detected, log))
+    if not found:
+        for c in by_group["residual"]:
+            share = relative(c.size, c.error)[0]
+            text = f" (RMS {share:+.0f} %)"
+            found.append(
+                _finding(c, "unknown", c.quantity.index + 1, relative(c.size, c.error), "%", detected, log, text)
+            )
+    return found
+
+
+def _payload(changes: Sequence[Change], detected: float, log: str) -> Finding:
+    main = max(changes, key=lambda c: c.gain)
+    mass = next((c for c in changes if PAYLOAD[c.quantity.index] == PAYLOAD[0]), None)
+    if mass is None:
+        return _finding(main, "unknown", None, (0.0, 0.0, 0.0), "", detected, log, ": a moment at the flange changed")
+    moments = {c.quantity.index: c.size for c in changes}
+    centre = [moments.get(axis, 0.0) / mass.size for axis in (1, 2, 3)]
+    text = f", centre near ({', '.join(f'{value:.2f}' for value in centre)}) m in the flange frame"
+    size = _interval(mass)
+    found = _finding(main, "payload", None, size, "kg", detected, log, text)
+    return found
+
+
+def _interval(c: Change) -> tuple[float, float, float]:
+    return c.size, c.size - NORMAL_95 * c.error, c.size + NORMAL_95 * c.error
+
+
+def _finding(
+    c: Change,
+    kind: Kind,
+    joint: int | None,
+    values: tuple[float, float, float],
+    unit: str,
+    detected: float,
+    log: str,
+    text: str = "",
+) -> Finding:
+    size, low, high = values
+    return Finding(
+        kind=kind,
+        joint=joint,
+        size=size,
+        low=low,
+        high=high,
+        unit=unit,
+        earliest=c.earliest,
+        latest=c.latest,
+        detected=detected,
+        sigmas=abs(c.sigmas),
+        from_start=c.first,
+        log=log,
+        text=text,
+    )

@@ -1,0 +1,224 @@
+"""Result of monitoring stored logs: findings, trends, and a row per log."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from estimation.monitoring.change_points import ChangePoints, find_change_points
+from estimation.monitoring.findings import LIGHTS, Finding, Severity, when, worst
+from robots.common.files import write_atomic
+from robots.common.plain import finite
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+    from estimation.monitoring.monitor import Monitor
+
+Array = NDArray[np.float64]
+
+RESULT = "monitor.json"
+FORMAT, FORMAT_VERSION = "robot-oed monitoring", 1
+HEAT_WORDS = {
+    "model": "the thermal model",
+    "temperature": "measured joint temperatures",
+    "common": "heat states with assumed time constants, fitted to the logs",
+    "none": "nothing",
+}
+
+
+@dataclass(frozen=True, kw_only=True)
+class LogRow:
+    """One log.
+
+    Attributes:
+        name: of the log.
+        start: on the monitor's clock [s]; NaN of a log that was left out.
+        end: likewise.
+        used: whether it counts.
+        findings: kinds that were detected in it.
+        note: why it was left out.
+    """
+
+    name: str
+    start: float = np.nan
+    end: float = np.nan
+    used: bool = True
+    findings: tuple[str, ...] = ()
+    note: str = ""
+
+    @classmethod
+    def left_out(cls, name: str, note: str) -> LogRow:
+        """A log that does not count."""
+        return cls(name=name, used=False, note=note)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Gives the row as plain data."""
+        return {**asdict(self), "start": finite(self.start), "end": finite(self.end), "findings": list(self.findings)}
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class MonitorResult:
+    """What a monitor found in logs.
+
+    Attributes:
+        robot: name of the robot.
+        joint_names: (n,).
+        heat: what explained the changes of friction that all joints share.
+        false_alarm_hours: between false alarms [h of recorded motion].
+        findings: in the order of their alarms.
+        logs: a row per log.
+        notes: what was found about the logs' clocks.
+        history: columns over time, see `History.table`.
+        origin: start of the first log [s].
+        change_points: of the stored logs; None without the package `ruptures`.
+    """
+
+    robot: str
+    joint_names: tuple[str, ...]
+    heat: str
+    false_alarm_hours: float
+    findings: tuple[Finding, ...]
+    logs: tuple[LogRow, ...]
+    notes: tuple[str, ...]
+    history: dict[str, Array]
+    origin: float
+    change_points: ChangePoints | None
+
+    @classmethod
+    def of(cls, monitor: Monitor, logs: tuple[LogRow, ...], notes: tuple[str, ...]) -> MonitorResult:
+        """Makes a result of a monitor's state.
+
+        Raises:
+            InputError: the monitor has seen no motion.
+        """
+        evaluation = monitor.evaluation
+        history = evaluation.history.table()
+        robot = monitor.baseline.robot
+        return cls(
+            robot=robot.name,
+            joint_names=robot.joint_names,
+            heat=evaluation.heat.kind,
+            false_alarm_hours=monitor.settings.false_alarm_hours,
+            findings=monitor.findings,
+            logs=logs,
+            notes=notes,
+            history=history,
+            origin=evaluation.begin,
+            change_points=find_change_points(history),
+        )
+
+    @property
+    def severity(self) -> Severity:
+        """The most urgent finding's."""
+        return worst([f.severity for f in self.findings])
+
+    @property
+    def light(self) -> str:
+        """Traffic light: green, amber or red."""
+        return LIGHTS[self.severity]
+
+    @property
+    def hours(self) -> float:
+        """Recorded motion [h]."""
+        return float((self.history["end"] - self.history["start"]).sum() / 3600)
+
+    @property
+    def heat_range(self) -> tuple[float, float]:
+        """Lowest and highest change of friction that temperature explains [%]."""
+        heat = self.history["heat"]
+        if not np.isfinite(heat).any():
+            return 0.0, 0.0
+        return float(100 * np.expm1(np.nanmin(heat))), float(100 * np.expm1(np.nanmax(heat)))
+
+    def verdict(self) -> str:
+        """Says in one or two sentences what was found."""
+        urgent = [f for f in self.findings if f.severity == "act"]
+        low, high = self.heat_range
+        heat = f" Temperature explains changes of friction of {low:+.0f} to {high:+.0f} %."
+        if self.heat == "none":
+            heat = ""
+        if urgent:
+            return f"Action needed. {urgent[-1].sentence(self.origin)}{heat}"
+        watched = [f for f in self.findings if f.severity == "watch"]
+        if watched:
+            return f"Watch this robot. {watched[-1].sentence(self.origin)}{heat}"
+        return f"No change beyond what temperature explains.{heat}"
+
+    def summary(self) -> str:
+        """Gives verdict, findings, what to do, and what was left out."""
+        used = [row for row in self.logs if row.used]
+        lines = [
+            f"{self.light.upper()}: {self.verdict()}",
+            f"  {len(used)} logs, {self.hours:.2g} h of motion; friction changes by temperature: from "
+            f"{HEAT_WORDS[self.heat]}; false alarms: one in {self.false_alarm_hours:g} h of motion",
+        ]
+        for f in self.findings:
+            lines += [f"  {LIGHTS[f.severity]:5}  {f.sentence(self.origin)}", f"         {f.advice()}"]
+        lines += [f"  {row.name}: left out: {row.note}" for row in self.logs if not row.used]
+        lines += [f"  {note}" for note in self.notes]
+        if self.change_points is None and len(used) > 1:
+            lines.append("  Change points of the stored logs need the package ruptures: pip install ruptures.")
+        return "\n".join(lines)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Gives the result as plain data, without the trends."""
+        return {
+            "format": FORMAT,
+            "format_version": FORMAT_VERSION,
+            "robot": self.robot,
+            "light": self.light,
+            "severity": self.severity,
+            "verdict": self.verdict(),
+            "heat": self.heat,
+            "heat_percent": list(self.heat_range),
+            "false_alarm_hours": self.false_alarm_hours,
+            "hours": self.hours,
+            "origin": self.origin,
+            "findings": [f.to_dict(self.origin) for f in self.findings],
+            "logs": [row.to_dict() for row in self.logs],
+            "notes": list(self.notes),
+            "change_points": None if self.change_points is None else self.change_points.to_dict(),
+        }
+
+    def to_frame(self) -> pd.DataFrame:
+        """Gives the trends: a row per window and joint, changes in per cent of the model's friction."""
+        import pandas as pd
+
+        h = self.history
+        count, n = h["friction"].shape
+        return pd.DataFrame(
+            {
+                "start": np.repeat(h["start"], n),
+                "end": np.repeat(h["end"], n),
+                "log": np.repeat(h["log"].astype(int) + 1, n),
+                "joint": np.tile(np.arange(1, n + 1), count),
+                **{f"{name}_percent": 100 * np.expm1(h[name].ravel()) for name in ("friction", "heat", "rest")},
+                "standard_error_percent": 100 * h["error"].ravel(),
+            }
+        )
+
+    def save(self, folder: str | Path, *, force: bool = False) -> None:
+        """Writes `monitor.json` and `trends.csv` into a folder.
+
+        Raises:
+            InputError: a file is there, and force is not given.
+        """
+        place = Path(folder)
+        text = json.dumps(self.to_dict(), indent=2, allow_nan=False)
+        write_atomic(place / RESULT, text + "\n", force=force)
+        write_atomic(place / "trends.csv", self.to_frame().to_csv(index=False), force=force)
+
+    def rows_of(self, log: int) -> Sequence[int]:
+        """Indices of the windows of a log, counted from 0."""
+        return np.flatnonzero(self.history["log"] == log).tolist()
+
+    def since(self, time: float) -> str:
+        """Writes a time on the clock of the logs."""
+        return when(time, self.origin)

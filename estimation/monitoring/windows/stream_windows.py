@@ -1,0 +1,106 @@
+"""Windows of a stream: rows are kept until a window and the margin of its smoothing are complete."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from robots.common.errors import InputError
+
+Array = NDArray[np.float64]
+
+# A step of so many median steps, and of so many seconds, is a pause.
+PAUSE_STEPS, PAUSE_SECONDS = 20.0, 0.5
+# The last part of a recording counts from this share of a window on, and with so many rows.
+SHORTEST, FEWEST = 0.3, 50
+
+
+class StreamWindows:
+    """Cuts rows into windows on a grid from the start of each recording; the cuts do not depend on the chunks.
+
+    Args:
+        window: length [s].
+        margin: rows before and after a window that its smoothing needs [s].
+        width: number of columns of a row, the time included.
+    """
+
+    def __init__(self, window: float, margin: float, width: int) -> None:
+        self.window, self.margin = window, margin
+        self.rows = np.zeros((0, width))
+        self.start: float | None = None
+        self.period: float | None = None
+
+    @property
+    def last(self) -> float | None:
+        """Time of the newest row [s]; None without rows."""
+        return float(self.rows[-1, 0]) if len(self.rows) else None
+
+    def add(self, rows: Array) -> Iterator[tuple[Array, float, float, bool]]:
+        """Takes rows (N, width), the time first, and gives each complete window.
+
+        Yields:
+            Rows with margins, start and end of the window [s], and whether the recording ends with it.
+
+        Raises:
+            InputError: times that do not increase.
+        """
+        if len(rows) == 0:
+            return
+        t = np.concatenate([self.rows[-1:, 0], rows[:, 0]])
+        steps = np.diff(t)
+        if (steps <= 0).any():
+            row = int(np.argmax(steps <= 0)) + (0 if len(self.rows) else 1)
+            raise InputError(
+                f"time does not increase: {t[row]:.6g} s is followed by {t[row + 1]:.6g} s",
+                column="t",
+                remedy="call end() before a recording whose clock begins anew",
+            )
+        if self.period is None and len(steps) >= 1:
+            self.period = float(np.median(steps))
+        longest = max(PAUSE_STEPS * (self.period or 0.0), PAUSE_SECONDS)
+        begin = 0
+        offset = 1 if len(self.rows) else 0
+        for cut in np.flatnonzero(steps > longest).tolist():
+            stop = cut + 1 - offset
+            yield from self._grow(rows[begin:stop])
+            yield from self.end()
+            begin = stop
+        yield from self._grow(rows[begin:])
+
+    def end(self) -> Iterator[tuple[Array, float, float, bool]]:
+        """Ends a recording: gives what is left of it, if it is long enough."""
+        rows, start, last = self.rows, self.start, self.last
+        self.rows, self.start = rows[:0], None
+        if start is None or last is None:
+            return
+        inside = int((rows[:, 0] >= start).sum())
+        if last - start >= SHORTEST * self.window and inside >= FEWEST:
+            yield rows, start, last, True
+
+    def _grow(self, rows: Array) -> Iterator[tuple[Array, float, float, bool]]:
+        if len(rows) == 0:
+            return
+        self.rows = np.concatenate([self.rows, rows])
+        if self.start is None:
+            self.start = float(self.rows[0, 0])
+        while self.rows[-1, 0] >= self.start + self.window + self.margin:
+            end = self.start + self.window
+            t = self.rows[:, 0]
+            stop = int(np.searchsorted(t, end + self.margin, side="right"))
+            yield self.rows[:stop], self.start, end, False
+            self.start = end
+            self.rows = self.rows[int(np.searchsorted(t, end - self.margin)) :]
+
+    def to_dict(self) -> dict[str, Any]:
+        """Gives the state as plain data."""
+        rows = [[None if np.isnan(value) else value for value in row] for row in self.rows.tolist()]
+        return {"rows": rows, "start": self.start, "period": self.period}
+
+    def restore(self, data: dict[str, Any]) -> None:
+        """Reads `to_dict`."""
+        rows = [[np.nan if value is None else value for value in row] for row in data["rows"]]
+        self.rows = np.array(rows, dtype=float).reshape(len(rows), self.rows.shape[1])
+        self.start, self.period = data["start"], data["period"]

@@ -1,0 +1,180 @@
+"""Whether a model can be simulated: which body and direction make it unfit, and the nearest model that simulates.
+
+A simulation divides by the inertia matrix. A fit of poor data may leave one that is not positive definite: some motion
+then has negative kinetic energy, and no position loop can hold it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from estimation.closed_loops.closed_loop import inertia_matrices
+from estimation.models.model import Model
+from estimation.predictions.simulable_models import nearest_simulable
+from robots.base_parameters import BaseParameters, find_base_parameters
+from robots.common.errors import InputError
+from robots.common.plain import finite
+from robots.signals import Motion
+
+Array = NDArray[np.float64]
+
+POSES = 200
+"""Poses of each motion that are looked at."""
+ALONG = 0.2
+"""Joints that move by less than this share of the fastest one are not named."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class UnfitDirection:
+    """Why a model cannot be simulated.
+
+    Attributes:
+        q: the worst pose (n,) [rad or m].
+        direction: joint velocities (n,) of the motion without inertia, the fastest 1.
+        inertia: of this motion, v' M v [kg m2, or kg of prismatic joints].
+        expected: the same of the nearest model.
+        body: the link, from 1, whose parameters bring most inertia back in the nearest model.
+        rotor: whether its rotor does most.
+        parameter: the base parameter of that link that does most.
+        value: identified.
+        needed: of the nearest model.
+        shift: the difference in standard errors; infinite where the logs do not determine it.
+        nearest: the nearest model that simulates.
+        change: largest change of a determined parameter in it, in standard errors.
+    """
+
+    q: Array
+    direction: Array
+    inertia: float
+    expected: float
+    body: int
+    rotor: bool
+    parameter: str
+    value: float
+    needed: float
+    shift: float
+    nearest: Model
+    change: float
+
+    @property
+    def joints(self) -> tuple[int, ...]:
+        """The joints that move, from 1, the fastest first."""
+        speed = np.abs(self.direction)
+        return tuple(int(j) + 1 for j in np.argsort(-speed) if speed[j] >= ALONG * speed.max())
+
+    def to_dict(self) -> dict[str, Any]:
+        """Gives everything but the nearest model as plain data; null where the logs do not determine the parameter."""
+        return {
+            "q": self.q.tolist(),
+            "direction": self.direction.tolist(),
+            "inertia": self.inertia,
+            "inertia_of_nearest": self.expected,
+            "link": self.body,
+            "rotor": self.rotor,
+            "parameter": self.parameter,
+            "value": self.value,
+            "value_of_nearest": self.needed,
+            "shift_in_standard_errors": finite(self.shift),
+            "largest_change_in_standard_errors": self.change,
+        }
+
+    def summary(self) -> str:
+        """Names body, direction and remedy in a few sentences."""
+        first, *others = self.joints
+        way = f"joint {first}"
+        if others:
+            signs = ["" if self.direction[j - 1] * self.direction[first - 1] > 0 else "against it " for j in others]
+            way += " with " + " and ".join(f"joint {j} {sign}".strip() for j, sign in zip(others, signs, strict=True))
+        shift = f"{self.shift:.2g} standard errors" if np.isfinite(self.shift) else "which the logs do not determine"
+        part = f"The rotor of joint {self.body}" if self.rotor else f"Link {self.body}"
+        return (
+            f"The model cannot be simulated: moving {way} has an inertia of {self.inertia:.3g} kg m2. {part} makes it "
+            f"so: {self.parameter} is {self.value:.3g}, and {self.needed:.3g} in the nearest model that simulates "
+            f"({shift}). There the inertia is {self.expected:.3g} kg m2. The largest change of a determined parameter "
+            f"in it is {self.change:.2g} standard errors."
+        )
+
+
+def find_unfit_direction(model: Model, motions: Motion | Sequence[Motion]) -> UnfitDirection | None:
+    """Finds the motion to which a model gives no inertia, if there is one.
+
+    A model is unfit where its inertia matrix is not positive definite. It is compared with the nearest model that can
+    be simulated, see `nearest_simulable`.
+
+    Args:
+        model: an identified model.
+        motions: the poses in which it should be simulated.
+
+    Returns:
+        The worst direction and the nearest model; None for a model that can be simulated.
+
+    Raises:
+        InputError: motions of another number of joints, or no description to stay near to.
+        SolverError: the solver gave up.
+    """
+    listed = [motions] if isinstance(motions, Motion) else list(motions)
+    robot = model.robot
+    for motion in listed:
+        if motion.n != robot.n:
+            raise InputError(f"a motion of {motion.n} joints", allowed=f"{robot.n}, as {robot.name} has")
+    base = find_base_parameters(model.torque_model, gravities=model.gravities)
+    if base.independent != model.columns:
+        raise InputError("the model's parameters are not the robot's base parameters", remedy="identify it again")
+    if all(_definite(inertia_matrices(base, model.values, motion, POSES)) for motion in listed):
+        return None
+    nearest, change = nearest_simulable(model)
+    worst: tuple[float, Array, Array] | None = None
+    for motion in listed:
+        at = np.linspace(0, len(motion) - 1, min(len(motion), POSES)).astype(int)
+        own, sound = (inertia_matrices(base, values, motion, POSES) for values in (model.values, nearest.values))
+        scale = 1.0 / np.sqrt(np.maximum(np.diagonal(sound, axis1=1, axis2=2), np.finfo(float).tiny))
+        sizes, ways = np.linalg.eigh(own * scale[:, :, None] * scale[:, None, :])
+        row = int(sizes[:, 0].argmin())
+        if worst is None or sizes[row, 0] < worst[0]:
+            worst = float(sizes[row, 0]), motion.q[at[row]], scale[row] * ways[row, :, 0]
+    assert worst is not None
+    _, q, way = worst
+    direction = way / way[np.abs(way).argmax()]
+    at_pose = Motion(np.zeros(1), q[None], np.zeros((1, robot.n)), np.zeros((1, robot.n)))
+    taken = _inertia_of_each(base, model.values - nearest.values, at_pose, direction)
+    bodies = np.array([0 if column.joint is None else column.joint for column in model.parameters])
+    body = min(set(bodies.tolist()) - {0}, key=lambda link: float(taken[bodies == link].sum()))
+    most = int(np.where(bodies == body, taken, np.inf).argmin())
+    moved = nearest.values[most] - model.values[most]
+    return UnfitDirection(
+        q=q,
+        direction=direction,
+        inertia=_along(base, model.values, at_pose, direction),
+        expected=_along(base, nearest.values, at_pose, direction),
+        body=body,
+        rotor=model.parameters[most].term == "rotor_inertia",
+        parameter=model.names[most],
+        value=float(model.values[most]),
+        needed=float(nearest.values[most]),
+        shift=float(abs(moved) / model.standard_errors[most]) if model.determined[most] else np.inf,
+        nearest=nearest,
+        change=change,
+    )
+
+
+def _definite(matrices: Array) -> bool:
+    """Whether all inertia matrices (M, n, n) have room to be divided by, each joint measured by its own inertia."""
+    diagonal = np.diagonal(matrices, axis1=1, axis2=2)
+    if not (diagonal > 0.0).all():
+        return False
+    scale = 1.0 / np.sqrt(diagonal)
+    return bool((np.linalg.eigvalsh(matrices * scale[:, :, None] * scale[:, None, :])[:, 0] > 0.0).all())
+
+
+def _along(base: BaseParameters, values: Array, pose: Motion, direction: Array) -> float:
+    return float(direction @ inertia_matrices(base, values, pose)[0] @ direction)
+
+
+def _inertia_of_each(base: BaseParameters, values: Array, pose: Motion, direction: Array) -> Array:
+    """What each base parameter (b,) adds to the inertia of a direction."""
+    return np.array([_along(base, row, pose, direction) if row.any() else 0.0 for row in np.diag(values)])

@@ -1,0 +1,55 @@
+"""Choices for the loop of experiments."""
+
+from __future__ import annotations
+
+from dataclasses import asdict, dataclass
+from typing import Any
+
+from robots.common.errors import InputError
+
+
+@dataclass(frozen=True, kw_only=True)
+class LoopOptions:
+    """What the loop does.
+
+    Attributes:
+        experiments: how many experiments are made at most, the first one included.
+        least_probability: a proposed experiment that separates the causes with a lower probability is not made.
+        longest: repetitions beyond this time of an experiment, rests included, are left to the next one [s].
+        friction: of the base model: ``auto``, ``polynomial`` or ``coulomb-viscous``.
+        velocity_fraction: of the velocity limits that may be used.
+        effort: of the design's search.
+        collision: whether the design avoids collisions, and motions are checked for them.
+        seed: of everything random.
+    """
+
+    experiments: int = 4
+    least_probability: float = 0.5
+    longest: float = 600.0
+    friction: str = "auto"
+    velocity_fraction: float = 1.0
+    effort: str = "standard"
+    collision: bool = True
+    seed: int = 0
+
+    def __post_init__(self) -> None:
+        """Checks the numbers.
+
+        Raises:
+            InputError: a number out of range.
+        """
+        if self.experiments != int(self.experiments) or self.experiments < 1:
+            raise InputError(f"{self.experiments} experiments", allowed="a whole number, at least 1")
+        if not 0.0 <= self.least_probability <= 1.0:
+            raise InputError(f"a least probability of {self.least_probability}", allowed="0 to 1")
+        if not self.longest > 0.0:
+            raise InputError(f"experiments of at most {self.longest} s", allowed="above 0")
+        if not 0.0 < self.velocity_fraction <= 1.0:
+            raise InputError(f"a velocity fraction of {self.velocity_fraction}", allowed="above 0, up to 1")
+
+    def settings(self) -> dict[str, Any]:
+        """Writes what must stay the same when the loop goes on as plain data."""
+        data = asdict(self)
+        # The budget may be raised later.
+        del data["experiments"], data["least_probability"], data["longest"]
+        return data

@@ -1,0 +1,73 @@
+"""What a loop of experiments found."""
+
+from __future__ import annotations
+
+from dataclasses import asdict, dataclass
+from typing import Any
+
+from oed.campaigns.loops.state import Experiment, Verdict
+from robots.robot import Robot
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class LoopResult:
+    """A loop that has ended.
+
+    Attributes:
+        robot: the robot.
+        place: the controller.
+        folder: of all files.
+        experiments: in order, each with what it showed.
+        ended: why the loop ended.
+        success: whether nothing was ambiguous or unexplained at the end.
+        duration: from the beginning of this start [s].
+    """
+
+    robot: Robot
+    place: str
+    folder: str
+    experiments: tuple[Experiment, ...]
+    ended: str
+    success: bool
+    duration: float
+
+    @property
+    def diagnosis(self) -> Verdict:
+        """The last diagnosis."""
+        last = self.experiments[-1].diagnosis
+        assert last is not None
+        return last
+
+    def to_dict(self) -> dict[str, Any]:
+        """Gives everything as plain data."""
+        return {
+            "robot": self.robot.name,
+            "place": self.place,
+            "folder": self.folder,
+            "verdict": self.diagnosis.verdict,
+            "causes": self.diagnosis.causes,
+            "ended": self.ended,
+            "success": self.success,
+            "duration": self.duration,
+            "experiments": [asdict(experiment) for experiment in self.experiments],
+        }
+
+    def summary(self) -> str:
+        """Tells the story in a few lines."""
+        lines = [f"{self.robot.name}: {self.ended}"]
+        for number, experiment in enumerate(self.experiments, start=1):
+            seen = experiment.diagnosis
+            assert seen is not None
+            rows = sum(run.recorded.rows for run in experiment.runs if run.recorded is not None)
+            causes = ", ".join(seen.causes) or "no cause"
+            lines += [
+                f"  experiment {number}, {experiment.kind.replace('_', ' ')}: {experiment.why}",
+                f"    {len(experiment.runs)} runs, {rows} rows; then {seen.verdict}: {causes}",
+                f"    held-out error per joint [% of torque RMS]: {percent(seen.before)} -> {percent(seen.after)}",
+            ]
+        return "\n".join(lines)
+
+
+def percent(shares: list[float | None]) -> str:
+    """Writes shares in per cent."""
+    return " ".join("-" if share is None else f"{100 * share:.2f}" for share in shares)

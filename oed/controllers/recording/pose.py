@@ -1,0 +1,45 @@
+"""Where the robot stands, as its controller reports it."""
+
+from __future__ import annotations
+
+import time
+
+import numpy as np
+from numpy.typing import NDArray
+
+from oed.controllers.interrupts import signals_held
+from oed.controllers.links import Endpoint, open_link
+from oed.controllers.recording.recorder import Recorder
+from robots.robot import Robot
+
+Array = NDArray[np.float64]
+
+RESTS = 0.3
+"""How long the robot must stand [s]."""
+TURN = 0.02
+
+
+def read_pose(robot: Robot, endpoint: Endpoint, patience: float = 2.0) -> Array:
+    """Waits until a robot stands, and reads its pose (n,) [rad or m].
+
+    A controller whose client was killed may go on with the points that it holds.
+
+    Args:
+        robot: the robot.
+        endpoint: its controller.
+        patience: longest silence [s].
+
+    Raises:
+        LinkError: the controller cannot be reached, or is silent.
+    """
+    recorder = Recorder(open_link(endpoint, endpoint.state_port), robot, endpoint.form, patience, endpoint.connect_time)
+    try:
+        recorder.wait_for_feedback()
+        while time.monotonic() - recorder.rest_since < RESTS:
+            time.sleep(TURN)
+            recorder.check()
+        assert recorder.positions is not None
+        return recorder.positions[: robot.n]
+    finally:
+        with signals_held():
+            recorder.finish({})

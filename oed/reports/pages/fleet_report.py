@@ -1,0 +1,119 @@
+"""The page of a fleet: what a manager reads in a minute."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from estimation.monitoring.fleets import FleetResult, RobotRow
+from oed.reports.pages.monitor_report import STATUS
+from oed.reports.rendering.page import Cell, Fact, Page, Section, Table
+from oed.reports.rendering.palette import joint_role
+from oed.reports.rendering.picture import Line, Panel, Picture, Series
+from oed.reports.rendering.saving import footer, save_page
+from robots.common.files import ResultFolder
+
+# Robots whose trends are drawn; the table lists all.
+DRAWN = 12
+
+
+def save_fleet_report(result: FleetResult, folder: ResultFolder, *, png: bool = False) -> None:
+    """Writes the page of a fleet, and its pictures as PNG on request."""
+    save_page(fleet_page(result), folder, png=png)
+
+
+def fleet_page(result: FleetResult) -> Page:
+    """Builds the page: lights, the table of robots, the trends of the worst, and logs that were left out."""
+    left_out = tuple((row.name, log.name, log.note) for row in result.rows for log in row.logs if not log.used)
+    drawn = [row for row in result.rows if row.trend.hours][:DRAWN]
+    return Page(
+        title="Fleet",
+        verdict=result.verdict(),
+        status=STATUS.get(result.light, "warning"),
+        facts=(
+            Fact(label="Red", value=result.count("red"), note="need action", status="bad"),
+            Fact(label="Amber", value=result.count("amber"), note="to be watched", status="warning"),
+            Fact(label="Green", value=result.count("green"), note="no finding", status="good"),
+            Fact(label="Grey", value=result.count("grey"), note="no usable log"),
+            Fact(label="Logs", value=sum(len(row.logs) for row in result.rows), note=f"{len(left_out)} left out"),
+        ),
+        sections=(
+            Section(title="Robots, worst first", tables=(_robots(result),)),
+            *(
+                (
+                    Section(
+                        title="Trends",
+                        paragraphs=(
+                            "Change of each joint's friction against the model. On the left what temperature does not "
+                            "explain, on the right what it explains. Each point is a window of a log; hovering shows "
+                            "the log.",
+                        ),
+                        pictures=(trends_picture(drawn),),
+                    ),
+                )
+                if drawn
+                else ()
+            ),
+            *(
+                (
+                    Section(
+                        title="Logs that were left out",
+                        tables=(Table(headings=("robot", "log", "reason"), rows=left_out),),
+                        folded=True,
+                    ),
+                )
+                if left_out
+                else ()
+            ),
+        ),
+        footer=footer(),
+    )
+
+
+def _robots(result: FleetResult) -> Table:
+    rows: list[tuple[Cell, ...]] = []
+    for row in result.rows:
+        low, high = row.heat
+        rows.append(
+            (
+                row.light,
+                row.name,
+                row.text,
+                row.since or None,
+                row.advice or None,
+                f"{len(row.logs) - row.left_out} of {len(row.logs)}",
+                f"{low:+.0f} to {high:+.0f} %" if row.trend.hours else None,
+            )
+        )
+    return Table(
+        headings=("light", "robot", "finding", "since", "what to do", "logs used", "by temperature"), rows=tuple(rows)
+    )
+
+
+def trends_picture(rows: list[RobotRow]) -> Picture:
+    """Draws two panels per robot: friction that temperature does not explain, and that it explains."""
+    panels = []
+    for row in rows:
+        days = np.asarray(row.trend.hours) / 24.0
+        for title, columns in (("not explained", row.trend.rest), ("by temperature", row.trend.heat)):
+            panels.append(
+                Panel(
+                    title=f"{row.name} ({row.light}): {title}",
+                    x_label="time [days]",
+                    y_label="friction [%]",
+                    lines=(Line(value=0.0, role="neutral", dash="dot"),),
+                    series=tuple(
+                        Series(
+                            x=days,
+                            y=np.array([np.nan if v is None else v for v in column]),
+                            name=f"joint {j}",
+                            kind="markers",
+                            role=joint_role(j),
+                            texts=row.trend.logs,
+                        )
+                        for j, column in enumerate(columns, start=1)
+                    ),
+                )
+            )
+    return Picture(
+        title="Friction of the worst robots", name="fleet_trends", panels=tuple(panels), columns=2, panel_height=190
+    )

@@ -1,0 +1,124 @@
+"""The page of a monitor."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from estimation.monitoring import MonitorResult
+from estimation.monitoring.findings import LIGHTS
+from estimation.monitoring.result import HEAT_WORDS
+from oed.reports.pictures.monitor_pictures import trend_picture
+from oed.reports.rendering.page import Cell, Fact, Page, Section, Status, Table
+from oed.reports.rendering.picture import Picture
+from oed.reports.rendering.saving import footer, save_page
+from robots.common.files import ResultFolder
+
+STATUS: dict[str, Status] = {"green": "good", "amber": "warning", "red": "bad"}
+
+
+def save_monitor_report(result: MonitorResult, folder: ResultFolder, *, png: bool = False) -> None:
+    """Writes the page of a monitor, and its picture as PNG on request."""
+    save_page(monitor_page(result), folder, png=png)
+
+
+def monitor_page(result: MonitorResult) -> Page:
+    """Builds the page: findings, trends of all joints, and the logs."""
+    low, high = result.heat_range
+    left_out = [row for row in result.logs if not row.used]
+    return Page(
+        title=f"Monitoring of {result.robot}",
+        verdict=result.verdict(),
+        status=STATUS[result.light],
+        facts=(
+            Fact(label="Light", value=result.light, status=STATUS[result.light]),
+            Fact(label="Findings", value=len(result.findings)),
+            Fact(label="Logs", value=len(result.logs) - len(left_out), note=f"{len(left_out)} left out"),
+            Fact(label="Motion", value=f"{result.hours:.2g} h"),
+            Fact(
+                label="Friction by temperature",
+                value=f"{low:+.0f} to {high:+.0f} %",
+                note=f"from {HEAT_WORDS[result.heat]}",
+            ),
+            Fact(label="False alarms", value=f"one in {result.false_alarm_hours:g} h of motion"),
+        ),
+        warnings=(*(f"{row.name}: left out: {row.note}" for row in left_out), *result.notes),
+        sections=(
+            Section(
+                title="Findings",
+                paragraphs=(
+                    "A change is reported where a CUSUM or EWMA chart exceeds its threshold and a fit of a step "
+                    "confirms it. Sizes and dates have 95 % intervals.",
+                )
+                if result.findings
+                else ("No chart gave an alarm.",),
+                tables=(findings_table(result),) if result.findings else (),
+            ),
+            Section(title="Trends", pictures=(trends(result),)),
+            Section(title="Logs", tables=(_logs(result),), folded=len(result.logs) > 40),
+            *_change_points(result),
+        ),
+        footer=footer(),
+    )
+
+
+def findings_table(result: MonitorResult) -> Table:
+    """A row per finding."""
+    rows: list[tuple[Cell, ...]] = [
+        (LIGHTS[f.severity], f.kind, f.joint, f.sentence(result.origin), f.log or None, f.advice())
+        for f in result.findings
+    ]
+    return Table(headings=("light", "kind", "joint", "finding", "log", "what to do"), rows=tuple(rows))
+
+
+def trends(result: MonitorResult, name: str = "trends") -> Picture:
+    """The picture of the trends."""
+    h = result.history
+    names = [row.name for row in result.logs if row.used]
+    marks = tuple(
+        (
+            f.joint,
+            (f.earliest - result.origin) / 3600,
+            (f.latest - result.origin) / 3600,
+            f.kind.replace("_", " "),
+            STATUS[LIGHTS[f.severity]],
+        )
+        for f in result.findings
+    )
+    return trend_picture(
+        (h["start"] - result.origin) / 3600,
+        h["friction"],
+        h["heat"],
+        h["rest"],
+        h["error"],
+        joint_names=result.joint_names,
+        logs=[names[int(k)] if 0 <= int(k) < len(names) else "" for k in h["log"]],
+        marks=marks,
+        name=name,
+    )
+
+
+def _logs(result: MonitorResult) -> Table:
+    rows: list[tuple[Cell, ...]] = []
+    for row in result.logs:
+        start = result.since(row.start) if np.isfinite(row.start) else None
+        rows.append((row.name, start, "used" if row.used else "left out", ", ".join(row.findings) or row.note or None))
+    return Table(headings=("log", "start", "", "findings"), rows=tuple(rows))
+
+
+def _change_points(result: MonitorResult) -> tuple[Section, ...]:
+    if result.change_points is None:
+        return ()
+    rows: tuple[tuple[Cell, ...], ...] = tuple(
+        (joint, result.since(time), f"{percent:+.3g} %") for joint, time, percent in result.change_points.points
+    )
+    return (
+        Section(
+            title="Change points of the stored logs",
+            paragraphs=(
+                "A second method for comparison: PELT on the friction that temperature does not explain, over all logs "
+                "at once. It takes no account of model errors, and finds more than the charts.",
+            ),
+            tables=(Table(headings=("joint", "time", "change"), rows=rows),) if rows else (),
+            folded=True,
+        ),
+    )

@@ -1,0 +1,225 @@
+"""A campaign that is played on a controller of this computer."""
+
+from __future__ import annotations
+
+import json
+import shutil
+import subprocess
+import sys
+from collections import namedtuple
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import oed
+from estimation import read_log
+from oed.campaigns import Campaign, Programme
+from oed.campaigns.runs import run_campaign, running
+from oed.campaigns.runs.state import run_lock
+from oed.controllers import ControllerError, ControllerOptions, Endpoint, LinkError, StreamOptions, VirtualController
+from oed.controllers.clients import ending
+from oed.controllers.recording import recorder
+from oed.exports import read_trajectory
+from robots.common.errors import InputError
+from robots.loading import load_robot
+from robots.robot import Robot
+from tests.oed.cli.conftest import ROBOT
+
+SPEED = 10.0
+FAST = StreamOptions(download=True, patience=10.0)
+NOWHERE = Endpoint(host="127.0.0.1", motion_port=9, state_port=9, connect_time=0.2, handshake_interval=0.1)
+
+
+@pytest.fixture(autouse=True)
+def _impatient(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The controller of the tests runs faster than real time."""
+    monkeypatch.setattr(recorder, "LOOK", 0.1)
+    monkeypatch.setattr(ending, "STANDS", 0.1)
+
+
+@pytest.fixture(scope="session")
+def planned(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A robot file, and the campaign of a cold robot: it holds still, then three friction stages with rests between."""
+    folder = tmp_path_factory.mktemp("planned")
+    (folder / "two.yaml").write_text(ROBOT.replace("VELOCITY", "2"))
+    programme = Programme(cycles=0, cooling=3, cycle_time=12.0, power_on=1.0, levels=(0.5, 1.0), plateau=0.2)
+    oed.campaign(load_robot(folder / "two.yaml"), programme=programme, collision=False).save(folder)
+    return folder
+
+
+@pytest.fixture
+def campaign(planned: Path, tmp_path: Path) -> Path:
+    """A copy of the campaign's folder."""
+    return Path(shutil.copytree(planned, tmp_path / "campaign"))
+
+
+@pytest.fixture
+def two(planned: Path) -> Robot:
+    """Load the robot."""
+    return load_robot(planned / "two.yaml")
+
+
+@pytest.fixture
+def endpoint(two: Robot, campaign: Path) -> Iterator[Endpoint]:
+    """Start a controller whose robot stands at the campaign's home."""
+    home = read_trajectory(campaign / "friction.csv")[0].q[0]
+    options = ControllerOptions(transport="tcp", motion_port=0, state_port=0, speed=SPEED, wait_for_points=True)
+    with VirtualController(two, options=options, pose=home) as controller:
+        yield Endpoint(
+            host="127.0.0.1",
+            transport="tcp",
+            motion_port=controller.motion_port,
+            state_port=controller.state_port,
+        )
+
+
+KILLED = """
+import os, signal, sys, time, warnings
+from pathlib import Path
+warnings.simplefilter("ignore")
+from oed.campaigns.runs import run_campaign
+from oed.controllers import Endpoint, StreamOptions
+folder, motion, state, speed = Path(sys.argv[1]), *map(int, sys.argv[2:4]), float(sys.argv[4])
+place = Endpoint(host="127.0.0.1", transport="tcp", motion_port=motion, state_port=state)
+
+def begun():
+    return [f for f in (folder / "interrupted").glob("*.csv") if f.stat().st_size > 20_000]
+
+for kill in (1, 2, 3, 0):
+    before = begun()
+    child = os.fork()
+    if not child:
+        run_campaign(folder, place, options=StreamOptions(download=True, patience=10.0), speed=speed)
+        os._exit(0)
+    # The second and third kill come in a later stage than the one before.
+    while kill and (len(list((folder / "logs").glob("*.csv"))) < kill - 1 or len(begun()) <= len(before)):
+        time.sleep(0.01)
+    if kill:
+        os.kill(child, signal.SIGKILL)
+    print(os.waitpid(child, 0)[1])
+"""
+
+
+@pytest.mark.slow
+def test_three_kills(campaign: Path, endpoint: Endpoint) -> None:
+    """Killed three times in the middle of a stage, the run ends with every stage recorded once, on one clock."""
+    words = [sys.executable, "-c", KILLED, campaign, endpoint.motion_port, endpoint.state_port, SPEED]
+    done = subprocess.run(list(map(str, words)), capture_output=True, text=True, check=False, timeout=120)
+    assert done.stderr == ""
+    assert done.stdout.split() == ["9", "9", "9", "0"]
+    state = json.loads((campaign / "run.json").read_text())
+    planned = [slot for slot in Campaign.load(campaign).slots if slot.stage is not None]
+    assert [(row["number"], row["stage"], row["cycle"]) for row in state["recorded"]] == [
+        (number, slot.stage, slot.cycle) for number, slot in enumerate(planned, start=1)
+    ]
+    files = sorted((campaign / "logs").iterdir())
+    assert [file.name for file in files] == [Path(row["file"]).name for row in state["recorded"]]
+    assert state["starts"] == 4
+    # What was cut short is kept.
+    assert len(list((campaign / "interrupted").glob("*.csv"))) >= 3
+    end = -np.inf
+    for file, slot in zip(files, planned, strict=True):
+        log = read_log(file, 2)
+        motion, _ = read_trajectory(campaign / f"{slot.stage}.csv")
+        assert log.t[0] > end
+        end = log.t[-1]
+        assert log.metadata["complete"] is True
+        assert (log.metadata["stage"], log.metadata["cycle"]) == (slot.stage, slot.cycle)
+        # The whole stage is in its log: 4-byte reals and encoders round by less.
+        np.testing.assert_allclose(log.q.max(axis=0), motion.q.max(axis=0), atol=1e-4)
+        np.testing.assert_allclose(log.q[[0, -1]], motion.q[[0, -1]], atol=1e-4)
+
+
+@pytest.mark.slow
+def test_rests_and_progress(campaign: Path, endpoint: Endpoint) -> None:
+    """Cycles last their time on the controller's clock, and the progress counts the seconds of the timetable."""
+    seen: list[float] = []
+
+    class Listener:
+        def start(self, task: str, total: float | None = None) -> None:
+            self.total = total
+
+        def update(self, done: float, note: str = "") -> None:
+            seen.append(done)
+
+        def finish(self) -> None:
+            seen.append(float("nan"))
+
+    listener = Listener()
+    result = run_campaign(campaign, endpoint, options=FAST, speed=SPEED, progress=listener)
+    assert [stage.stage for stage in result.stages] == ["power_on", "friction", "friction", "friction"]
+    slots = [slot for slot in Campaign.load(campaign).slots if slot.stage is not None]
+    assert listener.total == pytest.approx(slots[-1].end - slots[0].start)
+    assert seen[-2] == pytest.approx(listener.total)
+    assert (np.diff(seen[:-1]) >= 0).all()
+    ends = [stage.end.t for stage in result.stages[1:]]
+    # A cycle is never shorter; how much longer it is depends on how busy this computer is.
+    assert (np.diff(ends) > 12.0 - 2.0).all()
+    again = run_campaign(campaign, NOWHERE)
+    assert again.stages == result.stages
+
+
+def test_what_is_refused(campaign: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """No controller, a second program, a full disk, other logs and a changed plan are one message each."""
+    with pytest.raises(LinkError, match=r"nothing listens.*0 of 4 stages are recorded; the same command goes on"):
+        run_campaign(campaign, NOWHERE)
+    with run_lock(campaign, "plays this campaign"), pytest.raises(InputError, match="another program plays"):
+        run_campaign(campaign, NOWHERE)
+    with monkeypatch.context() as patch:
+        usage = namedtuple("usage", "free")
+        patch.setattr(running.shutil, "disk_usage", lambda _: usage(1000))
+        with pytest.raises(InputError, match=r"may need \d+ MB, the disk has 0 MB"):
+            run_campaign(campaign, NOWHERE)
+    with pytest.raises(InputError, match="a speed of 0"):
+        run_campaign(campaign, NOWHERE, speed=0.0)
+    plan = campaign / "campaign.json"
+    plan.write_text(plan.read_text().replace('"notes": [', '"notes": ["another one",'))
+    with pytest.raises(InputError, match="planned again"):
+        run_campaign(campaign, NOWHERE)
+    (campaign / "run.json").write_text("{}")
+    with pytest.raises(InputError, match="no state of a run"):
+        run_campaign(campaign, NOWHERE)
+    (campaign / "run.json").unlink()
+    (campaign / "logs").mkdir(exist_ok=True)
+    (campaign / "logs" / "other.csv").write_text("t\n")
+    with pytest.raises(InputError, match="holds other logs"):
+        run_campaign(campaign, NOWHERE)
+    with pytest.raises(InputError, match="no such file"):
+        run_campaign(tmp_path / "nothing", NOWHERE)
+
+
+@pytest.mark.slow
+def test_start_elsewhere(campaign: Path, two: Robot) -> None:
+    """At its first start a run does not move a robot that stands elsewhere; after an interruption it moves it home."""
+    home = read_trajectory(campaign / "friction.csv")[0].q[0]
+    options = ControllerOptions(transport="tcp", motion_port=0, state_port=0, speed=SPEED, wait_for_points=True)
+    with VirtualController(two, options=options, pose=home + 0.2) as controller:
+        place = Endpoint(
+            host="127.0.0.1",
+            transport="tcp",
+            motion_port=controller.motion_port,
+            state_port=controller.state_port,
+        )
+        with pytest.raises(InputError, match="move the robot to the start"):
+            run_campaign(campaign, place, options=FAST, speed=SPEED)
+        assert controller.points == 0
+        run_campaign(campaign, place, options=FAST, speed=SPEED)
+    moved = read_log(next((campaign / "interrupted").glob("*_home_1.csv")), 2)
+    np.testing.assert_allclose(moved.q[-1], home, atol=1e-4)
+    speed = np.abs(np.diff(moved.q, axis=0)).max() / 0.004
+    assert speed < 0.2 * 2.0 + 0.01
+
+
+@pytest.mark.slow
+def test_buffer_that_never_empties(campaign: Path, two: Robot) -> None:
+    """A controller that plays nothing ends the run with its reason, and says how far the run came."""
+    from oed.controllers import Faults
+
+    home = read_trajectory(campaign / "friction.csv")[0].q[0]
+    options = ControllerOptions(motion_port=0, state_port=0, faults=Faults(stuck=True))
+    with VirtualController(two, options=options, pose=home) as controller:
+        place = Endpoint(host="127.0.0.1", motion_port=controller.motion_port, state_port=controller.state_port)
+        with pytest.raises(ControllerError, match=r"takes no points.*0 of 4 stages are recorded"):
+            run_campaign(campaign, place, options=StreamOptions(patience=0.5))
