@@ -52,10 +52,14 @@ EXAMPLES = {
         "oed design --robot arm.urdf --tip tool0 --criterion d --velocity-fraction 0.7 --out experiment",
     ),
     "pareto": ("oed pareto --robot er3a --criteria cond,d --points 5 --out pareto",),
-    "retime": ("oed retime experiment/trajectory.csv --method toppra --out retimed",),
+    "retime": (
+        "oed retime experiment/trajectory.csv --method toppra --out retimed",
+        "oed retime waypoints.csv --robot er3a --out timed",
+    ),
     "export": (
         "oed export experiment/trajectory.csv --degrees --positions-only --bare --out for_controller.csv",
         "oed export experiment/trajectory.csv --to ros-goal --out goal.yaml",
+        "oed export experiment/trajectory.csv --to mcap --out planned.mcap",
         "oed export experiment/trajectory.csv --to urscript --period 0.008 --out excitation.script",
     ),
     "stream": (

@@ -263,7 +263,7 @@ class VirtualController:
         due = int((now - self._due_from) / step + 1e-9)
         for _ in range(due):
             clock = self._clock_ticks * self.options.feedback_period
-            sample = self._player.tick(clock, now)
+            sample = self._player.tick(clock, now, bool(self._state.clients))
             if sample is None:
                 self._due_from = now
                 break

@@ -136,12 +136,13 @@ class Player:
             self._count(now)
         return outcome
 
-    def tick(self, clock: float, now: float) -> Sample | None:
+    def tick(self, clock: float, now: float, heard: bool = True) -> Sample | None:
         """Goes on by one sample of time.
 
         Args:
             clock: the controller's time [s].
             now: time on the wall [s].
+            heard: whether anyone asks for the torque at rest.
 
         Returns:
             What the robot does; None where time must wait for points.
@@ -153,7 +154,7 @@ class Player:
                 if self._robot is not None:
                     self._robot.begin(clock)
         if self._phase != Phase.PLAYING:
-            return self._stand()
+            return self._stand(heard)
         if self._refilling and not self._buffer.full and now - self._last_accepted <= LOAD:
             return None
         self._refilling = False
@@ -166,13 +167,13 @@ class Player:
             if now - self._last_accepted > LOAD:
                 self._phase = Phase.IDLE
                 self.played_trajectories += 1
-            return self._stand()
+            return self._stand(heard)
         if self._options.wait_for_points and now - self._last_accepted < GONE:
             # Piece by piece: one point at a time would cost a simulation each.
             self._refilling = True
             return None
         self.fail(UNDERRUN)
-        return self._stand()
+        return self._stand(heard)
 
     @property
     def _exhausted(self) -> bool:
@@ -245,9 +246,10 @@ class Player:
         seen = q if self._robot is None else self._robot.encoders(q)
         self._ahead = [Sample(*row) for row in zip(seen, dq, ddq, torques, strict=True)]
 
-    def _stand(self) -> Sample:
+    def _stand(self, heard: bool) -> Sample:
         zero = np.zeros_like(self.pose)
-        return Sample(self.pose, zero, zero, None if self._robot is None else self._robot.stand(self.pose))
+        torque = self._robot.stand(self.pose) if heard and self._robot is not None else None
+        return Sample(self.pose, zero, zero, torque)
 
 
 def _even(buffer: PointBuffer) -> bool:
