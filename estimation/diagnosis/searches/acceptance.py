@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 from scipy.ndimage import maximum_filter1d
 
-from estimation.diagnosis.calibration import MIN_BIC_GAIN
+from estimation.diagnosis.calibration import IMPACT_SHARE, MIN_BIC_GAIN
 from estimation.diagnosis.hypothesis_tests.fitted_effects import FittedEffect
 from estimation.diagnosis.hypothesis_tests.joint_agreement import per_joint_evidence, shared_coefficient_gain
 from estimation.diagnosis.hypothesis_tests.problem import Problem
@@ -19,8 +19,6 @@ from robots.terms.effect_bases.capabilities import AtReversals
 # Time [s] before and after an impact of another effect in which the drives respond to it; share of the rows from which
 # such times no longer count as impacts; share of a delay that the other rows must show.
 ANSWERS, MOSTLY, ASIDE = 0.2, 0.8, 0.5
-# Share of the largest torque of such an effect from which a row is an impact: a lag also acts at rest on its flank.
-KICKS = 0.3
 # p-value over the false-alarm threshold below which an effect is certain, on joints without other effects.
 SURE = 0.2
 
@@ -138,7 +136,7 @@ def delay_supported_away_from_impacts(
     reach = round(ANSWERS / (problem.recording.step * problem.whitening.stride))
     beside = np.zeros(problem.rows, dtype=bool)
     for member in kicks:
-        near = maximum_filter1d(member.acts(KICKS), 2 * reach + 1)
+        near = maximum_filter1d(member.acts(IMPACT_SHARE), 2 * reach + 1)
         beside |= near & (near.mean() < MOSTLY)
     if not beside.any():
         return True

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from scipy.ndimage import maximum_filter1d
 
-from estimation.diagnosis.calibration import MAX_HIGH_BAND_ERROR, REVERSAL_MARGIN
+from estimation.diagnosis.calibration import IMPACT_SHARE, MAX_HIGH_BAND_ERROR, REVERSAL_MARGIN
 from estimation.diagnosis.hypothesis_tests.fitted_effects import FittedEffect
 from estimation.diagnosis.hypothesis_tests.hypotheses import Hypothesis
 from estimation.diagnosis.hypothesis_tests.problem import Problem
@@ -18,7 +18,7 @@ from estimation.diagnosis.hypothesis_tests.scoring import accept, score
 from estimation.diagnosis.recordings.log_reading import build_recording
 from estimation.diagnosis.recordings.recording import Recording
 from estimation.diagnosis.reversals.reversal_impulses import find_reversals
-from estimation.diagnosis.searches.acceptance import ANSWERS, KICKS, MOSTLY, delay_supported_away_from_impacts
+from estimation.diagnosis.searches.acceptance import ANSWERS, MOSTLY, delay_supported_away_from_impacts
 from robots.plants import simulate
 from robots.robot import Robot
 from robots.signals import Log, Motion
@@ -129,7 +129,7 @@ def test_a_delay_must_be_told_aside_from_the_kicks_of_a_play(problem: Problem, a
     for shape in PLAY.effect.grid(problem.situation, 2):
         play = FittedEffect(PLAY, shape, problem.measured(PLAY, shape), 1e3, np.array([1e-3]), 4, 1.0)
         torque = np.max([np.abs(part @ play.coefficients) for part in play.group.columns], axis=0)
-        near = maximum_filter1d(torque > KICKS * torque.max(), 2 * reach + 1)
+        near = maximum_filter1d(torque > IMPACT_SHARE * torque.max(), 2 * reach + 1)
         if near.mean() < MOSTLY:
             break
     assert 0.05 < near.mean() < MOSTLY
