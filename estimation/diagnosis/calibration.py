@@ -115,6 +115,9 @@ SHOCK_COUNT = 0.01
 MAX_GLITCH_SHARE = 0.1
 """Share of a short effect's chi-square that one shock must leave; less, and it is one."""
 
+IMPACT_SHARE = 0.3
+"""Share of an effect's largest torque at impacts from which a row is one. Not studied: a lag also acts beside them."""
+
 # Search.
 
 MAX_EFFECTS = 4

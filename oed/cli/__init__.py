@@ -9,13 +9,13 @@ import sys
 def main() -> None:
     """Runs ``oed``. Exit codes: 0 success, 1 no solution, 2 bad input, 130 interrupted."""
     from oed.cli.app import app
-    from oed.cli.help.usage_errors import CommandLineError, usage_message
+    from oed.cli.help.usage_errors import CommandLineError, usage_message, with_nearest
     from robots.common.errors import OedError
 
     try:
         sys.exit(app(prog_name="oed", standalone_mode=False) or 0)
     except OedError as error:
-        print(f"oed: {error}", file=sys.stderr)
+        print(f"oed: {with_nearest(error.problem, error.allowed, str(error))}", file=sys.stderr)
         sys.exit(error.exit_code)
     except CommandLineError as error:
         if len(sys.argv) == 1:  # Help was asked for by asking for nothing.

@@ -31,6 +31,7 @@ from oed.cli.commands.robot import robot, robots
 from oed.cli.commands.simulate import simulate
 from oed.cli.commands.stream import stream
 from oed.cli.commands.thermal import thermal
+from oed.cli.configuration.defaults import HELP_TEXT
 from oed.cli.help.groups import Commands
 
 FUNCTIONS = (
@@ -92,5 +93,8 @@ def options(
     version: Annotated[
         bool, typer.Option("--version", help="Print the version and exit.", is_eager=True, callback=_show_version)
     ] = False,
+    config: Annotated[  # Read by the commands, which have this option too.
+        str | None, typer.Option("--config", metavar="FILE", help=HELP_TEXT, show_default=False)
+    ] = None,
 ) -> None:
     """Designs excitation experiments for robots, identifies their dynamics, and diagnoses model errors."""

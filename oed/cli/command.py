@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import re
+import shlex
+import sys
 from collections.abc import Collection, Iterable, Iterator, Sequence
 from typing import Any
 
@@ -26,7 +28,30 @@ class Command(TyperCommand):
         again = {name for p in self.params if getattr(p, "multiple", False) for name in p.opts}
         if again and all(p.param_type_name == "option" for p in self.params):
             args = list(_repeated(args, again))
-        return super().parse_args(ctx, args)
+        left = super().parse_args(ctx, list(args))
+        if ctx.default_map:
+            from oed.cli.configuration.defaults import LEFT_OUT
+            from oed.cli.configuration.exclusions import left_out
+
+            unused = left_out(ctx)
+            if unused:
+                ctx.meta[LEFT_OUT] = unused
+                ctx.params.clear()
+                left = super().parse_args(ctx, list(args))
+        return left
+
+    def invoke(self, ctx: Any) -> Any:
+        """Runs the command, and says which options come from the configuration file."""
+        if not ctx.default_map:
+            return super().invoke(ctx)
+        from oed.cli.configuration.defaults import FILE, described, used_options
+        from oed.reports.rendering.command_lines import completed_by
+
+        words = described(used_options(ctx))
+        if words and not ctx.params.get("quiet"):
+            print(f"note: from {ctx.meta[FILE].path}: {shlex.join(words)}", file=sys.stderr)
+        with completed_by(words):
+            return super().invoke(ctx)
 
     def format_options(self, ctx: Any, formatter: Any) -> None:
         """Writes the options by purpose: robot, input, settings, output."""

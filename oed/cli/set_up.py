@@ -21,7 +21,7 @@ PayloadOption = Annotated[
         "--payload",
         help=(
             "Known payload in a log, as NUMBER=KG,X,Y,Z: number of the log, mass [kg], centre of mass in the flange "
-            "frame [m]; or NUMBER=payload.json. With one log, NUMBER= may be left out."
+            "frame [m]; or NUMBER=payload.json. Without NUMBER= it applies to all logs."
         ),
         show_default=False,
     ),
@@ -42,7 +42,7 @@ GravityOption = Annotated[
         "--gravity",
         help=(
             "Gravity in the base frame for a log with a tilted base, as NUMBER=X,Y,Z: number of the log, gravity "
-            "[m/s2]."
+            "[m/s2]. Without NUMBER= it applies to all logs."
         ),
         show_default=False,
     ),
@@ -86,8 +86,8 @@ def with_known_setup(logs: Sequence[Log], payloads: list[str] | None, gravities:
     Args:
         logs: in the order in which they were read; they are numbered from 1.
         payloads: each NUMBER=KG,X,Y,Z, a point mass [kg] and its position [m] in the flange's frame, or NUMBER=FILE, a
-            payload.json; of a single log without the number.
-        gravities: each NUMBER=X,Y,Z [m/s2], in the base frame.
+            payload.json; without the number of all logs that no other text names.
+        gravities: each NUMBER=X,Y,Z [m/s2], in the base frame, or without the number.
 
     Raises:
         InputError: a text of another form, a number without a log, or a number given twice.
@@ -112,14 +112,20 @@ def _by_number(
     from robots.common.errors import InputError
 
     found: dict[int, NDArray[np.float64]] = {}
+    everywhere: NDArray[np.float64] | None = None
     for text in texts:
         name, equals, values = text.partition("=")
-        if not equals and option == "--payload" and count == 1:
-            name, values = "1", text
+        if not equals:
+            name, values = "0", text
         try:
             number, value = int(name), read(values)
         except ValueError:
             raise InputError(f"{option} {text}", allowed=_EXAMPLES[option]) from None
+        if not equals:
+            if everywhere is not None:
+                raise InputError(f"{option} without a number twice", allowed="one for all logs")
+            everywhere = value
+            continue
         if not 1 <= number <= count:
             raise InputError(
                 f"{option} of log {number}", allowed=f"1 to {count}, the number of the log in reading order"
@@ -127,7 +133,7 @@ def _by_number(
         if number in found:
             raise InputError(f"{option} of log {number} twice", allowed="one per log")
         found[number] = value
-    return found
+    return found if everywhere is None else {**dict.fromkeys(range(1, count + 1), everywhere), **found}
 
 
 _EXAMPLES = {

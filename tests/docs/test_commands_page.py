@@ -14,7 +14,7 @@ from oed.cli.app import app
 PAGE = (Path(__file__).parents[2] / "docs" / "commands.md").read_text(encoding="utf-8")
 SECTIONS = dict(re.findall(r"^## `oed (\w+)`\n(.*?)(?=^## |\Z)", PAGE, flags=re.MULTILINE | re.DOTALL))
 # What every command has is described once, at the top of the page.
-COMMON = {"--force", "--json", "--quiet", "--help"}
+COMMON = {"--force", "--json", "--quiet", "--config", "--help"}
 
 
 def commands() -> dict[str, Any]:

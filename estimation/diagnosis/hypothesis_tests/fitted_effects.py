@@ -102,10 +102,10 @@ class FittedEffect:
         there = sum(e for j, e in zip(self.group.joints, energies, strict=True) if j in joints)
         return self.gain * there / max(sum(energies), 1e-300)
 
-    def acts(self) -> NDArray[np.bool_]:
-        """Returns the white rows (N,) in which its torque exceeds `ACTS` times its maximum on any joint."""
+    def acts(self, share: float = ACTS) -> NDArray[np.bool_]:
+        """Returns the white rows (N,) in which its torque exceeds a share of its maximum on any joint."""
         torques = [np.abs(part @ self.coefficients) for part in self.group.columns]
-        return np.asarray(np.max([torque > ACTS * torque.max(initial=0.0) for torque in torques], axis=0))
+        return np.asarray(np.max([torque > share * torque.max(initial=0.0) for torque in torques], axis=0))
 
     def share_beside(self, other: FittedEffect, joint: int) -> float:
         """Returns the share of its torque energy on a joint, from 0, in rows where another effect acts."""

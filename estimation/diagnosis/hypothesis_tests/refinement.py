@@ -33,13 +33,20 @@ SHORT_TRAVEL_FACTOR = 1.05
 
 
 def refine(
-    problem: Problem, hypothesis: Hypothesis, start: tuple[float, ...], accepted: Accepted, *, effort: int = EFFORT
+    problem: Problem,
+    hypothesis: Hypothesis,
+    start: tuple[float, ...],
+    accepted: Accepted,
+    *,
+    effort: int = EFFORT,
+    others: bool = True,
 ) -> FittedEffect:
     """Searches the shape with the best BIC of an effect, starting from the values `start`.
 
     Coefficients and base model are projected out at each step (variable projection, Golub and Pereyra 1973), so only
     shape parameters are searched. Usual design values near the optimum are tried last; they do not count as fitted.
-    `effort` is the number of evaluations per parameter; 0 evaluates only the start.
+    `effort` is the number of evaluations per parameter; 0 evaluates only the start. `others`: whether other optima are
+    searched, too.
     """
     situation = problem.state_for(hypothesis.effect)
     bounds = hypothesis.effect.bounds(situation, hypothesis.joint)
@@ -82,8 +89,8 @@ def refine(
             limits, kinds = tuple(bounds[k] for k in free), [scales[k] for k in free]
             climb(along, tuple(at[k] for k in free), limits, kinds, effort, first)
             summit = best[0]
-            others = hypothesis.effect.other_optima(situation, hypothesis.joint, summit.shape, summit.coefficients)
-            for slopes in others:
+            optima = hypothesis.effect.other_optima(situation, hypothesis.joint, summit.shape, summit.coefficients)
+            for slopes in optima if others else ():
                 gains = [evaluate(slope) for slope in slopes]
                 at[:] = slopes[int(np.argmax(gains))]
                 climb(along, tuple(at[k] for k in free), limits, kinds, effort, first)

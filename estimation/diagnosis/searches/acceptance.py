@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 from scipy.ndimage import maximum_filter1d
 
-from estimation.diagnosis.calibration import MIN_BIC_GAIN
+from estimation.diagnosis.calibration import IMPACT_SHARE, MIN_BIC_GAIN
 from estimation.diagnosis.hypothesis_tests.fitted_effects import FittedEffect
 from estimation.diagnosis.hypothesis_tests.joint_agreement import per_joint_evidence, shared_coefficient_gain
 from estimation.diagnosis.hypothesis_tests.problem import Problem
@@ -136,7 +136,7 @@ def delay_supported_away_from_impacts(
     reach = round(ANSWERS / (problem.recording.step * problem.whitening.stride))
     beside = np.zeros(problem.rows, dtype=bool)
     for member in kicks:
-        near = maximum_filter1d(member.acts(), 2 * reach + 1)
+        near = maximum_filter1d(member.acts(IMPACT_SHARE), 2 * reach + 1)
         beside |= near & (near.mean() < MOSTLY)
     if not beside.any():
         return True

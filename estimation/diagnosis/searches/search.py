@@ -192,7 +192,7 @@ def _searched(
     entries = measure(problem, hypotheses, _scan_progress(bar, share, 0.2))
     give_back()
     advance = _note_progress(bar, share + 0.25)
-    selection = select(problem, entries, false_alarm=false_alarm, advance=advance, known=known)
+    problem, selection = select(problem, entries, false_alarm=false_alarm, advance=advance, known=known)
     members = [found.effect for found in selection.found]
     return Search(problem, with_total_torque(problem, members, hypotheses), entries, selection)
 

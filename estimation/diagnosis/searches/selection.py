@@ -25,6 +25,7 @@ from estimation.diagnosis.searches.acceptance import (
 )
 from estimation.diagnosis.searches.candidate_screening import screen_candidates
 from estimation.diagnosis.searches.joint_shape_refinement import refine_shapes_jointly
+from estimation.diagnosis.searches.relinearisation import relinearise
 from estimation.diagnosis.searches.swap_search import refine_candidates, refine_with_swaps, remeasure
 from robots.terms.effect_bases.capabilities import Persistence
 
@@ -70,7 +71,7 @@ def select(
     false_alarm: float,
     advance: Callable[[str], None] = lambda note: None,
     known: Mapping[Hypothesis, tuple[float, ...]] | None = None,
-) -> Selection:
+) -> tuple[Problem, Selection]:
     """Adds effects as long as the strongest is significant, with refinement and swaps after each step.
 
     An effect that is dropped after the others are refined is not tried again. The search stops when a set of effects
@@ -84,7 +85,7 @@ def select(
         known: further starting shapes, from another search.
 
     Returns:
-        The selected effects, without rivals.
+        The data, with the base model fitted beside the selected effects, and these effects, without rivals.
     """
     members, p_values = _visible_in_torque(problem, entries, false_alarm, ())
     seen = {member.hypothesis for member in members}
@@ -124,7 +125,8 @@ def select(
         candidates[0] = refit_event_window(problem, candidates[0], accepted)
         members.append(candidates[0])
         p_values.append(chance[candidates[0].hypothesis])
-        won[candidates[0].hypothesis] = candidates[0].gain
+        problem, members = relinearise(problem, members)
+        won[candidates[0].hypothesis] = members[-1].gain
         # With the new effect, more effects may show in the total torque, such as clipping.
         more, sure = _visible_in_torque(problem, entries, false_alarm, members)
         seen |= {member.hypothesis for member in more}
@@ -146,7 +148,8 @@ def select(
         elif now in visited:
             break
         visited.append(now)
-    members = refine_shapes_jointly(problem, members)
+    if len(members) > 1:
+        problem, members = relinearise(problem, refine_shapes_jointly(problem, members))
     found = [
         SelectedEffect(remeasure(problem, member, accept_all_but(problem, members, i)), p_value)
         for i, (member, p_value) in enumerate(zip(members, p_values, strict=True))
@@ -158,7 +161,7 @@ def select(
         or is_accepted(problem, f.effect, f.p_value, [*members[:i], *members[i + 1 :]], false_alarm)
     ]
     order = sorted(kept, key=lambda f: -f.effect.gain)
-    return Selection(tuple(order), frozenset(seen), slight)
+    return problem, Selection(tuple(order), frozenset(seen), slight)
 
 
 def with_rivals(problem: Problem, entries: Sequence[Entry], selection: Selection) -> Selection:

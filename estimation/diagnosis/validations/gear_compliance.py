@@ -19,6 +19,7 @@ from robots.signals import Log
 from robots.terms.base import force_unit, length_unit
 from robots.terms.effect_bases.unknown_rotor import KNOWN
 from robots.terms.effects import EFFECTS
+from robots.terms.effects.joint_elasticity import DAMPING
 from robots.terms.situations.situation import Situation
 
 Array = NDArray[np.float64]
@@ -247,9 +248,9 @@ def _extension(now: Situation, joint: int, compliance: float, error: float) -> E
     return Extension(
         effect=EFFECT,
         joint=joint,
-        shape=(stiffness, KNOWN),
+        shape=(stiffness, KNOWN, DAMPING),
         coefficients=np.array([compliance]),
-        covariance=np.diag([error**2, np.inf, np.inf]),
+        covariance=np.diag([error**2, np.inf, np.inf, np.inf]),
     )
 
 

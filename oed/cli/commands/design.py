@@ -8,6 +8,7 @@ from typing import Annotated
 
 import typer
 
+from oed.cli.configuration.defaults import is_from_file
 from oed.cli.console import Console
 from oed.cli.options import (
     BaseFrequencyOption,
@@ -186,7 +187,9 @@ def design(
 
         if payload_only:
             refuse_beside_payload(context)
-            given = {name for name in ("criterion", "strokes") if is_given(context, name)}
+            given = {
+                name for name in ("criterion", "strokes") if is_given(context, name) or is_from_file(context, name)
+            }
             criterion = criterion if "criterion" in given else "d"
             strokes = strokes if "strokes" in given else False
         with ResultFolder(out, force, names=["trajectory.csv", "design.json", "report.html"]) as folder:

@@ -108,6 +108,11 @@ def payload(
             raise InputError("--without and --model together", allowed="one of them")
         if without and robot is None:
             raise InputError("no robot", remedy="name it with --robot; its geometry is enough")
+        if without and any("=" not in text for text in payload or []):
+            raise InputError(
+                "--payload without a number beside --without",
+                allowed="NUMBER=KG,X,Y,Z, because it is not clear whether logs without the payload carry it too",
+            )
         pose = _pose(frame)
         forms = list(dict.fromkeys(payload_export(name) for words in to or [] for name in words.split(",")))
         with ExitStack() as files:

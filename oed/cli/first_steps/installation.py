@@ -74,6 +74,17 @@ def installation() -> dict[str, Any]:
     }
 
 
+def with_configuration(found: dict[str, Any], state: dict[str, Any]) -> dict[str, Any]:
+    """Adds the configuration file to the description of an installation.
+
+    Args:
+        found: as `installation` gives it.
+        state: ``file``, ``origin``, ``keys`` and ``problem``, as `configuration_state` gives them.
+    """
+    problem = state["problem"]
+    return {**found, "configuration": state, "problems": [*found["problems"], *([problem] if problem else [])]}
+
+
 def requires_of(package: str = PACKAGE) -> list[tuple[str, str, str | None]]:
     """Lists what a package requires: name, versions, and the extra that asks for it.
 
@@ -97,11 +108,12 @@ def installation_text(found: dict[str, Any]) -> str:
     """Writes the description of an installation.
 
     Args:
-        found: as `installation` gives it.
+        found: as `installation` gives it, with or without the configuration file.
     """
     lines = [
         f"{PACKAGE} {found['version']}, Python {found['python']}, {found['platform']}, {found['cores']} cores",
         f"C compiler: {found['compiler'] or 'none; results are the same, but designs take longer'}",
+        *([_configuration_line(found["configuration"])] if "configuration" in found else []),
         "Libraries:",
     ]
     width = max((len(entry["name"]) for entry in found["libraries"]), default=0)
@@ -116,6 +128,14 @@ def installation_text(found: dict[str, Any]) -> str:
     problems = found["problems"]
     lines.append("No problems found." if not problems else "Problems: " + "; ".join(problems))
     return "\n".join(lines)
+
+
+def _configuration_line(state: dict[str, Any]) -> str:
+    if state["file"] is None:
+        return "Configuration file: none (no oed.toml here, no OED_CONFIG, no --config)"
+    if state["problem"]:
+        return f"Configuration file: {state['file']}, with a problem"
+    return f"Configuration file: {state['file']} ({state['origin']}): {', '.join(state['keys']) or 'empty'}"
 
 
 def _compiler() -> str | None:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 COMMANDS: dict[str, tuple[str, ...]] = {
     "First steps": ("example", "robots", "robot", "effects", "doctor"),
     "Experiments": ("design", "pareto", "retime", "campaign", "export"),
@@ -28,6 +30,7 @@ OPTIONS = {
             "before",
             "own_clocks",
             "mapping",
+            "config",
             "torque_is",
             "model",
             "campaign_folder",
@@ -124,7 +127,7 @@ FIRST = (
 """Lines at the end of the help of ``oed``."""
 
 
-def group_of(groups: dict[str, tuple[str, ...]], name: str, other: str) -> str:
+def group_of(groups: Mapping[str, tuple[str, ...]], name: str, other: str) -> str:
     """Finds the group of a name.
 
     Args:

@@ -10,6 +10,7 @@ import typer
 from typer.main import get_command
 
 from oed.cli.command import HELP, Command
+from oed.cli.configuration.defaults import config_parameter
 
 
 class LazyCommands(MutableMapping[str, Any]):
@@ -29,7 +30,9 @@ class LazyCommands(MutableMapping[str, Any]):
                 add_completion=False, pretty_exceptions_enable=False, rich_markup_mode=None, context_settings=HELP
             )
             alone.command(name, cls=Command)(self._functions[name])
-            self._made[name] = get_command(alone)
+            made = get_command(alone)
+            made.params.append(config_parameter(self._functions))
+            self._made[name] = made
         return self._made[name]
 
     def __setitem__(self, name: str, command: Any) -> None:

@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-import shlex
-import sys
 from datetime import UTC, datetime
-from pathlib import Path
 
+from oed.reports.rendering.command_lines import command_line
 from oed.reports.rendering.matplotlib_ import save_png
 from oed.reports.rendering.page import Footer, Page, render
 from robots.common.files import ResultFolder, write_atomic
@@ -25,5 +23,4 @@ def save_page(page: Page, folder: ResultFolder, *, png: bool = False) -> None:
 
 def footer() -> Footer:
     """Says which tool made the page, when, and by which command."""
-    command = shlex.join([Path(sys.argv[0]).name, *sys.argv[1:]])
-    return Footer(tool=f"robot-oed {VERSION}", date=f"{datetime.now(UTC):%Y-%m-%d %H:%M} UTC", command=command)
+    return Footer(tool=f"robot-oed {VERSION}", date=f"{datetime.now(UTC):%Y-%m-%d %H:%M} UTC", command=command_line())

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.integrate import cumulative_trapezoid
 
 from robots.terms.base import force_unit, length_unit
 from robots.terms.effect_bases.base import Coefficient, Effect, Place, Shape, Situation
@@ -20,48 +21,54 @@ from robots.terms.effect_bases.unknown_rotor import (
     rotor_grid,
     rotors_between,
 )
-from robots.terms.effects.joint_elasticity import link_inertia, windup
+from robots.terms.effects.joint_elasticity import least_inertia, link_inertia, windup
 
 if TYPE_CHECKING:
     from robots.robot import Robot
 
 Array = NDArray[np.float64]
 
-QUICKEST, SLOWEST = 0.004, 0.3
-"""Shortest and longest time [s] in which the link crosses the gap; the sample period is a lower limit, too."""
-SCANNED = (0.006, 0.012, 0.025, 0.05, 0.1, 0.2)
-"""Crossing times [s] of a scan."""
-ASIDE = (-0.03, -0.015, 0.0, 0.015, 0.03)
-"""Loads of a scan at which the link changes sides, as fractions of the load's RMS."""
+SLOWEST = 1.0
+"""Longest time [s] in which a link that left a flank is followed until it lands."""
+SCANNED = tuple(0.006 * 1.25**k for k in range(17))
+"""Crossing times [s] of a scan, up to 0.2; steps of a quarter, because impacts at wrong times explain nothing."""
+ASIDE = (-0.02, 0.0, 0.02)
+"""Loads of a scan at which the link leaves its flank, as fractions of the load's RMS."""
 FARTHEST = 0.1
 """Largest such fraction: a base model whose zero load is less certain cannot show backlash."""
 BRIEFEST, LANDS = 0.012, 0.02
 """Shortest and default time [s] in which a flank stops the link. The time of an impact is known to some milliseconds,
 so predicting a shorter impact would increase the error."""
-REBOUND, SETTLES = 0.2, 2.0
-"""Fraction of its speed with which a link rebounds from the flank, and the decay time of that in landing times."""
-LEAST, MOST = 1 / 8, 8.0
-"""Factors on the gap from the crossing time: the gap grows with the cube of that time, which is known to a factor of
-two."""
-
+SOFT = 0.03
+"""Landing time [s] of a scan: long, so that crossing times between those of the scan are found, too."""
+SETTLES = 0.05
+"""Time [s] after a landing before the link can leave again: the controller's response to the impact."""
+LEAST, MOST = 1 / 2, 2.0
+"""Factors on the gap from the crossing time. The size of the impacts is known to this factor; the crossing time, which
+grows with the cube root of the gap, is known better."""
 HOVERS = 0.05
-"""Fraction of its RMS that a load must exceed on the new side to have changed sign."""
+"""Fraction of its RMS that a load must exceed on the new side to count as a crossing of the scan."""
 
 INEXACT = 0.2
 """Relative error of the formula, because links rebound differently and drives yield to the impact."""
+CROSSED = 0.1
+"""Relative error of the gap by the crossing times: the motor answers during the crossing."""
+UNEXPLAINED = 0.25
+"""Fraction of the effect that the formula may leave."""
 SMALLEST = 5e-7
 """Half backlash below which it counts as zero [rad or m]: the roughness of teeth at a radius of 0.1 m."""
 
 
 class Backlash(Effect):
-    """The link lags its encoder by (b / 2) side; the side changes within T + L after the load changes sign.
+    """The link lags its encoder by (b / 2) side; between the flanks it moves freely: M lag'' = load.
 
-    A load that grows by r per second moves the link's inertia M over the gap b in T = (6 b M / r)^(1/3). T is at most
-    the parameter `longest`, because the motor moves, too. The motion in the gap grows with the third power of time, so
-    the link is fastest when it lands. The other flank stops it within a time L by a half wave of force. L is half a
-    period of the link on the stiffness of teeth and drive. The torque is therefore slightly too small during the
-    crossing; then it shows a short and large impact. It follows from the lag as for an elastic gear, at zero crossings
-    of the load, not of the velocity.
+    The link leaves its flank when the gear's load changes sign, and is followed until it reaches the other flank, or
+    its own one again if the load returns. A load that grows by r per second moves it over the gap b in
+    (6 b M / r)^(1/3). The flank stops it within a time L by a half wave of force. L is the duration of the impact and
+    the error of its time; the force is centred on that time. The link does not leave before it has settled, because the
+    impact moves the motor, and that shows in the load by the motor's motion. The torque is therefore too small during
+    the crossing; then it shows a short and large impact. It follows from the lag as for an elastic gear, at zero
+    crossings of the load, not of the velocity.
 
     Size and duration of the impacts both determine the gap, but only roughly, because real crossings vary. The zero of
     the load is known to some per cent, because a log separates offset and load poorly. It is a shape parameter.
@@ -73,8 +80,7 @@ class Backlash(Effect):
     gear_load: ClassVar[GearLoad] = GearLoad.FEELS
     above_band: ClassVar[AboveBand] = AboveBand.COUNTS
     shapes: ClassVar[tuple[Shape, ...]] = (
-        Shape("gap_crossed", "rad", 1e-7, 0.2, "log"),
-        Shape("longest", "s", 0.01, SLOWEST, "log", (SLOWEST,), default=SLOWEST),
+        Shape("gap_crossed", "rad", 1e-7, 0.2, "log", inexact=CROSSED),
         Shape("crossed_at", "N m", -np.inf, np.inf, "linear", (0.0,), default=0.0),
         ROTOR,
         Shape("landing", "s", BRIEFEST, 0.1, "log", (LANDS,), default=LANDS),
@@ -103,17 +109,16 @@ class Backlash(Effect):
                 continue
             gaps = [time**3 * float(np.median(quickness)) / 6.0 for time in SCANNED]
             able = [gap for gap in gaps if self.shapes[0].lower <= gap <= self.shapes[0].upper]
-            points += [(gap, SLOWEST, aside * size, rotor, LANDS) for gap in able for aside in ASIDE]
+            points += [(gap, aside * size, rotor, SOFT) for gap in able for aside in ASIDE]
         return tuple(points)
 
     def bounds(self, situation: Situation, joint: Place) -> tuple[tuple[float, float], ...]:
         """Bounds the load at which sides change to values near zero, and the rotor inertia to its known range."""
         assert joint is not None
-        gap, longest, *_, landing = self.shapes
+        gap, *_, landing = self.shapes
         most = FARTHEST * _size(situation, joint)
         return (
             (gap.lower, gap.upper),
-            (longest.lower, longest.upper),
             (-most, most),
             rotor_bounds(situation, joint),
             (landing.lower, landing.upper),
@@ -127,51 +132,36 @@ class Backlash(Effect):
         # Each parameter has its usual or its refined value; the last combination is the refined shape itself.
         assert joint is not None
         rotors = (KNOWN,) if is_sure(situation, joint) else (KNOWN, None)
-        either = ((LANDS, None), rotors, (0.0, None), (SLOWEST, None), (gap, None))
-        return tuple((g, s, z, r, lands) for lands, r, z, s, g in product(*either))[:-1]
+        either = ((LANDS, None), rotors, (0.0, None), (gap, None))
+        return tuple((g, z, r, lands) for lands, r, z, g in product(*either))[:-1]
 
     def other_optima(
         self, situation: Situation, joint: Place, shape: tuple[float, ...], coefficients: Array
     ) -> tuple[tuple[tuple[float, ...], ...], ...]:
-        """Lists starts with the gap that follows from the torque's size, and starts with other rotor inertias.
+        """Lists starts with other rotor inertias.
 
-        The first start keeps the present crossing time as `longest`; free motion in that time means a smaller gap.
         Another rotor inertia makes the load change sign at other times. Its optimum is narrow, so that a joint search
         over rotor inertia and load misses it.
         """
         assert joint is not None
-        gap = float(np.clip(2.0 * coefficients[0], self.shapes[0].lower, self.shapes[0].upper))
-        _, _, quickness = _crossings(situation, joint, *shape[2:4])
-        if not len(quickness):
-            return ()
-        now = float(np.median(_flights(situation, shape, quickness)))
-        slower = ((gap, max(now, self.shapes[1].lower), *shape[2:]),) if gap > shape[0] else ()
         rotors = rotors_between(situation, joint)
-        turned = tuple((size * shape[0], SLOWEST, 0.0, rotor, shape[4]) for size in (1.0, 2.0) for rotor in rotors)
-        return tuple(starts for starts in (slower, turned) if starts)
+        turned = tuple((size * shape[0], 0.0, rotor, shape[3]) for size in (1.0, 2.0) for rotor in rotors)
+        return (turned,) if turned else ()
 
     def columns(self, situation: Situation, joint: Place, shape: tuple[float, ...] = ()) -> Array:
         """Evaluates the torque of all joints per half backlash of one joint (N, n, 1)."""
         assert joint is not None
-        _, _, at, rotor, landing = shape
-        times, ways, quickness = _crossings(situation, joint, at, rotor)
-        flights = _flights(situation, shape, quickness)
-        side, rate, curve = (np.zeros(len(situation)) for _ in range(3))
+        gap, at, rotor, landing = shape
         load = load_beside(situation, joint, rotor) - at
+        pushed = load / least_inertia(situation, joint, rotor) / (gap / 2)
+        lag = np.empty(len(situation))
         for run in situation.runs:
-            t = situation.t[run]
-            inside = (times >= t[0]) & (times <= t[-1])
-            start, jump, flight = times[inside], 2 * ways[inside], flights[inside]
-            begins, last = np.searchsorted(t, (start, start + flight + (1 + SETTLES) * landing))
-            # Rows of all crossings, concatenated; crossings may overlap.
-            count = last - begins
-            of = np.repeat(np.arange(len(start)), count)
-            rows = np.arange(len(of)) + np.repeat(begins - np.cumsum(count) + count, count)
-            crossed, speed, push = (jump[of] * part for part in _course(t[rows] - start[of], flight[of], landing))
-            curve[run], rate[run], crossed = (np.bincount(rows, part, len(t)) for part in (push, speed, crossed))
-            first = -ways[inside][0] if inside.any() else np.sign(np.sum(load[run]))
-            side[run] = first + np.cumsum(np.bincount(last, jump, len(t) + 1)[: len(t)]) + crossed
-        return windup(situation, joint, side, rate, curve, rotor)[:, :, None]
+            lag[run] = _spread(_lag(situation.t[run], pushed[run]), landing, situation.period)
+        return windup(situation, joint, lag, *situation.derivatives(lag), rotor)[:, :, None]
+
+    def leakage(self, robot: Robot, joint: int, shape: tuple[float, ...] = ()) -> float:
+        """Returns a quarter: links rebound differently, and the motor yields to the impact."""
+        return UNEXPLAINED
 
     def describe(
         self,
@@ -193,43 +183,57 @@ class Backlash(Effect):
         """Returns the gear's load."""
         assert joint is not None
         unit = force_unit(situation.robot, joint - 1)
-        return f"load of joint {joint} [{unit}]", load_beside(situation, joint, shape[3] if len(shape) > 3 else KNOWN)
+        return f"load of joint {joint} [{unit}]", load_beside(situation, joint, shape[2] if len(shape) > 2 else KNOWN)
 
 
-def _course(since: Array, flight: Array, landing: float) -> tuple[Array, Array, Array]:
-    """Evaluates the motion of a link through a gap of size one.
-
-    A force that grows from zero accelerates the link. At the flank a half wave of force reverses its velocity to the
-    fraction `REBOUND`, which decays within `SETTLES` landing times.
+def _lag(t: Array, pushed: Array) -> Array:
+    """Follows a link between two flanks at 1 and -1, which take all its speed.
 
     Args:
-        since: time since the start of the crossing (K,) [s].
-        flight: time until the link reaches the flank (K,) [s].
-        landing: time in which the flank stops the link [s].
+        t: times (N,) [s].
+        pushed: acceleration of the lag while the link is free (N,) [1/s2].
 
     Returns:
-        The position (K,), and its two derivatives [1/s] and [1/s2].
+        The lag (N,).
     """
-    lost = SETTLES * landing
-    grows = 1.0 / (flight**3 / 6 + flight**2 / 4 * ((1 - REBOUND) * landing - REBOUND * lost))  # of its acceleration
-    speed, over = grows * flight**2 / 2, grows * flight**3 / 6
-    u, k = np.pi * (since - flight) / landing, np.pi * np.clip((since - flight - landing) / lost, 0.0, 1.0)
-    mean, swing, back = speed * (1 - REBOUND) / 2, speed * (1 + REBOUND) / 2, speed * REBOUND / 2
-    when = [since < flight, since < flight + landing]
-    there = over + mean * landing - back * lost * (k + np.sin(k)) / np.pi
-    position = [grows * since**3 / 6, over + landing * (mean * u + swing * np.sin(u)) / np.pi]
-    rate = [grows * since**2 / 2, mean + swing * np.cos(u)]
-    curve = [grows * since, -swing * np.pi / landing * np.sin(u)]
-    return (
-        np.select(when, position, there),
-        np.select(when, rate, -back * (1 + np.cos(k))),
-        np.select(when, curve, back * np.pi / lost * np.sin(k)),
-    )
+    speed = cumulative_trapezoid(pushed, t, initial=0.0)
+    way = cumulative_trapezoid(speed, t, initial=0.0)
+    changes = np.flatnonzero(pushed[:-1] * pushed[1:] < 0) + 1
+    lag = np.empty(len(t))
+    side = 1.0 if np.sum(pushed[: max(len(t) // 100, 1)]) >= 0 else -1.0
+    row = settled = 0
+    while row < len(t):
+        # The link stays until the load pushes it off its flank.
+        leaves = row
+        if side * pushed[row] >= 0:
+            leaves = next((int(c) for c in changes[np.searchsorted(changes, row) :] if side * pushed[c] < 0), len(t))
+        lag[row:leaves] = side
+        if leaves == len(t):
+            break
+        begins = t[leaves]
+        if leaves > settled:
+            before, after = pushed[leaves - 1], pushed[leaves]
+            begins = t[leaves - 1] + (t[leaves] - t[leaves - 1]) * before / (before - after)
+        v0, x0 = (float(np.interp(begins, t, values)) for values in (speed, way))
+        last = min(int(np.searchsorted(t, t[leaves] + SLOWEST)), len(t))
+        free = side + way[leaves:last] - x0 - v0 * (t[leaves:last] - begins)
+        outside = np.flatnonzero(np.abs(free) > 1.0)
+        lands = leaves + int(outside[0]) if len(outside) else last
+        lag[leaves:lands] = free[: lands - leaves]
+        if lands == len(t):
+            break
+        side = float(np.sign(free[outside[0]])) if len(outside) else -side
+        row = settled = max(int(np.searchsorted(t, t[lands] + SETTLES)), lands + 1)
+        lag[lands:row] = side
+    return lag
 
 
-def _flights(situation: Situation, shape: tuple[float, ...], quickness: Array) -> Array:
-    """Computes the times [s] from each load reversal to the landing: that of free motion, at most `longest`."""
-    return np.clip((6.0 * shape[0] / quickness) ** (1 / 3), max(QUICKEST, situation.period), shape[1])
+def _spread(lag: Array, landing: float, period: float) -> Array:
+    """Spreads each change of speed over the duration of a landing [s], as a half wave of force does."""
+    reach = int(0.5 * landing / period) if period else 0
+    kernel = np.cos(np.pi * period / landing * np.arange(-reach, reach + 1))
+    padded = np.pad(lag, reach, mode="edge")
+    return np.convolve(padded, kernel / kernel.sum(), mode="valid")
 
 
 def _size(situation: Situation, joint: int) -> float:

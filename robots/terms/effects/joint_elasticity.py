@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from itertools import product
 from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
@@ -19,7 +20,7 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 
 DAMPING = 0.05
-"""Damping ratio of the resonance."""
+"""Damping ratio of the resonance, unless the data show another one."""
 INEXACT = 0.05
 """Relative error of the dynamic stiffness in addition to that of the data, by errors of inertia and damping."""
 OWN = 0.03
@@ -40,7 +41,8 @@ class JointElasticity(Effect):
     c is the gear's compliance and w the link's load. It follows from M_jj w'' / K + w = tau_L, where tau_L is the load
     computed from the motor's motion. Above the resonance sqrt(K / M_jj), which depends on the pose, the link no longer
     follows the motor. The dynamic stiffness K equals 1 / c if the base model's link inertia is correct. The inertia of
-    an unknown rotor is part of neither M nor tau_L.
+    an unknown rotor is part of neither M nor tau_L. The damping is fitted, too: a wrong one biases compliance and rotor
+    inertia where the motion excites the resonance.
     """
 
     name: ClassVar[str] = "joint_elasticity"
@@ -50,6 +52,7 @@ class JointElasticity(Effect):
     shapes: ClassVar[tuple[Shape, ...]] = (
         Shape("dynamic_stiffness", "N m/rad", 1e-6, 1e12, "log", inexact=INEXACT),
         ROTOR,
+        Shape("damping_ratio", "", 1e-3, 0.5, "log", (DAMPING,), default=DAMPING, beside=True),
     )
     rivals: ClassVar[tuple[str, ...]] = ("backlash", "time_delay", "current_lag", "encoder_offset")
     experiments: ClassVar[tuple[str, ...]] = ("multisine", "payload")
@@ -64,25 +67,26 @@ class JointElasticity(Effect):
         """Lists stiffnesses for the resonances in `SCANNED`, for each rotor inertia of the scan."""
         assert joint is not None
         rotors = rotor_grid(situation, joint)
-        return tuple((_stiffness(situation, joint, f, rotor), rotor) for rotor in rotors for f in SCANNED)
+        return tuple((_stiffness(situation, joint, f, rotor), rotor, DAMPING) for rotor in rotors for f in SCANNED)
 
     def bounds(self, situation: Situation, joint: Place) -> tuple[tuple[float, float], ...]:
         """Bounds the stiffness to resonances of usual gears, and the rotor inertia to its known range."""
         assert joint is not None
         rotor = rotor_bounds(situation, joint)
         softest = _stiffness(situation, joint, LOWEST, rotor[1])
-        return (softest, _stiffness(situation, joint, HIGHEST, rotor[0])), rotor
+        damping = self.shapes[2]
+        return (softest, _stiffness(situation, joint, HIGHEST, rotor[0])), rotor, (damping.lower, damping.upper)
 
     def likely(
         self, situation: Situation, joint: Place, shape: tuple[float, ...], coefficients: Array
     ) -> tuple[tuple[float | None, ...], ...]:
-        """Lists the stiffness that equals the inverse compliance, the known rotor, and both together."""
+        """Lists combinations of the stiffness 1 / c, the known rotor and the usual damping with refined values."""
         assert joint is not None
-        plain: tuple[tuple[float | None, ...], ...] = () if is_sure(situation, joint) else ((None, KNOWN),)
-        if coefficients[0] <= 0:
-            return plain
-        stiffness = float(np.clip(1.0 / coefficients[0], *self.bounds(situation, joint)[0]))
-        return (stiffness, KNOWN), *plain, *((stiffness, None) for _ in plain)
+        stiffness: tuple[float | None, ...] = (None,)
+        if coefficients[0] > 0:
+            stiffness = (float(np.clip(1.0 / coefficients[0], *self.bounds(situation, joint)[0])), None)
+        rotors: tuple[float | None, ...] = (KNOWN,) if is_sure(situation, joint) else (KNOWN, None)
+        return tuple(product(stiffness, rotors, (DAMPING, None)))[:-1]
 
     def is_plausible(self, robot: Robot, joint: Place, coefficients: Array, shape: tuple[float, ...] = ()) -> bool:
         """Rejects an oscillation whose dynamic stiffness is far from the inverse compliance."""
@@ -92,8 +96,9 @@ class JointElasticity(Effect):
     def columns(self, situation: Situation, joint: Place, shape: tuple[float, ...] = ()) -> Array:
         """Evaluates the torque of all joints per compliance of one joint (N, n, 1)."""
         assert joint is not None
-        stiffness, rotor = shape
-        load = followed(situation, load_beside(situation, joint, rotor), stiffness, _inertia(situation, joint, rotor))
+        stiffness, rotor, damping = shape
+        inertia = least_inertia(situation, joint, rotor)
+        load = followed(situation, load_beside(situation, joint, rotor), stiffness, inertia, damping)
         return windup(situation, joint, load, *situation.derivatives(load), rotor)[:, :, None]
 
     def describe(
@@ -120,8 +125,8 @@ class JointElasticity(Effect):
         return f"second derivative of the load of joint {joint} [{unit}/s2]", curve
 
 
-def followed(situation: Situation, load: Array, stiffness: float, inertia: Array) -> Array:
-    """Filters a load by the dynamics of a link on an elastic gear with a damping ratio of 5 %.
+def followed(situation: Situation, load: Array, stiffness: float, inertia: Array, damping: float = DAMPING) -> Array:
+    """Filters a load by the dynamics of a link on an elastic gear.
 
     If the mean resonance is above 0.4 of the Nyquist frequency, the load is returned unchanged.
 
@@ -130,6 +135,7 @@ def followed(situation: Situation, load: Array, stiffness: float, inertia: Array
         load: load by the motor's motion (N,) [N m or N].
         stiffness: of the gear [N m/rad or N/m].
         inertia: of the link (N,) [kg m2 or kg].
+        damping: ratio of the resonance.
 
     Returns:
         The link's load (N,) [N m or N].
@@ -141,7 +147,7 @@ def followed(situation: Situation, load: Array, stiffness: float, inertia: Array
     # at rest are put before the log.
     k = 1.0 / np.tan(0.5 * w * situation.period)
     share = inertia / np.mean(inertia)
-    stored, lost = k**2 * share, 2 * DAMPING * k * np.sqrt(share)
+    stored, lost = k**2 * share, 2 * damping * k * np.sqrt(share)
     result = np.empty_like(load)
     for run in situation.runs:
         x, m, d = (np.concatenate([values[run][:1]] * 2 + [values[run]]) for values in (load, stored, lost))
@@ -154,7 +160,7 @@ def followed(situation: Situation, load: Array, stiffness: float, inertia: Array
     return result
 
 
-def _inertia(situation: Situation, joint: int, rotor: float = KNOWN) -> Array:
+def least_inertia(situation: Situation, joint: int, rotor: float = KNOWN) -> Array:
     """Returns the link inertia (N,) on a joint's gear, at least a fraction of its largest value.
 
     A wrist's inertia is so small that its fit may be negative, which would make the link unstable.
@@ -165,7 +171,7 @@ def _inertia(situation: Situation, joint: int, rotor: float = KNOWN) -> Array:
 
 def _stiffness(situation: Situation, joint: int, resonance: float, rotor: float = KNOWN) -> float:
     """Computes the stiffness that gives the log's mean inertia a resonance [Hz]."""
-    return float((2 * np.pi * resonance) ** 2 * np.mean(_inertia(situation, joint, rotor)))
+    return float((2 * np.pi * resonance) ** 2 * np.mean(least_inertia(situation, joint, rotor)))
 
 
 def link_inertia(situation: Situation, joint: int, rotor: float = KNOWN) -> Array:

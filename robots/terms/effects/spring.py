@@ -18,7 +18,8 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
-PLAIN = (0.0, 0.0)
+PLAIN = (0.0, 0.0, 3.0)
+LINEAR = (0.0, 0.0, 1.0)
 
 
 # Lever ratios and dead centres [rad] of the scan; a joint that moves less than the third value [rad] does not
@@ -30,16 +31,18 @@ SHORTEST = 0.1
 MEETING = 0.8
 LEVER = Shape("lever_ratio", "", 0.0, 0.95, "linear", inexact=0.1, default=0.0)
 CENTRE = Shape("dead_centre", "rad", -1.5 * np.pi, 1.5 * np.pi, "linear", inexact=0.1, default=0.0)
+# Highest power of the deflection in the torque: a spring is linear unless the data require more.
+POWER = Shape("highest_power", "", 1.0, 3.0, "linear", default=3.0, choices=(1.0, 3.0))
 
 
 class Spring(StaticJointEffect):
     """tau = (p + c1 s + c2 s^2 + c3 s^3) ds/dq, s the deflection of the spring at joint position q.
 
     A cable or a torsion spring has s = q minus the middle of the joint's range. Its p is the base model's offset. A
-    balancer is fixed to both links, at the distances r a and a from the joint. It has s = (L - 1) / r with the length
-    L = sqrt(1 + r^2 - 2 r cos(q - q0)) over a. At the dead centre q0 its ends are nearest. Its c3 is zero, because two
-    orders and the lever's nonlinearity fit a gas spring. The part of the torque proportional to sin(q) or cos(q) is the
-    same as gravity on a level base, and becomes part of the base model.
+    linear one has c2 = c3 = 0. A balancer is fixed to both links, at the distances r a and a from the joint. It has
+    s = (L - 1) / r with the length L = sqrt(1 + r^2 - 2 r cos(q - q0)) over a. At the dead centre q0 its ends are
+    nearest. Its c3 is zero, because two orders and the lever's nonlinearity fit a gas spring. The part of the torque
+    proportional to sin(q) or cos(q) is the same as gravity on a level base, and becomes part of the base model.
     """
 
     name: ClassVar[str] = "spring"
@@ -49,7 +52,7 @@ class Spring(StaticJointEffect):
         "A spring or cable acts on joint {joint}. These logs do not determine its stiffness, because gravity has a "
         "similar effect."
     )
-    shapes: ClassVar[tuple[Shape, ...]] = (LEVER, CENTRE)
+    shapes: ClassVar[tuple[Shape, ...]] = (LEVER, CENTRE, POWER)
     rivals: ClassVar[tuple[str, ...]] = ("base_tilt", "torque_ripple", "asymmetric_friction", "encoder_offset")
     experiments: ClassVar[tuple[str, ...]] = ("static_hold", "second_base_pose", "payload")
 
@@ -65,14 +68,19 @@ class Spring(StaticJointEffect):
         )
 
     def described(self, robot: Robot, joint: Place, shape: tuple[float, ...]) -> tuple[Coefficient, ...]:
-        """Describes the coefficients; the third order of a lever and the preload of a plain spring are unused."""
+        """Describes the coefficients.
+
+        The third order of a lever is unused, the preload of a plain spring, and the higher orders of a linear one.
+        """
         stiffness, second, third, preload = self.parameters(robot, joint)
         none = Coefficient("", "")
-        return (stiffness, second, none, preload) if _has_lever(shape) else (stiffness, second, third, none)
+        if _has_lever(shape):
+            return stiffness, second, none, preload
+        return (stiffness, second, third, none) if shape[2] > 1.0 else (stiffness, none, none, none)
 
     def unused(self, shape: tuple[float, ...]) -> frozenset[int]:
-        """Returns ratio and dead centre if the spring has no levers."""
-        return frozenset() if _has_lever(shape) else frozenset((0, 1))
+        """Returns ratio and dead centre of a spring without levers, and the power, which the coefficients show."""
+        return frozenset((2,)) if _has_lever(shape) else frozenset((0, 1, 2))
 
     def is_plausible(self, robot: Robot, joint: Place, coefficients: Array, shape: tuple[float, ...] = ()) -> bool:
         """Rejects a spring whose ends nearly meet within the joint's limits, which resembles a local fault there."""
@@ -81,34 +89,36 @@ class Spring(StaticJointEffect):
         return not meets and super().is_plausible(robot, joint, coefficients, shape)
 
     def grid(self, situation: Situation, joint: Place) -> tuple[tuple[float, ...], ...]:
-        """Lists a spring without levers, and levers if the joint moves far enough to determine them."""
+        """Lists springs without levers, and levers if the joint moves far enough to determine them."""
         assert joint is not None
-        return (PLAIN,) if np.ptp(situation.q[:, joint - 1]) < TOLD else self.forms(situation, joint)
+        return (LINEAR, PLAIN) if np.ptp(situation.q[:, joint - 1]) < TOLD else self.forms(situation, joint)
 
     def forms(self, situation: Situation, joint: Place) -> tuple[tuple[float, ...], ...]:
-        """Lists a spring without levers, and for a revolute joint those with levers."""
+        """Lists springs without levers, and for a revolute joint those with levers."""
         assert joint is not None
         if situation.robot.chain.joints[joint - 1].kind != "revolute":
-            return (PLAIN,)
-        return (PLAIN, *((ratio, centre) for ratio in RATIOS for centre in CENTRES))
+            return (LINEAR, PLAIN)
+        return (LINEAR, PLAIN, *((ratio, centre, PLAIN[2]) for ratio in RATIOS for centre in CENTRES))
 
     def bounds(self, situation: Situation, joint: Place) -> tuple[tuple[float, float], ...]:
         """Fixes a spring without levers if the data do not determine a lever."""
-        if len(self.grid(situation, joint)) == 1:
-            return ((0.0, 0.0), (0.0, 0.0))
-        return super().bounds(situation, joint)
+        lever, centre, power = super().bounds(situation, joint)
+        if len(self.grid(situation, joint)) == 2:
+            return (0.0, 0.0), (0.0, 0.0), power
+        return lever, centre, power
 
     def likely(
         self, situation: Situation, joint: Place, shape: tuple[float, ...], coefficients: Array
     ) -> tuple[tuple[float | None, ...], ...]:
-        """Lists the spring without levers."""
-        return (PLAIN,)
+        """Lists the springs without levers."""
+        return LINEAR, PLAIN
 
     def row(self, robot: Robot, joint: int, at: Instant) -> casadi.SX:
-        """Builds s s', s^2 s', s^3 s' (zero for a lever) and s'."""
+        """Builds s s', s^2 s', s^3 s' (zero for a lever) and s'; the powers are zero for a linear spring."""
         # With the offset, any middle spans the same torques; the middle of the range gives a good conditioning.
         x = at.q - _middle(robot, joint)
-        plain = casadi.horzcat(x, x**2, x**3, 1.0)
+        higher = at.shape[2] > LINEAR[2]
+        plain = casadi.horzcat(x, higher * x**2, higher * x**3, 1.0)
         ratio, angle = at.shape[0], at.q - at.shape[1]
         length = casadi.sqrt(1.0 + ratio**2 - 2.0 * ratio * casadi.cos(angle))
         s, rate = (ratio - 2.0 * casadi.cos(angle)) / (length + 1.0), casadi.sin(angle) / length

@@ -27,6 +27,7 @@ NUMERICS = {
     "acceptance.py": {"ANSWERS", "MOSTLY", "ASIDE", "SURE"},
     "candidate_screening.py": {"MAX_CANDIDATES", "TWICE"},
     "refit.py": {"CUT", "MIN_BASE_CHANGE", "MIN_EFFECT_CHANGE", "MIN_NOISE_CHANGE", "MIN_SLOW_NOISE_CHANGE"},
+    "relinearisation.py": {"ROUNDS", "CONVERGED", "EFFORT"},
     "search.py": {"SEARCHES", "ROUNDS", "SETTLED", "QUIETEST"},
     "selection.py": {"FAR_MORE"},
     "swap_search.py": {"SAME", "RIVALS"},

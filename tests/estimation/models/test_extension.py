@@ -123,7 +123,7 @@ def test_what_is_late_is_all_that_comes_before_a_cut(arm: Robot, state: Situatio
 
     delay, level = 0.02, 0.6 * float(np.abs(state.torque[:, 0]).max())
     late = extension("time_delay", None, (delay,), [delay])
-    spring = extension("spring", 1, (0.0, 0.0), [3.0, 0.0, 0.0, 1.0])
+    spring = extension("spring", 1, (0.0, 0.0, 3.0), [3.0, 0.0, 0.0, 1.0])
     cut = extension("current_clipping", 1, (level,), [1.0])
     plain = spring.torque(state)
     before = np.interp(state.t - delay, state.t, plain[:, 0])
@@ -151,14 +151,14 @@ def test_a_damaged_extension_is_refused(arm: Robot) -> None:
     old = {
         "effect": "joint_elasticity",
         "joint": 1,
-        "shape": [30.0, 0.0],
+        "shape": [30.0, 0.0, 0.05],
         "coefficients": [1e-4],
-        "covariance": np.eye(3).tolist(),
+        "covariance": np.eye(4).tolist(),
     }
     named = [{"name": name, "value": 1.0} for name in ("compliance", "resonance")]
     with pytest.raises(InputError, match="resonance"):
         read_extension({**old, "parameters": named}, arm)
-    assert read_extension(old, arm).shape == (30.0, 0.0)
+    assert read_extension(old, arm).shape == (30.0, 0.0, 0.05)
     shorter = {**old, "shape": [30.0], "covariance": np.eye(2).tolist()}
     with pytest.raises(InputError, match="1 coefficients and 1 shape values"):
         read_extension(shorter, arm)

@@ -100,7 +100,7 @@ def test_the_robot_of_a_file_is_that_of_the_model(base, tmp_path):
 def test_effects_of_a_file_without_limits_are_refused(base, tmp_path):
     """An older file's spring would be centred elsewhere; a model without effects is read as before."""
     extension = Extension(
-        effect="spring", joint=2, shape=(0.0, 0.0), coefficients=np.ones(4), covariance=np.zeros((6, 6))
+        effect="spring", joint=2, shape=(0.0, 0.0, 3.0), coefficients=np.ones(4), covariance=np.zeros((7, 7))
     )
     path = tmp_path / "model.json"
     for extensions in ((), (extension,)):

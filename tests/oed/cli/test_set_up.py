@@ -31,6 +31,16 @@ def test_logs_are_told_by_their_number(three: list[Log]) -> None:
     assert third.gravity == pytest.approx([1.0, 2.0, 3.0])
 
 
+def test_without_a_number_all_logs_are_meant(three: list[Log]) -> None:
+    """A log that another text names keeps its own; two texts without a number contradict each other."""
+    logs = with_known_setup(three, ["5,0,0,0.1"], ["2=1,2,3", "0,-2.54,-9.48"])
+    assert all(log.payload == pytest.approx(point_mass(5.0, (0.0, 0.0, 0.1))) for log in logs)
+    for log, field in zip(logs, ([0, -2.54, -9.48], [1, 2, 3], [0, -2.54, -9.48]), strict=True):
+        assert log.gravity == pytest.approx(field)
+    with pytest.raises(InputError, match="without a number twice"):
+        with_known_setup(three, None, ["1,2,3", "1,2,3"])
+
+
 @pytest.mark.parametrize("option", ["--payload", "--gravity"])
 @pytest.mark.parametrize(
     "text", ["2", "2=", "2=5,0", "x=0,0,0", "2=a,b,c", "2=0;0;0", "2=0,0,0,0,0", "=1,2,3", "1.5=1,2,3"]

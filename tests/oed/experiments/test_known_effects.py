@@ -21,7 +21,7 @@ from robots.signals import Motion
 from tests.oed import flat
 
 WIDTH = 0.02
-SPRING = PlantEffect(effect="spring", joint=2, coefficients=(40.0, 15.0, -8.0, 0.0), shape=(0.0, 0.0))
+SPRING = PlantEffect(effect="spring", joint=2, coefficients=(40.0, 15.0, -8.0, 0.0), shape=(0.0, 0.0, 3.0))
 STRIBECK = PlantEffect(effect="stribeck", joint=2, coefficients=(12.0,), shape=(0.2, 2.0))
 LOADED = PlantEffect(effect="load_dependent_friction", joint=3, coefficients=(0.1, 0.05), shape=(1.0, 0.0))
 BORNE = PlantEffect(effect="load_dependent_friction", joint=2, coefficients=(0.1, 0.05), shape=(1.0, 0.0))
@@ -145,7 +145,7 @@ def test_the_motion_keeps_the_limit_with_the_spring(tight: Robot, tmp_path) -> N
 @pytest.mark.slow
 def test_without_limits_nothing_is_claimed_to_count(make_robot) -> None:
     """A robot without torque limits or dynamics: the summary says that the spring could not be counted."""
-    spring = PlantEffect(effect="spring", joint=1, coefficients=(1.0, 0.0, 0.0, 0.0), shape=(0.0, 0.0))
+    spring = PlantEffect(effect="spring", joint=1, coefficients=(1.0, 0.0, 0.0, 0.0), shape=(0.0, 0.0, 3.0))
     result = made_plain(make_robot("RR", "plain"), spring)
     assert "NOT included in the torque limits, because torque limits or dynamics are not described" in result.summary()
 

@@ -298,7 +298,10 @@ def test_the_experiment_starts_from_the_arm_itself(problem):
 @pytest.mark.slow
 def test_a_tilted_base_counts_with_the_parameters_that_it_shows(problem):
     """With a tilted base, the first joint's first moments, which level logs do not determine, are fitted, too."""
-    causes = [_guess(problem, "spring", 1, (0.0, 0.0), 0.02), _guess(problem, "torque_constant_error", 1, (), 0.02)]
+    causes = [
+        _guess(problem, "spring", 1, (0.0, 0.0, 3.0), 0.02),
+        _guess(problem, "torque_constant_error", 1, (), 0.02),
+    ]
     grams = Grams(problem, causes)
     names = {column.name for column in grams.base.columns} - {c.name for c in problem.baseline.base.columns}
     assert names == {"mPx_1", "mPy_1"}
@@ -314,7 +317,7 @@ def test_a_base_that_stands_otherwise_stays_there(problem):
     """Experiments are made in the base pose of the last log, and a second base pose is tilted from there."""
     wall = np.array([-9.81, 0.0, 0.0])
     stands = replace(problem, recording=replace(problem.recording, gravity_fields=(wall,)))
-    causes = [_guess(problem, "stribeck", 4, (0.05, 1.0), 0.02), _guess(problem, "spring", 4, (0.0, 0.0), 0.02)]
+    causes = [_guess(problem, "stribeck", 4, (0.05, 1.0), 0.02), _guess(problem, "spring", 4, (0.0, 0.0, 3.0), 0.02)]
     room = motion_range(problem.situation.robot, problem.recording)
     (stage,) = MAKERS["repeat"](room, 3, 0)
     grams = Grams(stands, causes)

@@ -163,7 +163,7 @@ def test_nothing_is_borne_of_what_no_gear_feels(recording: Recording, pose_arm: 
 def test_a_spring_that_preloads_its_gear_has_the_offset(recording: Recording, pose_arm: Callable[..., Problem]) -> None:
     """The base model's offset is part of the gear load on the joint of a spring, if the spring preloads it."""
     now = pose_arm(recording).situation
-    weight = LoadSource(EFFECTS["spring"], 1, (0.0, 0.0), np.array([3.0, 0.0, 2.0, 0.0]))
+    weight = LoadSource(EFFECTS["spring"], 1, (0.0, 0.0, 3.0), np.array([3.0, 0.0, 2.0, 0.0]))
     q = recording.q[:, 0]
     offset = (now.torque - now.rigid - now.friction)[:, 0]
     plain, all_of_it = (ExtraGearLoad(how, [weight]).on(now).load - now.load for how in ("effects", "preloads"))

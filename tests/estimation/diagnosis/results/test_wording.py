@@ -46,7 +46,7 @@ def test_a_fifth_of_a_value_or_of_a_second(
         ("presliding_hysteresis", 0, 0.2, True),
         ("presliding_hysteresis", 0, 1e-5, True),
         ("presliding_hysteresis", 0, 0.19, False),
-        ("backlash", 1, 0.3, False),  # the default value
+        ("joint_elasticity", 2, 0.05, False),  # the default value
         ("torque_constant_saturation", 0, 1.0, False),  # an exponent, not a size
     ],
 )
@@ -77,13 +77,13 @@ def test_an_interval_holds_what_machines_may_have(arm: Robot) -> None:
 def test_levers_that_are_perhaps_none_have_no_dead_centre(arm: Robot, error: float, told: bool) -> None:
     """A dead centre is determined only if the lever ratio is significantly above zero."""
     coefficients = np.array([400.0, -300.0, 0.0, 900.0])
-    member = FittedEffect(Hypothesis(EFFECTS["spring"], 1), (0.3, -2.9), None, 100.0, coefficients, 6, 1.0)  # type: ignore[arg-type]
-    covariance = np.diag([4.0, 3.0, 0.0, 9.0, error, 0.1]) ** 2
+    member = FittedEffect(Hypothesis(EFFECTS["spring"], 1), (0.3, -2.9, 3.0), None, 100.0, coefficients, 6, 1.0)  # type: ignore[arg-type]
+    covariance = np.diag([4.0, 3.0, 0.0, 9.0, error, 0.1, 0.0]) ** 2
     extension = Extension(
         effect="spring", joint=1, shape=member.shape, coefficients=coefficients, covariance=covariance
     )
     fitted: Any = SimpleNamespace(model=SimpleNamespace(extensions=[extension]))
-    centre = _parameters(arm, member, fitted, 0, np.ones(6, dtype=bool))[-1]
+    centre = _parameters(arm, member, fitted, 0, np.ones(7, dtype=bool))[-1]
     assert centre.name == "dead_centre"
     assert centre.determined is told
     assert bool(np.isfinite(centre.ci95).all()) is told

@@ -186,7 +186,7 @@ def test_what_reversals_tell_counts_as_one_row_for_each_joint(
     problem = replace(plain, timing=timing)
     for name, joint in (("time_delay", None), ("current_lag", 1), ("spring", 1)):
         hypothesis = Hypothesis(EFFECTS[name], joint)
-        shape = {"time_delay": (1e-3,), "current_lag": (1e-3,)}.get(name, (0.0, 0.0))
+        shape = {"time_delay": (1e-3,), "current_lag": (1e-3,)}.get(name, (0.0, 0.0, 3.0))
         before, after = (p.measured(hypothesis, shape) for p in (plain, problem))
         squares, product = (4e6, 2e-3 * 4e6) if name == "time_delay" else (0.0, 0.0)
         assert after.gram == pytest.approx(before.gram + squares)

@@ -56,11 +56,12 @@ def _searching(
         lambda problem, entries, members, p_values, *rest: (kept := polished(members), p_values[: len(kept)]),
     )
     replace("remeasure", lambda problem, member, beside: member)
+    replace("relinearise", lambda problem, members: (problem, list(members)))
     return scans
 
 
 def _selected() -> set[Hypothesis]:
-    result = selection.select(None, [], false_alarm=0.01)  # type: ignore[arg-type]
+    _, result = selection.select(None, [], false_alarm=0.01)  # type: ignore[arg-type]
     return {found.effect.hypothesis for found in result.found}
 
 

@@ -112,7 +112,7 @@ def test_a_spring_takes_up_its_joints_offset(tmp_path, angle):
     """Stiffness and springref state a straight spring and the constant torque exactly, in the file's angles."""
     text = GANTRY.replace('angle="radian"', f'angle="{angle}"')
     robot = file_of(tmp_path, text)
-    model = made(robot, offset=1.5, extensions=[effect("spring", 2, (0.0, 0.0), [25.0, 0.0, 0.0, 0.0])])
+    model = made(robot, offset=1.5, extensions=[effect("spring", 2, (0.0, 0.0, 3.0), [25.0, 0.0, 0.0, 0.0])])
     written = export_mjcf(model, tmp_path / "corrected.xml", robot=robot)
     assert "spring of joint swing" in written.stated
     # The rail has no spring, and its offset has no place.
@@ -125,7 +125,7 @@ def test_a_spring_takes_up_its_joints_offset(tmp_path, angle):
 def test_a_curved_spring_is_stated_nearly(tmp_path):
     """The straight line for a curved spring is named with its largest difference."""
     robot = file_of(tmp_path, GANTRY)
-    model = made(robot, extensions=[effect("spring", 2, (0.0, 0.0), [25.0, 0.0, 6.0, 0.0])])
+    model = made(robot, extensions=[effect("spring", 2, (0.0, 0.0, 3.0), [25.0, 0.0, 6.0, 0.0])])
     recorded = {"position": [[-0.5, -1.0], [0.5, 1.0]], "velocity": [[1.0, 2.0]]}
     written = build_mjcf(model, robot, recorded=recorded)
     swing = next(j for j in ElementTree.fromstring(written.text).iter("joint") if j.get("name") == "swing")

@@ -29,6 +29,7 @@ def payload_file(tmp_path: Path) -> Path:
         ((), "--without LOG, of the same path without the payload, or --model"),
         (("--without", "LOG", "--model", "MODEL"), "--without and --model together"),
         (("--without", "LOG"), "no robot"),
+        (("--without", "LOG", "--robot", "ur10", "--payload", "5,0,0,0.1"), "--payload without a number beside"),
         (("--model", "MODEL", "--to", "fanuc"), "urscript, franka, kuka, ros, urdf"),
         (("--model", "MODEL", "--frame", "0,0"), "X,Y,Z"),
         (("--model", "MODEL", "--frame", "0,0,x"), "numbers"),

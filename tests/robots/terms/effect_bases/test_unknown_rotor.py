@@ -68,7 +68,7 @@ def test_a_rotor_that_is_told_is_as_one_that_is_described(effect, seen):
     heavier[0, 4:] += rotor * np.outer(axis, axis)[np.triu_indices(3)]
     lumped = seen(5, robot=replace(robot, inertia=heavier, rotor_inertia=robot.rotor_inertia * (np.arange(5) > 0)))
     np.testing.assert_allclose(lumped.torque, described.torque, atol=1e-9 * np.abs(lumped.torque).max())
-    shape, after = {"backlash": ((1e-3, 0.05, 0.0), (0.02,)), "joint_elasticity": ((1e4,), ())}[effect]
+    shape, after = {"backlash": ((1e-3, 0.0), (0.02,)), "joint_elasticity": ((1e4,), (0.05,))}[effect]
     cases = ((described, 0.0), (lumped, rotor), (lumped, 0.0))
     known, told, taken = (EFFECTS[effect].columns(now, 1, (*shape, b, *after)) for now, b in cases)
     np.testing.assert_allclose(told, known, atol=1e-6 * np.abs(known).max())

@@ -14,7 +14,7 @@ from robots.geometry.chain import Chain
 from robots.regressor import default_model
 from robots.robot import Robot
 from robots.terms.effects import EFFECTS
-from robots.terms.effects.backlash import LANDS, SLOWEST
+from robots.terms.effects.backlash import LANDS
 from robots.terms.effects.base_tilt import level_axes
 from robots.terms.effects.joint_elasticity import followed
 from robots.terms.situations.situation import situation
@@ -55,7 +55,7 @@ def test_an_elastic_gear_lets_its_link_lag(now, torque):
         # Large lags (c = 1) would leave the difference's range: it is scaled to the largest.
         size = max(float(np.abs(part).max()) for part in change)
         expected = _slope(torque, now, [part / size for part in change]) * size
-        X = EFFECTS["joint_elasticity"].columns(now, joint, (1e9, 0.0))[SOME, :, 0]
+        X = EFFECTS["joint_elasticity"].columns(now, joint, (1e9, 0.0, 0.05))[SOME, :, 0]
         # A spline's second derivative is of second order: (2 pi 4 Hz 4 ms)^2 / 12 at the motion's fastest products.
         assert np.abs(X - expected).max() < 2e-3 * np.abs(expected).max()
 
@@ -186,12 +186,12 @@ def test_size_of_an_effect_tells_its_time(seen):
     """What follows from a coefficient is offered: the gap that is crossed, a delay's own reversals, a resonance."""
     now = seen(5, seed=1)
     bare = seen(5, seed=1, robot=replace(now.robot, rotor_inertia=np.zeros(5)))
-    for known, at, count in ((True, now, 15), (False, bare, 31)):
-        crossings = EFFECTS["backlash"].likely(at, 2, (1e-3, 0.07, 0.2, 0.0, 0.03), np.array([2e-4]))
-        assert crossings[0] == (4e-4, SLOWEST, 0.0, 0.0, LANDS)
+    for known, at, count in ((True, now, 7), (False, bare, 15)):
+        crossings = EFFECTS["backlash"].likely(at, 2, (1e-3, 0.2, 0.0, 0.03), np.array([2e-4]))
+        assert crossings[0] == (4e-4, 0.0, 0.0, LANDS)
         assert len(set(crossings)) == count
-        assert (None,) * 5 not in crossings
-        assert ((None, None, None, 0.0, None) in crossings) is not known
+        assert (None,) * 4 not in crossings
+        assert ((None, None, 0.0, None) in crossings) is not known
     for name, joint in (("time_delay", None), ("current_lag", 2)):
         assert EFFECTS[name].likely(now, joint, (1e-3,), np.array([-3e-3])) == ((-3e-3,),)
         assert EFFECTS[name].likely(now, joint, (1e-3,), np.array([0.04])) == ((0.02,),)
@@ -218,14 +218,21 @@ def test_a_gear_of_known_compliance_has_a_resonance(now, seen, twin):
         resonances = (2 * np.pi * frequencies) ** 2
         half = 0.5 * inertia.min()
         wanted = [*(inertia.mean() * resonances), *((inertia.mean() - half) * resonances)]
-        np.testing.assert_allclose([stiffness for stiffness, _ in scanned], wanted, rtol=0.01)
-        np.testing.assert_allclose([rotor for _, rotor in scanned], [0.0] * count + [half] * count, rtol=0.01)
+        np.testing.assert_allclose([stiffness for stiffness, *_ in scanned], wanted, rtol=0.01)
+        np.testing.assert_allclose([rotor for _, rotor, _ in scanned], [0.0] * count + [half] * count, rtol=0.01)
         stiff = pytest.approx(wanted[2], rel=0.01)
-        likely = elastic.likely(bare, joint, (1.0, 0.0), np.array([1 / wanted[2]]))
-        assert likely == ((stiff, 0.0), (None, 0.0), (stiff, None))
-        assert elastic.likely(now, joint, (1.0, 0.0), np.array([1 / wanted[2]])) == ((stiff, 0.0),)
-        assert elastic.likely(now, joint, (1.0, 0.0), np.array([1e9]))[0] == (elastic.bounds(now, joint)[0][0], 0.0)
-    assert elastic.likely(now, 1, (60.0, 0.0), np.zeros(1)) == ()
+        likely = elastic.likely(bare, joint, (1.0, 0.0, 0.1), np.array([1 / wanted[2]]))
+        every = {
+            (s, rotor, damping) for s in (stiff.expected, None) for rotor in (0.0, None) for damping in (0.05, None)
+        }
+        assert len(likely) == len(every) - 1
+        assert likely[0] == (stiff, 0.0, 0.05)
+        assert (None, None, None) not in likely
+        plain = elastic.likely(now, joint, (1.0, 0.0, 0.1), np.array([1 / wanted[2]]))
+        assert plain == ((stiff, 0.0, 0.05), (stiff, 0.0, None), (None, 0.0, 0.05))
+        softest = elastic.bounds(now, joint)[0][0]
+        assert elastic.likely(now, joint, (1.0, 0.0, 0.1), np.array([1e9]))[0] == (softest, 0.0, 0.05)
+    assert elastic.likely(now, 1, (60.0, 0.0, 0.1), np.zeros(1)) == ((None, 0.0, 0.05),)
 
 
 @pytest.mark.parametrize(("name", "joint"), [("time_delay", None), ("current_lag", 1)])
