@@ -64,7 +64,7 @@ def test_forms_of_a_spring_that_fit_alike_are_listed(
     rng = np.random.default_rng(4)
     extra = np.column_stack([_balancer(small.q[:, 0]), 0 * small.t])
     problem = pose_arm(replace(small, tau=small.tau + extra + rng.normal(size=small.tau.shape) * NOISE))
-    plain = refine(problem, SPRING, (0.0, 0.0), accept(problem, ()), effort=0)
+    plain = refine(problem, SPRING, (0.0, 0.0, 3.0), accept(problem, ()), effort=0)
     forms = equivalent_shapes(problem, [plain], 0)
     assert len(forms) >= 2
     assert all(form.gain > plain.gain - MAX_SHAPE_CHI2 and form.shape != plain.shape for form in forms)
@@ -88,7 +88,7 @@ def test_a_form_that_fits_worse_is_not_listed(
     rng = np.random.default_rng(5)
     extra = np.column_stack([3.0 * q + 4.0 * q**3, 0 * q])
     problem = pose_arm(replace(wide, tau=wide.tau + extra + rng.normal(size=wide.tau.shape) * NOISE))
-    plain = refine(problem, SPRING, (0.0, 0.0), accept(problem, ()), effort=0)
+    plain = refine(problem, SPRING, (0.0, 0.0, 3.0), accept(problem, ()), effort=0)
     assert equivalent_shapes(problem, [plain], 0) == []
     stribeck = refine(problem, Hypothesis(EFFECTS["stribeck"], 1), (0.1, 1.0), accept(problem, ()), effort=0)
     assert equivalent_shapes(problem, [stribeck], 0) == []
