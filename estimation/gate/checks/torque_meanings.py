@@ -14,6 +14,7 @@ from estimation.gate.check import Check
 from estimation.gate.checks.likely_causes import without_gravity
 from estimation.gate.context import Context, Stage
 from estimation.gate.finding import Finding
+from estimation.gate.quick_fits.whole_fit import HOPELESS
 from robots.robot import Robot
 
 # Log of the odds against joint torques, from which another meaning is a warning, and from which it is refused.
@@ -65,7 +66,7 @@ class TorqueMeanings(Check):
         explained = any(finding.severity != "info" for finding in context.found(EXPLAINED))
         if not np.isfinite(described).all() or not described.any() or explained:
             return []
-        if context.cleaned.columns.prefix != "tau":
+        if context.cleaned.columns.prefix != "tau" or not (context.fitted.unexplained < HOPELESS).any():
             return []
         evidence = joint_evidence(context.fitted)
         if not evidence:
@@ -81,7 +82,8 @@ class TorqueMeanings(Check):
             OTHERWISE[other.kind] for other in others if other.odds > best.odds - CLOSE and other.kind in OTHERWISE
         }
         close -= {OTHERWISE[best.kind]}
-        return [replace(finding, text=" or ".join([finding.text, *sorted(close)]))]
+        also = f" (about as likely: {', '.join(sorted(close))})" if close else ""
+        return [replace(finding, text=finding.text + also)]
 
 
 def _finding(robot: Robot, best: Hypothesis) -> Finding:
