@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from estimation import load_model, read_log
+from estimation import load_model, predict, read_log
 from estimation.diagnosis.experiment_plans.experiment_motions import Stage
 from estimation.diagnosis.experiment_plans.next_experiment import NextExperiment
 from oed.campaigns.loops import LoopOptions, run_loop, running
@@ -211,6 +211,12 @@ def test_two_hidden_effects_are_named(two, designed, controllers, tmp_path: Path
     assert sorted(result.diagnosis.causes) == ["asymmetric friction of joint 1", "load dependent friction of joint 2"]
     assert result.experiments[0].diagnosis.verdict == "ambiguous"
     assert len(result.experiments) >= 2
-    # The noise is 0.7 % of the torque's RMS.
-    assert max(result.diagnosis.after) < 0.009
-    assert len(load_model(tmp_path / "loop" / "model.json").extensions) == 2
+    model = load_model(tmp_path / "loop" / "model.json")
+    assert len(model.extensions) == 2
+    # The noise is 0.7 % of the torque's RMS. At rest static friction takes any value, for a time that is not fixed.
+    for number in (1, 2):
+        log = read_log(tmp_path / "loop" / f"experiment_{number}" / "log_1.csv")
+        error = predict(model, log, check=False).predicted - log.tau
+        moving = np.abs(np.gradient(log.q, log.t, axis=0)) > 0.05
+        size = [np.sqrt(np.mean(error[moving[:, j], j] ** 2) / np.mean(log.tau[moving[:, j], j] ** 2)) for j in (0, 1)]
+        assert max(size) < 0.012
