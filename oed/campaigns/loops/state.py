@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
-import json
 import shutil
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, field
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+from oed.campaigns.state_files import read_state, write_state
 from oed.controllers.recording.clock import ClockAnchor
 from robots.common.errors import InputError
-from robots.common.files import write_atomic
 from robots.robot import Robot
 
 LOOP = "loop.json"
@@ -132,8 +131,7 @@ class LoopState:
 
     def save(self, folder: Path) -> None:
         """Replaces the file."""
-        data = {"format": FORMAT, "format_version": 1, **asdict(self)}
-        write_atomic(folder / LOOP, json.dumps(data, indent=2, allow_nan=False) + "\n", force=True)
+        write_state(folder / LOOP, FORMAT, self)
 
     @classmethod
     def load(cls, folder: Path) -> LoopState | None:
@@ -142,27 +140,19 @@ class LoopState:
         Raises:
             InputError: a file of another kind, or a damaged one.
         """
-        file = folder / LOOP
-        if not file.exists():
-            return None
-        try:
-            data = json.loads(file.read_text(encoding="utf-8"))
-            if data["format"] != FORMAT:
-                raise InputError(f"found the format {data['format']!r}", file=file, allowed=FORMAT)
-            return cls(
+        return read_state(
+            folder / LOOP,
+            FORMAT,
+            "a loop",
+            lambda data: cls(
                 robot=data["robot"],
                 settings=data["settings"],
                 home=data["home"],
                 experiments=[_experiment(item) for item in data["experiments"]],
                 ended=data["ended"],
                 success=data["success"],
-            )
-        except (OSError, UnicodeDecodeError, json.JSONDecodeError, KeyError, TypeError) as error:
-            raise InputError(
-                f"is damaged, or no state of a loop: {type(error).__name__} {error}",
-                file=file,
-                remedy="choose another folder",
-            ) from error
+            ),
+        )
 
     def require_same(self, robot: Robot, settings: Mapping[str, Any], folder: Path) -> None:
         """Refuses to go on with another robot or other choices.

@@ -3,17 +3,15 @@
 from __future__ import annotations
 
 import fcntl
-import json
 import os
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import asdict, dataclass, field
+from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
 
+from oed.campaigns.state_files import read_state, write_state
 from oed.controllers.recording.clock import ClockAnchor
 from robots.common.errors import InputError
-from robots.common.files import write_atomic
 
 RUN, LOCK = "run.json", ".run.lock"
 LOGS = "logs"
@@ -68,8 +66,7 @@ class RunState:
 
     def save(self, folder: Path) -> None:
         """Replaces the file."""
-        data = {"format": FORMAT, "format_version": 1, **asdict(self)}
-        write_atomic(folder / RUN, json.dumps(data, indent=2, allow_nan=False) + "\n", force=True)
+        write_state(folder / RUN, FORMAT, self)
 
     @classmethod
     def load(cls, folder: Path) -> RunState | None:
@@ -78,24 +75,16 @@ class RunState:
         Raises:
             InputError: a file of another kind, or a damaged one.
         """
-        file = folder / RUN
-        if not file.exists():
-            return None
-        try:
-            data: Mapping[str, Any] = json.loads(file.read_text(encoding="utf-8"))
-            if data["format"] != FORMAT:
-                raise InputError(f"found the format {data['format']!r}", file=file, allowed=FORMAT)
-            return cls(
+        return read_state(
+            folder / RUN,
+            FORMAT,
+            "a run",
+            lambda data: cls(
                 campaign=data["campaign"],
                 recorded=[RecordedStage(**{**row, "end": ClockAnchor(**row["end"])}) for row in data["recorded"]],
                 starts=data["starts"],
-            )
-        except (OSError, UnicodeDecodeError, json.JSONDecodeError, KeyError, TypeError) as error:
-            raise InputError(
-                f"is damaged, or no state of a run: {type(error).__name__} {error}",
-                file=file,
-                remedy="choose another folder",
-            ) from error
+            ),
+        )
 
 
 @contextmanager
