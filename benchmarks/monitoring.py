@@ -77,7 +77,7 @@ def trained(folder: Path, seed: int) -> dict[str, Baseline]:
 
 
 def cycle(robot: VirtualRobot, number: int) -> Log:
-    """One 5 min cycle, of which the first minute is logged."""
+    """A cycle of 5 min. Its first minute is logged."""
     log = robot.log(LOGGED, number % 2, f"cycle {number}")
     robot.warm_up(CYCLE - LOGGED - REST)
     robot.rest(REST)

@@ -27,7 +27,7 @@ Array = NDArray[np.float64]
 
 # Windows whose residual gives the colour of the noise.
 COLOUR_WINDOWS = 30
-# A friction factor with a larger relative standard error says nothing in its window.
+# A friction factor with a larger relative standard error is not used in its window.
 UNSURE = 0.25
 # Windows between tests for steps, where no pause comes before.
 STEP_TESTS = 30
@@ -194,7 +194,7 @@ class Evaluation:
             self.event = Event(time=window.end, log=log, sources=alarms)
 
     def _note_force(self, window: Window, log: int) -> None:
-        """Keeps a short force until the windows after it tell whether something lasting began."""
+        """Keeps a short force until later windows show whether a lasting change began."""
         felt = np.flatnonzero(np.abs(window.burst_joints) > 3.0)
         link = int(felt.max()) + 1 if len(felt) else 0
         self.forces.append((window.start, window.burst_at, log, link, self.heat_windows))

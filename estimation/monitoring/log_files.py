@@ -1,4 +1,4 @@
-"""Logs from files of which some may be corrupt: each of those costs a row, not the run."""
+"""Logs from files that may be corrupt: a corrupt file costs one row, not the run."""
 
 from __future__ import annotations
 

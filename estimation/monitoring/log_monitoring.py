@@ -22,7 +22,7 @@ from robots.signals import Log
 
 @dataclass
 class _Pending:
-    """Logs that do not fit, until the next one tells whether the logs or the model are the reason."""
+    """Logs that do not fit, until the next one shows whether the logs or the model are wrong."""
 
     logs: list[Placed]
     before: Monitor
@@ -84,7 +84,7 @@ def monitor_logs(
         spans.append(_span(item))
     if pending is not None:
         if len(pending.logs) == 1 and len(placed) > 1:
-            # One log alone: nothing tells whether it is of another robot. It is left out.
+            # A single log does not show whether it is of another robot. It is left out.
             monitor.take(pending.before)
             rows += [_foreign(monitor.baseline, other.log) for other in pending.logs]
         else:

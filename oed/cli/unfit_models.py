@@ -21,7 +21,7 @@ def unfit_of(model: Model, logs: Sequence[Log]) -> UnfitDirection | None:
         logs: where it is simulated.
 
     Returns:
-        None for a model that can be simulated, or where no description tells of a nearest one.
+        None for a model that can be simulated, or without a description that gives a nearest one.
     """
     import numpy as np
 

@@ -22,7 +22,7 @@ from robots.common.files import existing_file
 
 Array = NDArray[np.float64]
 
-# Samples of the healthy log that tell the levels of the localisation.
+# Samples of the healthy log from which the levels of the localisation are estimated.
 MOST_ROWS = 4000
 ROUNDS = 8
 # Where the first round cuts residuals off, and a normal distribution's standard deviation over its median size.
@@ -183,7 +183,7 @@ def calibrate_signals(
     counts = settled.copy()
     for number in range(ROUNDS if own else 1):
         first = own and number == 0
-        # At first nobody knows what is a contact: it must not decide how large errors are.
+        # Contacts are not known at first: they must not enter the size of the errors.
         fitted = _winsorised(residual, settled) if first else residual
         errors = fit_error_model(model, fitted, whole.dq, whole.friction, whole.variance, counts, lag, in_fit=in_fit)
         w = lag(errors.amplitudes(whole.dq, whole.friction, whole.variance * (not in_fit)))

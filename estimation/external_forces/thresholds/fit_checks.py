@@ -13,7 +13,7 @@ Array = NDArray[np.float64]
 
 # The band is to hold 95 % of a healthy log's errors. Where it holds less than half, something acts most of the time.
 HALF = 0.5
-# A joint that moves in less of the samples says nothing of the model.
+# A joint that moves in a smaller share of the samples does not test the model.
 FEW = 0.1
 
 

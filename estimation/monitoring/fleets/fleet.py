@@ -174,7 +174,7 @@ def _monitored(
 
 @lru_cache(maxsize=4)
 def _baseline(model: Path, digest: str) -> Baseline:
-    """A model, read and compiled once per process; the digest tells versions of the file apart."""
+    """A model, read and compiled once per process; the digest identifies the version of the file."""
     return read_baseline(model)
 
 

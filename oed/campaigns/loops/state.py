@@ -176,7 +176,7 @@ class LoopState:
 
 
 def identity(robot: Robot) -> dict[str, Any]:
-    """Gives what tells robots apart."""
+    """Gives what identifies a robot."""
     return {"name": robot.name, "sha256": robot.digest}
 
 

@@ -1,4 +1,4 @@
-"""Stored logs: of another robot, of a model that does not fit, of another payload, each told apart."""
+"""Stored logs: of another robot, of a model that does not fit, of another payload: each is named."""
 
 import dataclasses
 

@@ -15,7 +15,7 @@ def signals(seconds, excess):
 
 
 def test_constant_excess_is_found_from_the_first_sample():
-    """Friction 20 % above the model's is known at once: the first memory of the log tells it."""
+    """Friction 20 % above the model's is known at once, from the first memory of the log."""
     found = friction_excess(*signals(60.0, lambda t: 0.2 + 0 * t))
     np.testing.assert_allclose(found, 0.2, atol=1e-9)
 

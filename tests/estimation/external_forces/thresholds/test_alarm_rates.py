@@ -38,7 +38,7 @@ def test_rate_of_alarms_is_the_stated_one():
 
 
 def test_peaks_are_as_rare_as_the_process_is_slow():
-    """A statistic that is constant over ten samples has a tenth of the peaks: the extremal index tells it."""
+    """A statistic that is constant over ten samples has a tenth of the peaks. The extremal index shows this."""
     white = np.random.default_rng(0).exponential(size=3000)
     held = np.repeat(white, 10)
     fast, slow = alarm_threshold(white, PERIOD, 1.0), alarm_threshold(held, PERIOD, 1.0)

@@ -189,7 +189,7 @@ def test_what_is_refused(two, designed, tmp_path: Path) -> None:
     ],
 )
 def test_controllers_that_are_refused(settings, error, problem: str, two, designed, controllers, tmp_path) -> None:
-    """A robot elsewhere, a controller that is not ready, tells no torque or is of another kind: one message each."""
+    """A robot elsewhere, a controller that is not ready, gives no torque or is of another kind: one message each."""
     place = replace(controllers(**settings), connect_time=1.0)
     with pytest.raises(error, match=f"{problem}.*the same command goes on from here"):
         run_loop(two, place, tmp_path, design=designed, options=FREE, stream_options=FAST, speed=SPEED)
