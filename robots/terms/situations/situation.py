@@ -192,6 +192,11 @@ class Situation:
                 - ``flange``: position of the flange in the base frame [m] (N, 3, 1)
                 - ``moment``: first moment of the links' masses in the base frame [kg m] (N, 3, 1)
                 - ``links``: per link, rotation matrix (row by row) and origin [m] in the base frame (N, 12, n)
+                - ``base_rate``: d rigid/d(angular velocity of the base) (N, n, 3)
+                - ``base_acceleration``: d rigid/d(angular acceleration of the base) (N, n, 3)
+                - ``base_moment``: moment of the base on the robot about the base's origin (N, 3, 1)
+                - ``base_inertia``: d base_moment/d(angular acceleration of the base) (N, 3, 3)
+                - ``base_damping``: d base_moment/d(angular velocity of the base) (N, 3, 3)
         """
         if kind not in self._cache:
             parts = [part.sensitivity(kind) for part in self.parts]
