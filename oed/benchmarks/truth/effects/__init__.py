@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from tests.truth.effects.actuator import Clipping, Delay, Drift, EncoderOffset, Saturation, TorqueConstant
-from tests.truth.effects.base import Effect
-from tests.truth.effects.friction import (
+from oed.benchmarks.truth.effects.actuator import Clipping, Delay, Drift, EncoderOffset, Saturation, TorqueConstant
+from oed.benchmarks.truth.effects.base import Effect
+from oed.benchmarks.truth.effects.friction import (
     Asymmetric,
     FrictionStep,
     LoadDependent,
@@ -13,7 +13,7 @@ from tests.truth.effects.friction import (
     Stribeck,
     Warming,
 )
-from tests.truth.effects.strangers import (
+from oed.benchmarks.truth.effects.strangers import (
     BeltFriction,
     BorrowedFriction,
     CrossWave,
@@ -24,9 +24,9 @@ from tests.truth.effects.strangers import (
     SlippedZero,
     TiredCable,
 )
-from tests.truth.effects.surroundings import Contact, Payload, Tilt
-from tests.truth.effects.transmission import Backlash, Balancer, Cable, Elastic, Ripple, WristCoupling
-from tests.truth.effects.whole_strangers import Conveyor, FloorVibration, Hose, LeaningBase, SlippedBase, Slosh
+from oed.benchmarks.truth.effects.surroundings import Contact, Payload, Tilt
+from oed.benchmarks.truth.effects.transmission import Backlash, Balancer, Cable, Elastic, Ripple, WristCoupling
+from oed.benchmarks.truth.effects.whole_strangers import Conveyor, FloorVibration, Hose, LeaningBase, SlippedBase, Slosh
 
 KNOWN: tuple[type[Effect], ...] = (
     Stribeck,

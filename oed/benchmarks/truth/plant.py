@@ -9,12 +9,12 @@ from dataclasses import dataclass
 import numpy as np
 import pinocchio as pin
 
-from tests.truth.dynamics import Projection, base_regressor, rigid_torque
-from tests.truth.effects.base import Effect
-from tests.truth.machines import Machine
-from tests.truth.noise import Noise
-from tests.truth.references import Reference
-from tests.truth.ride import Ride, friction_of
+from oed.benchmarks.truth.dynamics import Projection, base_regressor, rigid_torque
+from oed.benchmarks.truth.effects.base import Effect
+from oed.benchmarks.truth.machines import Machine
+from oed.benchmarks.truth.noise import Noise
+from oed.benchmarks.truth.references import Reference
+from oed.benchmarks.truth.ride import Ride, friction_of
 
 CONTROL_STEP = 0.001  # [s]
 LOG_EVERY = 4  # control steps per logged sample
@@ -103,14 +103,14 @@ def measure(ride: Ride, effects: Sequence[Effect]) -> tuple[np.ndarray, tuple[np
         own = effect.torque(ride)
         ride.parts.append(share if own is None else share + own)
         torque = torque + ride.parts[-1]
-    errors = tuple(np.zeros_like(ride.q) for _ in range(3))
+    errors = (np.zeros_like(ride.q), np.zeros_like(ride.q), np.zeros_like(ride.q))
     for index, effect in enumerate(effects):
         logged = effect.signal(ride, torque)
         ride.parts[index] = ride.parts[index] + logged - torque
         torque = logged
         wrong = effect.position(ride)
         if wrong is not None:
-            errors = tuple(error + more for error, more in zip(errors, wrong, strict=True))
+            errors = (errors[0] + wrong[0], errors[1] + wrong[1], errors[2] + wrong[2])
             q, v, a = (ride.q + wrong[0], ride.v + wrong[1], ride.a + wrong[2])
             seen = rigid_torque(machine.model, q, v, a) + machine.rotor * a
             seen += friction_of(machine.friction, v, np.tanh(v / machine.sign_width)) + machine.offset

@@ -12,12 +12,12 @@ from pathlib import Path
 
 import numpy as np
 
-from tests.truth.dynamics import Projection, base_regressor
-from tests.truth.effects import KNOWN, STRANGERS, Effect
-from tests.truth.machines import KINDS, Machine, draw_machine
-from tests.truth.noise import Noise, draw_noise
-from tests.truth.plant import Record, open_loop, parts_links, play, projection_of
-from tests.truth.references import Reference, draw_aperiodic, draw_moves, draw_periodic
+from oed.benchmarks.truth.dynamics import Projection, base_regressor
+from oed.benchmarks.truth.effects import KNOWN, STRANGERS, Effect
+from oed.benchmarks.truth.machines import KINDS, Machine, draw_machine
+from oed.benchmarks.truth.noise import Noise, draw_noise
+from oed.benchmarks.truth.plant import Record, open_loop, parts_links, play, projection_of
+from oed.benchmarks.truth.references import Reference, draw_aperiodic, draw_moves, draw_periodic
 
 SEARCH_STEP = 0.008  # sample period [s] of the open-loop rides in the search for an effect's amount
 SEARCHES = 12  # largest number of steps of that search

@@ -7,9 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.interpolate import CubicSpline, PchipInterpolator
 
-from tests.truth.effects.base import Effect
-from tests.truth.machines import Machine
-from tests.truth.ride import Ride
+from oed.benchmarks.truth.effects.base import Effect
+from oed.benchmarks.truth.machines import Machine
+from oed.benchmarks.truth.ride import Ride
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -9,13 +9,13 @@ import numpy as np
 import pinocchio as pin
 from scipy.interpolate import make_interp_spline
 
-from tests.truth.cases import Case
-from tests.truth.dynamics import massless, rigid_torque, with_gravity, with_tool
-from tests.truth.effects.base import Effect
-from tests.truth.effects.surroundings import Tilt
-from tests.truth.plant import PAUSE, Record, play
-from tests.truth.references import Reference, Spline
-from tests.truth.ride import Ride
+from oed.benchmarks.truth.cases import Case
+from oed.benchmarks.truth.dynamics import massless, rigid_torque, with_gravity, with_tool
+from oed.benchmarks.truth.effects.base import Effect
+from oed.benchmarks.truth.effects.surroundings import Tilt
+from oed.benchmarks.truth.plant import PAUSE, Record, play
+from oed.benchmarks.truth.references import Reference, Spline
+from oed.benchmarks.truth.ride import Ride
 
 
 @dataclass(frozen=True, kw_only=True)

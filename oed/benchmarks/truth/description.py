@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pinocchio as pin
 
-from tests.truth.machines import Machine
+from oed.benchmarks.truth.machines import Machine
 
 
 def write_description(machine: Machine, folder: Path, *, drives: bool = True) -> Path:

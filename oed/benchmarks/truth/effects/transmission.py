@@ -7,10 +7,10 @@ from dataclasses import dataclass
 import numpy as np
 import pinocchio as pin
 
-from tests.truth.dynamics import rigid_torque
-from tests.truth.effects.base import Effect, log_uniform
-from tests.truth.machines import Machine
-from tests.truth.ride import Ride
+from oed.benchmarks.truth.dynamics import rigid_torque
+from oed.benchmarks.truth.effects.base import Effect, log_uniform, place_of
+from oed.benchmarks.truth.machines import Machine
+from oed.benchmarks.truth.ride import Ride
 
 SETTLES = 0.3  # time [s] in which a link that has landed comes to rest
 FINE = 2e-4  # largest integration step [s] of a link within the backlash
@@ -31,7 +31,7 @@ class Ripple(Effect):
     @classmethod
     def draw(cls, machine: Machine, rng: np.random.Generator, joint: int | None, span: float) -> Ripple:
         order = float(rng.choice([1.0, 2.0, 4.0]))
-        gear = float(machine.gear[joint - 1])
+        gear = float(machine.gear[place_of(joint)])
         return cls(joint=joint, order=order, gear=gear, phase=rng.uniform(0, 2 * np.pi), loaded=rng.uniform(0.0, 0.4))
 
     def torque(self, ride: Ride) -> np.ndarray:
@@ -160,7 +160,7 @@ class WristCoupling(Effect):
 
     @classmethod
     def draw(cls, machine: Machine, rng: np.random.Generator, joint: int | None, span: float) -> WristCoupling:
-        f1, f2 = machine.friction[joint - 1, :2]
+        f1, f2 = machine.friction[place_of(joint), :2]
         return cls(joint=joint, viscous=float(f2 / f1 * rng.uniform(0.3, 1.0)), inertia=log_uniform(rng, 0.01, 0.05))
 
     def torque(self, ride: Ride) -> np.ndarray:

@@ -11,26 +11,26 @@ import pinocchio as pin
 import pytest
 from scipy.integrate import solve_ivp
 
-from tests.truth.cases import Hidden, draw_case
-from tests.truth.description import urdf_of, write_description
-from tests.truth.dynamics import rigid_torque
-from tests.truth.effects import KNOWN, STRANGERS
-from tests.truth.effects.friction import LoadDependent, LuGre, Stribeck, _bristles
-from tests.truth.effects.strangers import CrossWave
-from tests.truth.effects.surroundings import Payload
-from tests.truth.effects.transmission import Backlash, Balancer, Elastic
-from tests.truth.experiments import KnownChange, Stage
-from tests.truth.machines import KINDS, draw_machine
-from tests.truth.oracle import ask_oracle
-from tests.truth.plant import measure, open_loop
-from tests.truth.references import draw_aperiodic, draw_moves, draw_periodic
+from oed.benchmarks.truth.cases import Hidden, draw_case
+from oed.benchmarks.truth.description import urdf_of, write_description
+from oed.benchmarks.truth.dynamics import rigid_torque
+from oed.benchmarks.truth.effects import KNOWN, STRANGERS
+from oed.benchmarks.truth.effects.friction import LoadDependent, LuGre, Stribeck, _bristles
+from oed.benchmarks.truth.effects.strangers import CrossWave
+from oed.benchmarks.truth.effects.surroundings import Payload
+from oed.benchmarks.truth.effects.transmission import Backlash, Balancer, Elastic
+from oed.benchmarks.truth.experiments import KnownChange, Stage
+from oed.benchmarks.truth.machines import KINDS, draw_machine
+from oed.benchmarks.truth.oracle import ask_oracle
+from oed.benchmarks.truth.plant import measure, open_loop
+from oed.benchmarks.truth.references import draw_aperiodic, draw_moves, draw_periodic
 
-ALLOWED = {"numpy", "scipy", "pinocchio", "tests"} | set(sys.stdlib_module_names)
+ALLOWED = {"numpy", "scipy", "pinocchio", "oed"} | set(sys.stdlib_module_names)
 
 
 def test_imports_numpy_scipy_and_pinocchio_alone() -> None:
-    """Files of `tests.truth`, except tests, import only numpy, scipy, pinocchio and `tests.truth`."""
-    files = [path for path in Path(__file__).parent.rglob("*.py") if not path.name.startswith("test_")]
+    """Files of the plant import only numpy, scipy, pinocchio and each other."""
+    files = list(Path(draw_case.__code__.co_filename).parent.rglob("*.py"))
     assert len(files) > 10
     for path in files:
         for node in ast.walk(ast.parse(path.read_text())):
@@ -42,7 +42,7 @@ def test_imports_numpy_scipy_and_pinocchio_alone() -> None:
                 names = [node.module or ""]
             for name in names:
                 assert name.split(".")[0] in ALLOWED, f"{path.name} imports {name}"
-                assert not name.startswith("tests") or name.startswith("tests.truth"), f"{path.name} imports {name}"
+                assert not name.startswith("oed") or name.startswith("oed.benchmarks.truth"), f"{path.name}: {name}"
 
 
 @pytest.mark.parametrize("kind", KINDS)

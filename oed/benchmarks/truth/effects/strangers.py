@@ -7,10 +7,10 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.signal import lfilter
 
-from tests.truth.dynamics import rigid_torque
-from tests.truth.effects.base import Effect, log_uniform
-from tests.truth.machines import Machine
-from tests.truth.ride import Ride
+from oed.benchmarks.truth.dynamics import rigid_torque
+from oed.benchmarks.truth.effects.base import Effect, log_uniform
+from oed.benchmarks.truth.machines import Machine
+from oed.benchmarks.truth.ride import Ride
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -68,8 +68,9 @@ class Interpolation(Effect):
         h = self.order
         angle, v, a = h * ride.q[:, self.j] + self.phase, ride.v[:, self.j], ride.a[:, self.j]
         s, c = np.sin(angle), np.cos(angle)
-        errors = (c, -h * v * s, -h * a * s - (h * v) ** 2 * c)
-        return tuple(self.on_joint(ride, self.amount * error) for error in errors)
+        first, second = -h * v * s, -h * a * s - (h * v) ** 2 * c
+        error, rate, change = (self.on_joint(ride, self.amount * values) for values in (c, first, second))
+        return error, rate, change
 
 
 @dataclass(frozen=True, kw_only=True)

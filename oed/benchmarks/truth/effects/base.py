@@ -7,8 +7,8 @@ from typing import TypeVar
 
 import numpy as np
 
-from tests.truth.machines import Machine
-from tests.truth.ride import Ride
+from oed.benchmarks.truth.machines import Machine
+from oed.benchmarks.truth.ride import Ride
 
 Kind = TypeVar("Kind", bound="Effect")
 
@@ -73,14 +73,19 @@ class Effect:
     @property
     def j(self) -> int:
         """The joint, counted from 0."""
-        assert self.joint is not None
-        return self.joint - 1
+        return place_of(self.joint)
 
     def on_joint(self, ride: Ride, values: np.ndarray) -> np.ndarray:
         """Returns a torque (N, n) with values (N,) on the effect's joint, zero on all others."""
         torque = np.zeros_like(ride.q)
         torque[:, self.j] = values
         return torque
+
+
+def place_of(joint: int | None) -> int:
+    """Counts a joint from 0, instead of from 1."""
+    assert joint is not None, "an effect of the whole robot has no joint"
+    return joint - 1
 
 
 def log_uniform(rng: np.random.Generator, lower: float, upper: float) -> float:

@@ -7,10 +7,10 @@ from dataclasses import dataclass
 import numpy as np
 import pinocchio as pin
 
-from tests.truth.dynamics import massless, point_force_torque, rigid_torque, with_gravity, with_tool
-from tests.truth.effects.base import Effect, log_uniform
-from tests.truth.machines import Machine
-from tests.truth.ride import Ride
+from oed.benchmarks.truth.dynamics import massless, point_force_torque, rigid_torque, with_gravity, with_tool
+from oed.benchmarks.truth.effects.base import Effect, log_uniform
+from oed.benchmarks.truth.machines import Machine
+from oed.benchmarks.truth.ride import Ride
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -8,8 +8,8 @@ from itertools import pairwise
 import numpy as np
 from scipy.ndimage import gaussian_filter1d
 
-from tests.truth.dynamics import rigid_torque
-from tests.truth.machines import Machine
+from oed.benchmarks.truth.dynamics import rigid_torque
+from oed.benchmarks.truth.machines import Machine
 
 
 @dataclass(kw_only=True)
@@ -27,10 +27,10 @@ class Ride:
     q: np.ndarray
     v: np.ndarray
     a: np.ndarray
-    link_q: np.ndarray = None
-    link_v: np.ndarray = None
-    link_a: np.ndarray = None
-    rigid: np.ndarray = None
+    link_q: np.ndarray = field(default=None)  # type: ignore[arg-type]
+    link_v: np.ndarray = field(default=None)  # type: ignore[arg-type]
+    link_a: np.ndarray = field(default=None)  # type: ignore[arg-type]
+    rigid: np.ndarray = field(default=None)  # type: ignore[arg-type]
     carried: np.ndarray | None = None
     parts: list[np.ndarray] = field(default_factory=list)
 

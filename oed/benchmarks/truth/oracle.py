@@ -4,15 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from operator import attrgetter
 
 import numpy as np
 from scipy.interpolate import make_interp_spline
 from scipy.signal import butter, sosfiltfilt
 
-from tests.truth.cases import EVERY, MOTION, Case
-from tests.truth.dynamics import Projection, base_regressor
-from tests.truth.plant import Record, measure
-from tests.truth.ride import Ride
+from oed.benchmarks.truth.cases import EVERY, MOTION, Case
+from oed.benchmarks.truth.dynamics import Projection, base_regressor
+from oed.benchmarks.truth.plant import Record, measure
+from oed.benchmarks.truth.ride import Ride
 
 STEP = 0.002  # sample period [s] of the motion from logged positions
 CUT_OFFS = (10.0, 20.0, 40.0, 80.0)  # [Hz]
@@ -55,8 +56,8 @@ def ask_oracle(case: Case, counted: Sequence[np.ndarray] | None = None, *, logge
     def rows(of: Callable[[Record], np.ndarray]) -> np.ndarray:
         return np.concatenate([of(record)[::EVERY] for record in case.records])
 
-    Y = base_regressor(case.machine.known, *(rows(lambda record, key=key: getattr(record, key)) for key in MOTION))
-    y = rows(lambda record: record.tau)
+    Y = base_regressor(case.machine.known, *(rows(attrgetter(key)) for key in MOTION))
+    y = rows(attrgetter("tau"))
     training, others = slice(len(y) - len(counts)), slice(len(y) - len(counts), None)
 
     def errors(columns: np.ndarray) -> tuple[float, np.ndarray]:
@@ -68,7 +69,7 @@ def ask_oracle(case: Case, counted: Sequence[np.ndarray] | None = None, *, logge
     def beside(parts: np.ndarray) -> tuple[float, np.ndarray]:
         return errors(np.concatenate([Y, parts], axis=2))
 
-    true = [rows(lambda record, k=k: record.parts[k]) for k in range(len(case.effects))]
+    true = [np.concatenate([record.parts[k][::EVERY] for record in case.records]) for k in range(len(case.effects))]
     tried = [beside(_parts_as_measured(case, cut_off)) for cut_off in CUT_OFFS] if logged else []
     return Oracle(
         before=errors(Y)[1],

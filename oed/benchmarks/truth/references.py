@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.interpolate import BSpline, PPoly
 
-from tests.truth.machines import Machine
+from oed.benchmarks.truth.machines import Machine
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -17,7 +17,7 @@ class Reference:
     duration: float
     period: float | None
     kind: str
-    curve: object
+    curve: Fourier | Spline
 
     def at(self, t: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Evaluates positions, velocities and accelerations (N, n) at times t (N,) [s]."""

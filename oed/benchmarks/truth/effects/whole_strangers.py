@@ -8,10 +8,10 @@ import numpy as np
 import pinocchio as pin
 from scipy.signal import lfilter
 
-from tests.truth.dynamics import point_force_torque, rigid_torque, with_gravity
-from tests.truth.effects.base import Effect, log_uniform
-from tests.truth.machines import Machine
-from tests.truth.ride import Ride
+from oed.benchmarks.truth.dynamics import point_force_torque, rigid_torque, with_gravity
+from oed.benchmarks.truth.effects.base import Effect, log_uniform
+from oed.benchmarks.truth.machines import Machine
+from oed.benchmarks.truth.ride import Ride
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -104,7 +104,7 @@ class Hose(Effect):
         middle = (machine.lower + machine.upper)[None] / 2
         size = float(np.linalg.norm(_places(machine, middle, np.zeros(3))))
         place = (rng.uniform(-0.3, 0.3), rng.uniform(-0.3, 0.3), rng.uniform(0.8, 1.6))
-        return cls(anchor=tuple(size * x for x in place), slack=size * rng.uniform(0.2, 0.5))
+        return cls(anchor=(size * place[0], size * place[1], size * place[2]), slack=size * rng.uniform(0.2, 0.5))
 
     def torque(self, ride: Ride) -> np.ndarray:
         every = _thinning(ride)

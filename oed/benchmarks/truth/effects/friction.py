@@ -7,9 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.linalg import expm
 
-from tests.truth.effects.base import Effect, log_uniform
-from tests.truth.machines import Machine
-from tests.truth.ride import Ride
+from oed.benchmarks.truth.effects.base import Effect, log_uniform, place_of
+from oed.benchmarks.truth.machines import Machine
+from oed.benchmarks.truth.ride import Ride
 
 SUBSTEPS = 4
 HEAT_STEP = 0.1
@@ -27,7 +27,7 @@ class Stribeck(Effect):
     @classmethod
     def draw(cls, machine: Machine, rng: np.random.Generator, joint: int | None, span: float) -> Stribeck:
         """Draws speed and exponent."""
-        top = machine.speed[joint - 1]
+        top = machine.speed[place_of(joint)]
         return cls(joint=joint, speed=top * log_uniform(rng, 0.015, 0.1), exponent=rng.uniform(0.8, 2.0))
 
     def torque(self, ride: Ride) -> np.ndarray:

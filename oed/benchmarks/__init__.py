@@ -1,0 +1,1 @@
+"""The hidden-effect benchmark: blind cases, answers of any tool, and their scores."""
