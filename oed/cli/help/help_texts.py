@@ -9,7 +9,7 @@ COMMANDS: dict[str, tuple[str, ...]] = {
     "Experiments": ("design", "pareto", "retime", "campaign", "export"),
     "Robot and virtual robot": ("stream", "record", "loop", "controller", "simulate"),
     "Models": ("check", "identify", "thermal", "predict", "payload"),
-    "Diagnosis": ("diagnose", "compare", "monitor", "fleet", "force"),
+    "Diagnosis": ("diagnose", "compare", "monitor", "fleet", "force", "benchmark"),
 }
 """Commands by purpose; those that are not listed come last."""
 
@@ -110,6 +110,11 @@ EXAMPLES = {
     "force": (
         "oed force --model model --log log.csv --healthy healthy.csv --out forces",
         "oed force --model model --log log.csv --calibration forces/forces.json --out other",
+    ),
+    "benchmark": (
+        "oed benchmark make blind --cases 24",
+        "oed benchmark answer blind --by residual-fit",
+        "oed benchmark score blind blind.residual-fit others/answers.json --markdown table.md",
     ),
     "example": ("oed example --out example",),
     "robots": ("oed robots",),
