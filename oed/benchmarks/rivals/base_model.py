@@ -16,10 +16,11 @@ Array = NDArray[np.float64]
 CUT_OFF = 30.0  # of the low-pass of positions [Hz]
 BAND = 5.0  # of the low-pass of torque and columns before the fit [Hz]: above it, accelerations are poorly known
 DECIMATED = 2.5  # samples per period of the band's edge that are left
+STILL = 0.005  # velocity [rad/s] of the smooth sign of Coulomb friction; below it, filtered positions show no direction
 BESIDE = 0.25  # time [s] on both sides of a reversal in which filtered positions do not show the friction's jump
 ENDS = 0.5  # time [s] at both ends of a log where filters err
 ORDER = 4  # of the low-passes
-SMALL = 1e-6  # singular values below this fraction of the largest one are left out
+SMALL = 1e-3  # singular values below this fraction of the largest one are left out: they extrapolate badly
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -75,7 +76,7 @@ def base_columns(model: pin.Model, motion: Motion) -> Array:
         columns[k, :, : 10 * n] = pin.computeJointTorqueRegressor(model, data, motion.q[k], motion.v[k], motion.a[k])
     for j in range(n):
         v, first = motion.v[:, j], 10 * n + 6 * j
-        own = (np.sign(v), v, v * np.abs(v), v**3, motion.a[:, j], np.ones(len(v)))
+        own = (np.tanh(v / STILL), v, v * np.abs(v), v**3, motion.a[:, j], np.ones(len(v)))
         columns[:, j, first : first + 6] = np.column_stack(own)
     return columns
 

@@ -22,7 +22,10 @@ from oed.benchmarks.rivals.whitening import whitening_filter
 Array = NDArray[np.float64]
 
 FALSE_ALARMS = 0.01
-"""Probability of any effect at a robot whose model is right."""
+"""Probability of any significant group if the base model is right."""
+
+LEAST = 0.02
+"""Share of the torque RMS that an effect explains at least: one in ten cases without an effect has a group above it."""
 
 MOST = 3
 """Largest number of effects."""
@@ -46,6 +49,7 @@ class Pick:
         explained: share of the whitened residual's sum of squares that the group explains.
         of_possible: the same over what all groups together explain.
         p_value: of the F test, without correction.
+        size: RMS of the filtered torque that it explains, over the RMS of the joint's filtered torque.
     """
 
     name: str
@@ -53,14 +57,15 @@ class Pick:
     explained: float
     of_possible: float
     p_value: float
+    size: float
 
 
 def by_residual_fit(case: BlindCase) -> CaseAnswer:
     """Answers a case by a stepwise fit of the base model's residual.
 
     At each joint the residual, whitened by an autoregressive model, is fitted by each group of columns. The group that
-    explains the largest share is significant by an F test, with Bonferroni's correction for all groups and joints. It
-    enters the model, which is fitted again, until no group is significant.
+    explains the largest share enters the model, which is fitted again, until no group is significant. A group is
+    significant by an F test with Bonferroni's correction for all groups and joints, if it explains at least `LEAST`.
 
     Args:
         case: the public part of the case.
@@ -72,6 +77,7 @@ def by_residual_fit(case: BlindCase) -> CaseAnswer:
     log_columns = base_columns(model, motion)
     slow = filtered(log_columns, motion.period), filtered(tau, motion.period), away_from_reversals(motion)
     base = fit(*slow)
+    level = np.sqrt((slow[1] ** 2).mean(axis=0))
     torque = log_columns @ base.parameters
     listed = [
         [(name, filtered(group, motion.period)) for name, group in groups(motion, torque, j, gear)]
@@ -80,7 +86,7 @@ def by_residual_fit(case: BlindCase) -> CaseAnswer:
     picks: list[Pick] = []
     found = base
     while len(picks) < MOST:
-        best = _best(found, listed, picks)
+        best = _best(found, level, listed, picks)
         if best is None:
             break
         picks.append(best)
@@ -102,20 +108,20 @@ def by_residual_fit(case: BlindCase) -> CaseAnswer:
     )
 
 
-def _best(found: BaseFit, listed: list[list[tuple[str, Array]]], picks: list[Pick]) -> Pick | None:
-    """Finds the group that explains the largest share of a joint's residual; None if it is not significant."""
+def _best(found: BaseFit, level: Array, listed: list[list[tuple[str, Array]]], picks: list[Pick]) -> Pick | None:
+    """Finds the significant group that explains the largest share of a joint's residual; None if there is none."""
     used = {pick.name if pick.name in WHOLE else (pick.name, pick.j) for pick in picks}
     tried = [
         pick
         for j, candidates in enumerate(listed)
-        for pick in _explained(found, j, candidates)
+        for pick in _explained(found, level[j], j, candidates)
         if used.isdisjoint({pick.name, (pick.name, pick.j)})
     ]
-    best = max(tried, key=lambda pick: pick.explained)
-    return best if best.p_value * len(tried) < FALSE_ALARMS else None
+    significant = [pick for pick in tried if pick.p_value * len(tried) < FALSE_ALARMS and pick.size >= LEAST]
+    return max(significant, key=lambda pick: pick.explained, default=None)
 
 
-def _explained(found: BaseFit, j: int, listed: list[tuple[str, Array]]) -> list[Pick]:
+def _explained(found: BaseFit, level: float, j: int, listed: list[tuple[str, Array]]) -> list[Pick]:
     residual = found.residual[:, j]
     scaled = [(name, group / np.sqrt((group**2).mean(axis=0) + TINY)) for name, group in listed]
     together = np.concatenate([group for _, group in scaled], axis=1)
@@ -137,6 +143,12 @@ def _explained(found: BaseFit, j: int, listed: list[tuple[str, Array]]) -> list[
     target = left(residual)
     whole = float(target @ target)
 
+    slow_own, slow_residual = _span(base[rows]), residual[rows]
+
+    def size(columns: Array) -> float:
+        beyond = columns[rows] - _projected(slow_own, columns[rows])
+        return float(np.sqrt((_projected(_span(beyond), slow_residual) ** 2).mean()) / level)
+
     def gain(columns: Array) -> float:
         along = _span(left(columns)).T @ target
         return float(along @ along)
@@ -152,6 +164,7 @@ def _explained(found: BaseFit, j: int, listed: list[tuple[str, Array]]) -> list[
                 j=j,
                 explained=explained / whole,
                 of_possible=explained / max(possible, TINY),
+                size=size(group),
                 p_value=float(f_distribution.sf(statistic, k, free - k)),
             )
         )

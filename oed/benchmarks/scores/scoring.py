@@ -52,8 +52,8 @@ class Scores:
     def rows(self) -> list[tuple[str, ...]]:
         """Lists the rows of the table: title, and one cell per tool."""
         return [
-            (title, *(tool.figures[title].text() for tool in self.tools))
-            for title in (self.tools[0].figures if self.tools else ())
+            (title, *(tool.figures[title].text() if title in tool.figures else "-" for tool in self.tools))
+            for title in dict.fromkeys(title for tool in self.tools for title in tool.figures)
         ]
 
     def summary(self) -> str:
