@@ -44,7 +44,7 @@ def by_diagnosis(case: BlindCase) -> CaseAnswer:
         found = diagnosis.to_dict()
         return CaseAnswer(
             verdict=VERDICTS[found["verdict"]],
-            effects=tuple(map(_effect, found["findings"])) if found["verdict"] != "none" else (),
+            effects=tuple(map(named_effect, found["findings"])) if found["verdict"] != "none" else (),
             torque=_predicted(model, log, unseen),
         )
 
@@ -58,7 +58,12 @@ def _predicted(model: Any, log: Any, unseen: Any) -> NDArray[np.float64]:
     return np.column_stack([np.interp(unseen.t, t, torque[:, j]) for j in range(torque.shape[1])])
 
 
-def _effect(finding: dict[str, Any]) -> NamedEffect:
+def named_effect(finding: dict[str, Any]) -> NamedEffect:
+    """Translates a finding of ``diagnosis.json``; an effect that the benchmark has no name for is ``unknown``.
+
+    Args:
+        finding: its effect, joint and parameters.
+    """
     name = finding["effect"] if finding["effect"] in EFFECT_NAMES else UNKNOWN
     values = {NAMES.get(p["name"], p["name"]): p for p in finding["parameters"] or ()}
     scored = known_parameters(name, dict.fromkeys(values, 0.0))

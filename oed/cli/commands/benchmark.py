@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from pathlib import Path
 from typing import Annotated
 
@@ -30,7 +31,7 @@ def benchmark(
     context: typer.Context,
     action: Annotated[str, typer.Argument(help="What to do: make, answer or score.", show_default=False)],
     folder: Annotated[Path, typer.Argument(help="Folder of the benchmark.", show_default=False)],
-    given: Annotated[
+    files: Annotated[
         list[Path] | None,
         typer.Argument(
             metavar="[ANSWERS]...", help="Of score: files of answers, or their folders.", show_default=False
@@ -98,8 +99,8 @@ def benchmark(
         for name, owner in BELONGS.items():
             if owner != action and is_given(context, name):
                 raise InputError(f"--{name} beside `oed benchmark {action}`", remedy=f"it belongs to {owner}")
-        if given and action != "score":
-            raise InputError(f"{given[0]} beside `oed benchmark {action}`", remedy="files of answers belong to score")
+        if files and action != "score":
+            raise InputError(f"{files[0]} beside `oed benchmark {action}`", remedy="files of answers belong to score")
         if action == "answer" and answers is not None:
             raise InputError("--answers beside `oed benchmark answer`", remedy="blind cases are answered without them")
         if action == "make":
@@ -119,10 +120,14 @@ def benchmark(
             if by is None:
                 raise InputError("no method", allowed=", ".join(METHODS), remedy="name it with --by")
             target = out if out is not None else folder.absolute().with_name(f"{folder.absolute().name}.{by}")
-            answered = answer_benchmark(folder, by=by, out=target, force=force, workers=workers, progress=progress)
+            try:
+                answered = answer_benchmark(folder, by=by, out=target, force=force, workers=workers, progress=progress)
+            except KeyboardInterrupt:
+                print("oed: interrupted; the same command continues where it was", file=sys.stderr)
+                raise typer.Exit(130) from None
             summary, data = f"{answered.summary()}\nwritten to {target.resolve()}", answered.to_dict()
         else:
-            scores = score_benchmark(folder, given or (), sealed=answers)
+            scores = score_benchmark(folder, files or (), sealed=answers)
             summary, data = scores.summary(), scores.to_dict()
             if markdown is not None:
                 write_atomic(markdown, scores.markdown(), force=force)

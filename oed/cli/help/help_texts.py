@@ -35,10 +35,10 @@ OPTIONS = {
             "model",
             "campaign_folder",
         ),
-        *("payload", "gravity", "ambient", "plant", "after", "task", "design", "extension"),
+        *("payload", "gravity", "ambient", "plant", "after", "task", "design", "extension", "answers"),
     ),
     "Output": (
-        *("out", "force", "png", "json", "quiet", "urdf", "mjcf", "c_code", "to", "degrees", "positions_only", "bare"),
+        *("out", "force", "png", "json", "quiet", "urdf", "mjcf", "c_code", "to", "degrees", "positions_only", "bare", "markdown"),
         *("install_completion", "show_completion", "help", "version"),
     ),
 }
