@@ -38,7 +38,21 @@ OPTIONS = {
         *("payload", "gravity", "ambient", "plant", "after", "task", "design", "extension", "answers"),
     ),
     "Output": (
-        *("out", "force", "png", "json", "quiet", "urdf", "mjcf", "c_code", "to", "degrees", "positions_only", "bare", "markdown"),
+        *(
+            "out",
+            "force",
+            "png",
+            "json",
+            "quiet",
+            "urdf",
+            "mjcf",
+            "c_code",
+            "to",
+            "degrees",
+            "positions_only",
+            "bare",
+            "markdown",
+        ),
         *("install_completion", "show_completion", "help", "version"),
     ),
 }
