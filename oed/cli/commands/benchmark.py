@@ -33,9 +33,7 @@ def benchmark(
     folder: Annotated[Path, typer.Argument(help="Folder of the benchmark.", show_default=False)],
     files: Annotated[
         list[Path] | None,
-        typer.Argument(
-            metavar="[ANSWERS]...", help="Of score: files of answers, or their folders.", show_default=False
-        ),
+        typer.Argument(help="Of score: files of answers, or their folders.", show_default=False),
     ] = None,
     cases: Annotated[int, typer.Option(help="Of make: number of cases.")] = 24,
     robots: Annotated[
