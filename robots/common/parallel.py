@@ -147,7 +147,7 @@ def _map_in_processes(
     function: Callable[[Item], Result], work: Sequence[Item], count: int, progress: Progress
 ) -> list[Result]:
     context = multiprocessing.get_context("spawn")
-    pool = ProcessPoolExecutor(count, mp_context=context, initializer=_start_worker)
+    pool = ProcessPoolExecutor(count, mp_context=context, initializer=start_worker)
     try:
         # Workers start during submission, one at a time, and inherit the environment of that moment.
         with single_blas_thread():
@@ -163,7 +163,8 @@ def _map_in_processes(
         pool.shutdown(wait=True, cancel_futures=True)
 
 
-def _start_worker() -> None:
+def start_worker() -> None:
+    """Prepares a worker process for interrupts."""
     # A terminal interrupts the whole process group: workers then end at once, without a traceback each.
     signal.signal(signal.SIGINT, signal.SIG_DFL)
 
