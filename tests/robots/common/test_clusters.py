@@ -11,8 +11,8 @@ import time
 import numpy as np
 import pytest
 
-from robots.common import clusters
-from robots.common.clusters import ClusterExecutor, cluster
+from robots.common.clusters import ClusterExecutor, cluster, connection
+from robots.common.clusters import executor as executors
 from robots.common.errors import InfeasibleError, InputError, OedError
 from robots.common.parallel import as_finished, parallel_map
 from tests.robots.common import cluster_jobs as jobs
@@ -96,7 +96,7 @@ def test_other_versions_are_refused(dask_cluster):
 
 def test_no_scheduler(monkeypatch):
     """A wrong address, and a port where something else listens, are input errors within the time for an answer."""
-    monkeypatch.setattr(clusters, "ANSWER", 1.0)
+    monkeypatch.setattr(connection, "ANSWER", 1.0)
     with socket.socket() as other:
         other.bind(("127.0.0.1", 0))
         other.listen()
@@ -115,8 +115,8 @@ def test_cluster_without_workers(monkeypatch):
     """A cluster without workers is refused; one that loses its last worker for long ends the work."""
     from distributed import LocalCluster
 
-    monkeypatch.setattr(clusters, "WITHOUT_WORKERS", 0.3)
-    monkeypatch.setattr(clusters, "LOOK", 0.1)
+    monkeypatch.setattr(executors, "WITHOUT_WORKERS", 0.3)
+    monkeypatch.setattr(executors, "LOOK", 0.1)
     quiet = {"dashboard_address": "127.0.0.1:0", "processes": False}
     with LocalCluster(n_workers=0, **quiet) as empty:
         with pytest.raises(InputError, match="has no workers"), cluster(empty.scheduler_address):
