@@ -37,6 +37,11 @@ def dies_once(task: tuple[Path, int]) -> int:
     return number * number
 
 
+def dies(_: int) -> None:
+    """Ends its process."""
+    os._exit(9)
+
+
 def fail(number: int) -> int:
     """Fails for item 1."""
     if number == 1:

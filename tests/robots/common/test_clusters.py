@@ -50,6 +50,14 @@ def test_killed_worker_costs_its_task_alone(dask_cluster, tmp_path):
     assert len(begun) == 7  # the task of the killed worker, once more
 
 
+def test_task_that_kills_its_workers(dask_cluster, monkeypatch):
+    """A task that has cost more workers than the scheduler allows is an error of ours that says what to do."""
+    monkeypatch.setattr(dask_cluster.scheduler, "allowed_failures", 0)
+    with cluster(dask_cluster.scheduler_address) as executor, pytest.raises(OedError, match="memory may have run out"):
+        parallel_map(jobs.dies, [0], executor=executor)
+    dask_cluster.wait_for_workers(2)
+
+
 def test_errors_and_functions_of_scripts(dask_cluster):
     """An error of ours arrives with its fields; functions that have no name to import by work, too."""
     with cluster(dask_cluster.scheduler_address) as executor:
@@ -112,7 +120,7 @@ def test_no_scheduler(monkeypatch):
 
 
 def test_cluster_without_workers(monkeypatch):
-    """A cluster without workers is refused; one that loses its last worker for long ends the work."""
+    """A cluster without workers is refused; the loss of the last worker for long, or of the scheduler, ends the work."""
     from distributed import LocalCluster
 
     monkeypatch.setattr(executors, "WITHOUT_WORKERS", 0.3)
@@ -126,4 +134,8 @@ def test_cluster_without_workers(monkeypatch):
         with cluster(empty.scheduler_address) as executor:
             empty.scale(0)
             with pytest.raises(OedError, match="has had no worker"):
+                parallel_map(jobs.fail, [0, 2], executor=executor)
+            monkeypatch.setattr(executors, "WITHOUT_WORKERS", 100.0)
+            threading.Timer(0.3, empty.close).start()
+            with pytest.raises(OedError, match=r"connection to the Dask scheduler at .* was lost"):
                 parallel_map(jobs.fail, [0, 2], executor=executor)
