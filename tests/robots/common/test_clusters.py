@@ -120,7 +120,7 @@ def test_no_scheduler(monkeypatch):
 
 
 def test_cluster_without_workers(monkeypatch):
-    """A cluster without workers is refused; the loss of the last worker for long, or of the scheduler, ends the work."""
+    """A cluster without workers is refused; the loss of the last worker, or of the scheduler, ends the work."""
     from distributed import LocalCluster
 
     monkeypatch.setattr(executors, "WITHOUT_WORKERS", 0.3)
