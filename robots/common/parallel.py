@@ -35,6 +35,13 @@ BLAS_VARIABLES = (
 )
 
 
+class _Marks:
+    worker = False
+
+
+_marks = _Marks()
+
+
 def parallel_map(
     function: Callable[[Item], Result],
     items: Iterable[Item],
@@ -153,6 +160,16 @@ def threaded(function: Callable[[Item], Result], items: Iterable[Item]) -> Itera
                 future.cancel()
 
 
+def is_worker() -> bool:
+    """Whether this process is one of several that work side by side, so that its other cores are busy."""
+    return _marks.worker or multiprocessing.parent_process() is not None
+
+
+def mark_as_worker() -> None:
+    """Says that this process is one of several, where its parent does not show it, as for a cluster's worker."""
+    _marks.worker = True
+
+
 def available_cores() -> int:
     """Returns the number of cores that this process may use, at least 1."""
     if hasattr(os, "sched_getaffinity"):
@@ -196,7 +213,7 @@ def _by_processes(
     while left:
         begun, before, lost = context.Event(), len(left), False
         pool = ProcessPoolExecutor(
-            min(count, len(left)), mp_context=context, initializer=_start_worker, initargs=(begun,)
+            min(count, len(left)), mp_context=context, initializer=_begin_worker, initargs=(begun,)
         )
         try:
             # Workers start during submission, one at a time, and inherit the environment of that moment.
@@ -232,7 +249,7 @@ def _require_accident(begun: Event, losses: int) -> None:
     if not begun.is_set():
         raise OedError(
             "the worker processes ended before their work began",
-            remedy="a script must start its work under `if __name__ == '__main__':`",
+            remedy="a script must start its work under `if __name__ == '__main__':`; else the reason stands above",
         )
     if losses > MOST_LOSSES:
         raise OedError(
@@ -241,10 +258,15 @@ def _require_accident(begun: Event, losses: int) -> None:
         )
 
 
-def _start_worker(begun: Event) -> None:
+def _begin_worker(begun: Event) -> None:
+    start_worker()
+    begun.set()
+
+
+def start_worker() -> None:
+    """Prepares a worker process for interrupts."""
     # A terminal interrupts the whole process group: workers then end at once, without a traceback each.
     signal.signal(signal.SIGINT, signal.SIG_DFL)
-    begun.set()
 
 
 def _by_executor(

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from robots.common.errors import InputError, OedError
+from robots.common.parallel import mark_as_worker
 from robots.version import VERSION
 
 _stopped: set[str] = set()
@@ -52,6 +53,7 @@ def work(call: bytes, version: str) -> Any:
         # For good, and not around the task: another task may run beside it in a thread of its own.
         if not _limits:
             _limits.append(threadpool_limits(limits=1, user_api="blas"))
+            mark_as_worker()
     try:
         function, args, kwargs = cloudpickle.loads(call)
     except ImportError as error:
