@@ -17,6 +17,7 @@ from robots.common.errors import InfeasibleError, InputError, OedError
 from robots.common.parallel import as_finished, parallel_map
 from tests.robots.common import cluster_jobs as jobs
 
+pytest.importorskip("distributed", reason="a cluster needs the package distributed")
 pytestmark = pytest.mark.slow
 
 
