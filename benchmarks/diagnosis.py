@@ -1,9 +1,10 @@
 """How well the diagnosis finds what is hidden in logs of a plant that shares no code with it.
 
-Run it with ``python benchmarks/diagnosis.py``. Cases are drawn by ``tests/truth``: four kinds of robot, periodic and
-aperiodic motion under a closed position loop, logs of t, q and tau at 250 Hz with 2.5 % of coloured noise. Sizes are
-the share of a joint's torque RMS that shows beyond the base model. Rows go to a JSON-lines file as they come; a run
-that was stopped goes on where it was. Seeds below 1000 are the benchmark's own: no threshold is tuned on them.
+Run it with ``python benchmarks/diagnosis.py``. Cases are drawn by ``oed/benchmarks/truth``: four kinds of robot,
+periodic and aperiodic motion under a closed position loop, logs of t, q and tau at 250 Hz with 2.5 % of coloured
+noise. Sizes are the share of a joint's torque RMS that shows beyond the base model. Rows go to a JSON-lines file as
+they come; a run that was stopped goes on where it was. Seeds below 1000 are the benchmark's own: no threshold is tuned
+on them.
 """
 
 from __future__ import annotations

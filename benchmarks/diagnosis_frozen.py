@@ -2,7 +2,7 @@
 
 Run ``python benchmarks/diagnosis_frozen.py run --data FOLDER --out now.jsonl`` and then
 ``python benchmarks/diagnosis_frozen.py compare benchmarks/diagnosis_frozen.jsonl now.jsonl``. The set has 60 cases of
-``tests/truth`` (15 without an effect, 25 with one, 10 with two, 10 outside the catalogue) and the real logs of
+``oed/benchmarks/truth`` (15 without an effect, 25 with one, 10 with two, 10 outside the catalogue) and the real logs of
 ``diagnosis_real.py``. Texts are left out: a change of wording is no change of behaviour. A run that was stopped goes
 on where it was. Processors round differently: compare two runs of one machine.
 """

@@ -24,13 +24,13 @@ from estimation.diagnosis.recordings.smoothed_motion import low_pass_gain
 from estimation.diagnosis.reversals.reversal_impulses import ImpulseResponse, edges_of
 from estimation.diagnosis.reversals.reversal_timing import ReversalTiming, measure_reversal_timing
 from estimation.diagnosis.searches.search import fit_plain
+from oed.benchmarks.truth.cases import Case, draw_case
+from oed.benchmarks.truth.description import write_description
+from oed.benchmarks.truth.effects.actuator import Delay
 from robots import load_robot
 from robots.robot import Robot
 from robots.signals import Log
 from robots.terms.effects import EFFECTS
-from tests.truth.cases import Case, draw_case
-from tests.truth.description import write_description
-from tests.truth.effects.actuator import Delay
 
 COUNTS = 2.0**17
 
