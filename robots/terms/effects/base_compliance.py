@@ -23,6 +23,8 @@ SCANNED = (4.0, 5.5, 7.5, 11.0, 20.0, 300.0)
 """Resonances [Hz] of a scan at the log's mean inertia, the same about both axes."""
 LOWEST, HIGHEST = 2.0, 1000.0
 """Range of the resonances [Hz]."""
+LIGHTEST = 0.02
+"""Smallest inertia about any axis in any pose, as a fraction of the largest."""
 SOFTEST, FARTHEST = 1e-3, 0.3
 """Largest compliance [rad/(N m)], and largest tilt by the first link's own moments [rad]."""
 INEXACT = 0.05
@@ -93,6 +95,13 @@ class BaseCompliance(Effect):
             :-1
         ]
 
+    def other_optima(
+        self, situation: Situation, joint: Place, shape: tuple[float, ...], coefficients: Array
+    ) -> tuple[tuple[tuple[float, ...], ...], ...]:
+        """Lists starts with different resonances about both axes, which the scan does not have."""
+        values = [_stiffness(situation, f) for f in SCANNED]
+        return (tuple((a[0], b[1], *shape[2:]) for a, b in product(values, values) if a is not b),)
+
     def is_plausible(self, robot: Robot, joint: Place, coefficients: Array, shape: tuple[float, ...] = ()) -> bool:
         """Rejects compliances that would give energy: their matrix is not positive."""
         first, second, both = coefficients[:3]
@@ -151,14 +160,23 @@ def _moment(situation: Situation) -> Array:
 
 
 def _inertia(situation: Situation) -> Array:
-    """Computes the robot's inertia about each horizontal axis (N, 2) [kg m2], at least a little of its mean."""
-    own = np.einsum("ki,nij,kj->nk", _axes(situation), situation.sensitivity("base_inertia"), _axes(situation))
-    return np.asarray(np.maximum(own, 0.02 * np.abs(own).mean(axis=0) + 1e-9))
+    """Computes the robot's inertia about both horizontal axes (N, 2, 2) [kg m2], positive definite.
+
+    A base model lacks the first link's inertia and may have a negative one, which would make the base unstable.
+    """
+
+    def positive() -> Array:
+        own = _axes(situation) @ situation.sensitivity("base_inertia") @ _axes(situation).T
+        values, vectors = np.linalg.eigh((own + own.transpose(0, 2, 1)) / 2)
+        least = LIGHTEST * max(float(values.max(initial=0.0)), 1e-9)
+        return np.asarray((vectors * np.maximum(values, least)[:, None]) @ vectors.transpose(0, 2, 1))
+
+    return situation.cached("inertia about the base", positive)
 
 
 def _stiffness(situation: Situation, resonance: float) -> tuple[float, float]:
     """Computes the stiffnesses that give the log's mean inertia a resonance [Hz] about each axis."""
-    first, second = (2 * np.pi * resonance) ** 2 * _inertia(situation).mean(axis=0)
+    first, second = (2 * np.pi * resonance) ** 2 * np.diag(_inertia(situation).mean(axis=0))
     return float(first), float(second)
 
 
@@ -175,8 +193,8 @@ def _oscillation(situation: Situation, rate: Array, curve: Array, shape: tuple[f
         The difference (N, 2, k); zero in logs whose resonances are both above 0.4 of the Nyquist frequency.
     """
     K, own, damping = np.array(shape[:2]), shape[2], shape[3]
-    about, axes = _inertia(situation) + own, _axes(situation)
-    inertia = axes @ situation.sensitivity("base_inertia") @ axes.T + own * np.eye(2)
+    axes, inertia = _axes(situation), _inertia(situation) + own * np.eye(2)
+    about = np.einsum("nkk->nk", inertia)
     lost = axes @ situation.sensitivity("base_damping") @ axes.T
     lost = lost + 2 * damping * np.sqrt(K * about)[:, :, None] * np.eye(2)
     push = -(inertia @ curve + lost @ rate)
