@@ -19,8 +19,8 @@ Array = NDArray[np.float64]
 
 DAMPING = 0.05
 """Damping ratio of the base's resonances, unless the data show another one."""
-SCANNED = (4.0, 5.5, 7.5, 11.0, 20.0, 300.0)
-"""Resonances [Hz] of a scan at the log's mean inertia, the same about both axes."""
+SCANNED = (*(3.5 * 1.1**k for k in range(18)), 30.0, 300.0)
+"""Resonances [Hz] of a scan at the log's mean inertia, up to 18 in steps of a tenth: a resonance is narrow."""
 LOWEST, HIGHEST = 2.0, 1000.0
 """Range of the resonances [Hz]."""
 LIGHTEST = 0.02
@@ -71,8 +71,23 @@ class BaseCompliance(Effect):
         return (None,) if np.any(robot.chain.gravity) else ()
 
     def grid(self, situation: Situation, joint: Place) -> tuple[tuple[float, ...], ...]:
-        """Lists stiffnesses for the resonances in `SCANNED`, the same about both axes."""
-        return tuple((*_stiffness(situation, f), 0.0, DAMPING) for f in SCANNED)
+        """Lists stiffnesses for all pairs of the resonances in `SCANNED`."""
+        pairs = [_stiffness(situation, f) for f in SCANNED]
+        return tuple((one[0], other[1], 0.0, DAMPING) for one, other in product(pairs, pairs))
+
+    def propose(
+        self, situation: Situation, joint: Place, residual: Array, count: int = 8
+    ) -> tuple[tuple[float, ...], ...]:
+        """Ranks the resonances about each axis by what that axis' compliance explains, the other axis alike."""
+        pairs = [_stiffness(situation, f) for f in SCANNED]
+        shown = []
+        for pair in pairs:
+            X = self.columns(situation, joint, (*pair, 0.0, DAMPING))[:, :, :2]
+            explained = np.einsum("njk,nj->k", X, residual)
+            shown.append(np.maximum(explained, 0.0) ** 2 / np.maximum(np.einsum("njk,njk->k", X, X), 1e-300))
+        score = np.array(shown)  # (resonances, 2)
+        best = sorted(product(range(len(pairs)), repeat=2), key=lambda at: -(score[at[0], 0] + score[at[1], 1]))
+        return tuple((pairs[one][0], pairs[other][1], 0.0, DAMPING) for one, other in best[:count])
 
     def bounds(self, situation: Situation, joint: Place) -> tuple[tuple[float, float], ...]:
         """Bounds the stiffness to usual resonances, and the base's own inertia to the robot's."""
@@ -94,13 +109,6 @@ class BaseCompliance(Effect):
         return tuple((*pair, own, damping) for pair, own, damping in product(stiffness, (0.0, None), (DAMPING, None)))[
             :-1
         ]
-
-    def other_optima(
-        self, situation: Situation, joint: Place, shape: tuple[float, ...], coefficients: Array
-    ) -> tuple[tuple[tuple[float, ...], ...], ...]:
-        """Lists starts with different resonances about both axes, which the scan does not have."""
-        values = [_stiffness(situation, f) for f in SCANNED]
-        return (tuple((a[0], b[1], *shape[2:]) for a, b in product(values, values) if a is not b),)
 
     def is_plausible(self, robot: Robot, joint: Place, coefficients: Array, shape: tuple[float, ...] = ()) -> bool:
         """Rejects compliances that would give energy: their matrix is not positive."""
