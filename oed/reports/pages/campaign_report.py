@@ -8,8 +8,9 @@ import numpy as np
 
 from oed.campaigns import Campaign, Slot, Stage
 from oed.reports.pictures.campaign_pictures import temperature_picture, velocity_picture
-from oed.reports.rendering.page import Cell, Fact, Page, Section, Table
-from oed.reports.rendering.saving import footer, save_page
+from oed.reports.rendering.page import Cell, Fact, Finding, Page, Section, Table, findings_of
+from oed.reports.rendering.provenance import footer
+from oed.reports.rendering.saving import save_page
 from robots.common.files import ResultFolder
 
 
@@ -22,17 +23,16 @@ def campaign_page(campaign: Campaign) -> Page:
     """Builds the page: what runs when, how each stage moves, and how hot the robot is expected to get."""
     robot = campaign.robot
     verdict = (
-        f"{campaign.cycles} cycles in {campaign.duration / 60:.1f} min, {len(campaign.stages)} files to play. Every "
-        f"stage respects all limits and starts and ends at rest in the home pose."
+        f"Play {len(campaign.stages)} files in {campaign.cycles} cycles, {campaign.duration / 60:.1f} min in all, by the "
+        "timetable below."
     )
     temperature = _temperature_sections(campaign)
     return Page(
         title="Campaign",
-        subtitle=robot.title or robot.name,
-        verdict=verdict if campaign.success else "At least one stage exceeds a limit; see the table of margins.",
-        status="good" if campaign.success else "bad",
+        robot=robot.title or robot.name,
+        verdict=verdict if campaign.success else "Do not play this campaign: at least one stage exceeds a limit.",
+        findings=_findings(campaign),
         facts=_facts(campaign),
-        warnings=(*campaign.notes, *_assumed(campaign)),
         sections=(
             Section(
                 title="Schedule",
@@ -74,10 +74,21 @@ def _facts(campaign: Campaign) -> tuple[Fact, ...]:
     return tuple(facts)
 
 
-def _assumed(campaign: Campaign) -> tuple[str, ...]:
-    if not campaign.robot.assumed:
-        return ()
-    return (f"Assumed values without a source: {', '.join(campaign.robot.assumed)}.",)
+def _findings(campaign: Campaign) -> tuple[Finding, ...]:
+    found = [
+        Finding(
+            code="limit.exceeded",
+            subject=f"{stage.name}, joint {margin.joint}:",
+            text=f"the limit of {margin.quantity} is exceeded at {margin.time:.3f} s.",
+            action="Do not play it.",
+        )
+        for stage in campaign.stages
+        for margin in stage.margins
+        if margin.violated
+    ]
+    assumed = campaign.robot.assumed
+    texts = [f"Assumed values without a source: {', '.join(assumed)}."] if assumed else []
+    return (*found, *findings_of("experiment.note", campaign.notes), *findings_of("value.assumed", texts))
 
 
 def _phases(campaign: Campaign) -> Table:
@@ -227,7 +238,14 @@ def _temperature_sections(campaign: Campaign) -> tuple[Section, ...]:
             )
         )
     table = Table(
-        headings=("joint", "W [W]", "slow [min]", "fast [min]", "highest [°C]", "parameters"),
+        headings=(
+            "joint",
+            "friction power [W]",
+            "slow time constant [min]",
+            "fast time constant [min]",
+            "highest temperature [°C]",
+            "parameters",
+        ),
         rows=tuple(rows),
         caption="Mean power of the hottest cycle at ambient temperature, and the time constants at that power.",
     )

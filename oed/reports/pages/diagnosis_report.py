@@ -10,15 +10,17 @@ from numpy.typing import NDArray
 from estimation.diagnosis.calibration import CLOSE_RIVAL_BIC
 from estimation.diagnosis.experiment_plans.detection_limits import summarise_limits
 from estimation.diagnosis.results.diagnosis import Diagnosis
+from oed.reports.pages.diagnosis_actions import action_for, sentence_for
 from oed.reports.pages.diagnosis_limits import limits_section
 from oed.reports.pages.diagnosis_simulation import simulation_section
 from oed.reports.pages.diagnosis_view import DiagnosisView, view_of
 from oed.reports.pictures.diagnosis_pictures import cause_picture, gain_picture
 from oed.reports.pictures.torque_pictures import torque_picture
 from oed.reports.rendering.joint_units import joint_titles, joint_units
-from oed.reports.rendering.page import Cell, Fact, Page, Section, Status, Table
+from oed.reports.rendering.page import Cell, Fact, Finding, Page, Section, Table, findings_of
 from oed.reports.rendering.picture import Picture
-from oed.reports.rendering.saving import footer, save_page
+from oed.reports.rendering.provenance import footer
+from oed.reports.rendering.saving import save_page
 from oed.reports.rendering.significant import NORMAL_95, significant
 from robots.common.files import ResultFolder
 
@@ -43,39 +45,56 @@ def diagnosis_page(view: DiagnosisView) -> Page:
         sections.append(Section(title="Unexplained residual", paragraphs=view.unexplained))
     sections.append(_next(view))
     sections.append(limits_section(view.limits, folded=bool(view.findings)))
-    status: dict[str, Status] = {"none": "good", "named": "good"}
     return Page(
         title="Diagnosis",
-        subtitle=view.robot,
+        robot=view.robot,
         verdict=_verdict(view),
-        status=status.get(view.verdict, "warning"),
+        logs=view.logs,
+        findings=_findings(view),
         facts=_facts(view),
-        warnings=view.warnings,
         sections=tuple(sections),
-        footer=footer(),
+        footer=footer(view.seed),
     )
 
 
 def _verdict(view: DiagnosisView) -> str:
     if view.verdict == "none":
-        seen = summarise_limits(view.limits)
-        return f"No missing effect was found.{f' {seen}.' if seen else ''}"
-    if not view.findings:
-        return "The residual is not noise, but no effect of the catalogue explains it."
-    first = view.findings[0].sentence
-    others = len(view.findings) - 1
-    more = f" {others} more below." if others else ""
+        return "No missing effect was found: use the model as it is."
+    if view.verdict == "named":
+        known = sentence_for((finding.effect, finding.joint) for finding in view.findings)
+        return f"{known} {view.findings[0].sentence}" if len(view.findings) == 1 else known
+    # A free function does not name a cause, whatever its gain.
+    helps = any(finding.interval[0] > 0 and finding.named for finding in view.findings)
+    why = "part of the error has no known cause" if helps else "no effect of the catalogue explains the residual"
     if view.verdict == "ambiguous":
-        return f"An effect is found, but several causes fit. The most likely: {first}{more}"
-    if view.verdict == "unexplained":
-        # A free function does not name a cause, whatever its gain.
-        helps = any(finding.interval[0] > 0 and finding.named for finding in view.findings)
-        part = "The error is explained in part." if helps else _NO_KNOWN_CAUSE
-        return f"{part} {first}{more}"
-    return f"{first}{more}"
+        why = "several causes fit"
+    if view.next_kind:
+        return f"Record {view.next_kind} and diagnose again: {why}."
+    return f"Check logs and robot: {why}, and no known experiment finds it."
 
 
-_NO_KNOWN_CAUSE = "The residual is not noise, but no effect of the catalogue explains it."
+def _findings(view: DiagnosisView) -> tuple[Finding, ...]:
+    found = [
+        Finding(
+            code=f"effect.{finding.effect}" if finding.named else "diagnosis.unexplained",
+            subject=f"{finding.title[:1].upper()}{finding.title[1:]}:",
+            text=finding.sentence,
+            action=action_for(finding.effect, [finding.joint]) if finding.named else "",
+        )
+        for finding in view.findings
+    ]
+    found += findings_of("diagnosis.unexplained", view.unexplained)
+    if view.verdict == "unexplained" and not any(item.code == "diagnosis.unexplained" for item in found):
+        found += findings_of("diagnosis.unexplained", ["Part of the residual is not noise and has no known cause."])
+    for finding in view.findings:
+        close = [title for title, worse in finding.rivals if worse < CLOSE_RIVAL_BIC]
+        if view.verdict == "ambiguous" and close:
+            text = f"{finding.title} explains the logs hardly better than {', '.join(close)}."
+            found.append(Finding(code="diagnosis.ambiguous", text=f"{text[:1].upper()}{text[1:]}"))
+    if view.verdict == "ambiguous" and not any(item.code == "diagnosis.ambiguous" for item in found):
+        found.append(Finding(code="diagnosis.ambiguous", text="Several causes explain the logs about as well."))
+    seen = summarise_limits(view.limits) if view.verdict == "none" else ""
+    return (*found, *findings_of("diagnosis.note", view.warnings), *findings_of("done", [f"{seen}."] if seen else []))
 
 
 def _facts(view: DiagnosisView) -> tuple[Fact, ...]:
@@ -126,7 +145,14 @@ def _torque(view: DiagnosisView) -> Section:
     if known:
         pictures.append(gain_picture(view.nrmse_before, view.nrmse_after, joint_names=view.joint_names))
     pictures.append(
-        torque_picture(view.t, view.measured, view.extended, joint_names=view.joint_names, kinds=view.kinds)
+        torque_picture(
+            view.t,
+            view.measured,
+            view.extended,
+            joint_names=view.joint_names,
+            kinds=view.kinds,
+            why_gaps="in rows that do not count for a joint: it rests or reverses there, and its friction is not known",
+        )
     )
     titles = joint_titles(view.joint_names, len(view.joint_names))
     rows: list[tuple[Cell, ...]] = []

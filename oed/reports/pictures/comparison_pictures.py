@@ -46,7 +46,7 @@ def course_picture(
         Panel(
             title=names[i],
             x_label=x_label,
-            y_label=f"[{units[i]}]",
+            y_label=f"value [{units[i]}]",
             series=(
                 Series(
                     x=np.asarray(x, dtype=float),
@@ -92,7 +92,7 @@ def friction_runs_picture(
             Panel(
                 title=titles[joint - 1],
                 x_label=f"velocity [{units[joint - 1].velocity}]",
-                y_label=f"[{units[joint - 1].torque}]",
+                y_label=f"friction [{units[joint - 1].torque}]",
                 series=tuple(
                     Series(x=speed, y=torque[k], error=NORMAL_95 * error[k], name=label, role=sequence_role(k))
                     for k, label in enumerate(labels)

@@ -31,7 +31,7 @@ class Series:
         error: half widths, (N,), or None: error bars of markers and bars, a ribbon around lines.
         role: the role that gives its colour.
         dash: the stroke of a line.
-        opacity: from 0 to 1.
+        opacity: from 0 to 1; 0 draws only the ribbon of a line with errors.
         texts: a text per point for hovering, (N,) or empty.
 
     Raises:

@@ -1,7 +1,8 @@
-"""Pictures as plotly figures, for pages."""
+"""Pictures as plotly figures, for notebooks and pages."""
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -45,12 +46,14 @@ def to_plotly(picture: Picture, *, points: int = POINTS) -> Figure:
         rows=picture.rows,
         cols=picture.columns,
         subplot_titles=[_escape(panel.title) for panel in picture.panels],
+        specs=_cells(picture),
         vertical_spacing=min(gap / height, 0.9 / max(picture.rows - 1, 1)) if picture.rows > 1 else 0.0,
         horizontal_spacing=0.2 / picture.columns if picture.columns > 1 else 0.0,
         figure=Figure(layout={"template": "none"}),
     )
-    for annotation in figure.layout.annotations:
-        annotation.update(font={"size": 13, "color": INK}, x=annotation.x, yshift=2)
+    titled = [index for index, panel in enumerate(picture.panels) if panel.title]
+    for index, annotation in zip(titled, figure.layout.annotations, strict=True):
+        annotation.update(font={"size": 13, "color": INK}, x=annotation.x, yshift=2, name=f"title-{index}")
     named: set[str] = set()
     # Handed over all at once: plotly copies and checks everything that is there with each single one.
     shapes: list[dict[str, Any]] = []
@@ -81,6 +84,78 @@ def to_plotly(picture: Picture, *, points: int = POINTS) -> Figure:
     return figure
 
 
+def for_page(picture: Picture) -> Figure:
+    """Draws a picture for a page, which has its legend and buttons in HTML and arranges the panels by its width.
+
+    Args:
+        picture: what to draw.
+    """
+    figure = to_plotly(picture)
+    height, gap = _height(picture)
+    figure.update_layout(
+        showlegend=False,
+        height=height,
+        margin=MARGINS,
+        meta={
+            "columns": picture.columns,
+            "panelHeight": picture.panel_height,
+            "gap": gap,
+            "margin": height - picture.rows * picture.panel_height - (picture.rows - 1) * gap,
+            "panels": [{"title": p.title, "x": p.x_label, "y": p.y_label} for p in picture.panels],
+        },
+    )
+    return figure
+
+
+@dataclass(frozen=True, kw_only=True)
+class LegendEntry:
+    """One name of a picture's legend.
+
+    Attributes:
+        name: what is drawn so.
+        colour: as ``#RRGGBB`` or ``rgba()``.
+        shape: lines, steps, markers, bars, or area.
+        dash: of a line.
+    """
+
+    name: str
+    colour: str
+    shape: str
+    dash: str = "solid"
+
+
+def legend_entries(picture: Picture) -> tuple[LegendEntry, ...]:
+    """Lists each name of a picture once, as it is drawn first.
+
+    Args:
+        picture: with named series, stripes or bands.
+    """
+    entries: dict[str, LegendEntry] = {}
+    for panel in picture.panels:
+        for series in panel.series:
+            entry = LegendEntry(
+                name=series.name,
+                colour=colour(series.role) if series.opacity else translucent(series.role, 0.4),
+                shape=series.kind if series.opacity else "area",
+                dash=series.dash,
+            )
+            entries.setdefault(series.name, entry)
+        for stripe in (*panel.spans, *panel.bands):
+            entry = LegendEntry(name=stripe.label, colour=translucent(stripe.role, 0.4), shape="area")
+            entries.setdefault(stripe.label, entry)
+    entries.pop("", None)
+    return tuple(entries.values())
+
+
+def _cells(picture: Picture) -> list[list[dict[str, Any] | None]]:
+    """Panels as cells of a grid; those after the last panel have no axes."""
+    count = len(picture.panels)
+    return [
+        [{} if row * picture.columns + column < count else None for column in range(picture.columns)]
+        for row in range(picture.rows)
+    ]
+
+
 def _height(picture: Picture) -> tuple[int, int]:
     gap = ROW_GAP + (0 if picture.shared_x else AXIS_GAP)
     longest = max((len(name) for panel in picture.panels for name in panel.categories), default=0)
@@ -98,7 +173,9 @@ def _traces(series: Series, panel: Panel, points: int, named: set[str]) -> list[
         texts = [_escape(panel.categories[round(value)]) for value in series.x[chosen]]
     if texts is not None:
         trace |= {"hovertext": texts, "hovertemplate": "%{hovertext}<br>%{y:.4g}"}
-    if series.name:
+    if not series.opacity:
+        trace["hoverinfo"] = "skip"
+    elif series.name:
         hover = trace.get("hovertemplate", "%{x:.5g}, %{y:.5g}")
         trace["hovertemplate"] = f"{hover}<extra>{_escape(series.name)}</extra>"
     ink = colour(series.role)
@@ -114,7 +191,10 @@ def _traces(series: Series, panel: Panel, points: int, named: set[str]) -> list[
         return [trace | ({} if error is None else {"error_y": bars})]
     stroke = {"color": ink, "width": 1.4, "dash": series.dash, "shape": "hv" if series.kind == "steps" else "linear"}
     trace |= {"mode": "lines", "line": stroke}
-    return [trace] if error is None else [_ribbon(x, y, error, series), trace]
+    if error is None:
+        return [trace]
+    # The half widths are drawn by the ribbon; the line keeps them for the table of data.
+    return [_ribbon(x, y, error, series), trace | {"error_y": {"type": "data", "array": error, "visible": False}}]
 
 
 def _slot(series: Series, panel: Panel) -> tuple[float, float]:
@@ -126,11 +206,18 @@ def _slot(series: Series, panel: Panel) -> tuple[float, float]:
 
 def _ribbon(x: FloatArray, y: FloatArray, error: FloatArray, series: Series) -> dict[str, Any]:
     known = np.isfinite(y) & np.isfinite(error)
-    x, y, error = x[known], y[known], error[known]
+    starts = np.flatnonzero(known & ~np.concatenate([[False], known[:-1]]))
+    ends = np.flatnonzero(known & ~np.concatenate([known[1:], [False]])) + 1
+    edge_x, edge_y = [], []
+    # One closed outline for each stretch without a gap.
+    for start, end in zip(starts, ends, strict=True):
+        part = slice(start, end)
+        edge_x += [x[part], x[part][::-1], [np.nan]]
+        edge_y += [(y - error)[part], (y + error)[part][::-1], [np.nan]]
     return {
         "type": "scatter",
-        "x": np.concatenate([x, x[::-1]]),
-        "y": np.concatenate([y - error, (y + error)[::-1]]),
+        "x": np.concatenate(edge_x, dtype=np.float32) if edge_x else [],
+        "y": np.concatenate(edge_y, dtype=np.float32) if edge_y else [],
         "fill": "toself",
         "fillcolor": translucent(series.role, 0.2),
         "line": {"width": 0},

@@ -19,9 +19,10 @@ from oed.reports.pictures.comparison_pictures import (
     friction_difference_picture,
     friction_runs_picture,
 )
-from oed.reports.rendering.page import Cell, Fact, Page, Section, Status, Table
+from oed.reports.rendering.page import Cell, Fact, Finding, Page, Section, Table, findings_of
 from oed.reports.rendering.picture import Picture
-from oed.reports.rendering.saving import footer, save_page
+from oed.reports.rendering.provenance import Recording, footer
+from oed.reports.rendering.saving import save_page
 from oed.reports.rendering.significant import NORMAL_95
 from robots.common.files import ResultFolder
 
@@ -41,24 +42,23 @@ def comparison_page(comparison: ModelComparison) -> Page:
         comparison: the comparison.
     """
     damaged, last = comparison.damaged, len(comparison.runs) - 1
-    status: Status = "bad" if damaged else "warning" if comparison.significant else "good"
     parts = {item.name for item in comparison.significant if item.level == "part"}
     return Page(
         title="Comparison of models",
-        subtitle=comparison.robot_name,
+        robot=comparison.robot_name,
         verdict=comparison.verdict(),
-        status=status,
+        logs=tuple(Recording(name=run.label, start=run.date) for run in comparison.runs),
+        findings=_findings(comparison),
         facts=(
             Fact(label="Runs", value=len(comparison.runs), note=f"order: {comparison.order}"),
             Fact(label="Parts that differ", value=len(parts)),
             Fact(
                 label="Joints with a change of their own",
                 value=len({item.joint for item in damaged}),
-                status="bad" if damaged else "neutral",
+                status="act" if damaged else "neutral",
             ),
             Fact(label="Family-wise false-alarm rate", value=f"{100 * comparison.alpha:g} %", note="Holm"),
         ),
-        warnings=comparison.warnings,
         sections=(
             Section(title="Runs", tables=(runs_table(comparison),)),
             Section(
@@ -86,6 +86,28 @@ def comparison_page(comparison: ModelComparison) -> Page:
         ),
         footer=footer(),
     )
+
+
+def _findings(comparison: ModelComparison) -> tuple[Finding, ...]:
+    found = [
+        Finding(
+            code="difference.joint",
+            subject=f"{comparison.labels[item.run]}:",
+            text=item.sentence(),
+        )
+        for item in comparison.damaged
+    ]
+    runs: dict[str, list[str]] = {}
+    for part in comparison.significant:
+        if part.level == "part" and part.run is not None:
+            runs.setdefault(part.name, []).append(comparison.labels[part.run])
+    found += [
+        Finding(
+            code="difference", subject=f"{name}:", text=f"differs from {comparison.labels[0]} in {', '.join(those)}."
+        )
+        for name, those in runs.items()
+    ]
+    return (*found, *findings_of("comparison.note", comparison.warnings))
 
 
 def _friction(comparison: ModelComparison, last: int) -> tuple[Section, ...]:

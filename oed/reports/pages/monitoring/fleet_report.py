@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 
 from estimation.monitoring.fleets import FleetResult, RobotRow
-from oed.reports.pages.monitoring.monitor_report import STATUS
-from oed.reports.rendering.page import Cell, Fact, Page, Section, Table
+from oed.reports.rendering.page import Cell, Fact, Finding, Page, Section, Table
 from oed.reports.rendering.palette import joint_role
 from oed.reports.rendering.picture import Line, Panel, Picture, Series
-from oed.reports.rendering.saving import footer, save_page
+from oed.reports.rendering.provenance import footer
+from oed.reports.rendering.saving import save_page
 from robots.common.files import ResultFolder
 
 # Robots whose trends are drawn; the table lists all.
@@ -28,11 +28,24 @@ def fleet_page(result: FleetResult) -> Page:
     return Page(
         title="Fleet",
         verdict=result.verdict(),
-        status=STATUS.get(result.light, "warning"),
+        findings=tuple(
+            Finding(code=f"fleet.{row.light}", subject=f"{row.name}:", text=row.text, action=row.advice)
+            for row in result.rows
+        ),
         facts=(
-            Fact(label="Red", value=result.count("red"), note="need action", status="bad"),
-            Fact(label="Amber", value=result.count("amber"), note="to be watched", status="warning"),
-            Fact(label="Green", value=result.count("green"), note="no finding", status="good"),
+            Fact(
+                label="Red",
+                value=result.count("red"),
+                note="need action",
+                status="act" if result.count("red") else "neutral",
+            ),
+            Fact(
+                label="Amber",
+                value=result.count("amber"),
+                note="to be watched",
+                status="note" if result.count("amber") else "neutral",
+            ),
+            Fact(label="Green", value=result.count("green"), note="no finding"),
             Fact(label="Grey", value=result.count("grey"), note="no usable log"),
             Fact(label="Logs", value=sum(len(row.logs) for row in result.rows), note=f"{len(left_out)} left out"),
         ),
@@ -99,7 +112,7 @@ def trends_picture(rows: list[RobotRow]) -> Picture:
                 Panel(
                     title=f"{row.name} ({row.light}): {title}",
                     x_label="time [days]",
-                    y_label="friction [%]",
+                    y_label="change of friction [%]",
                     lines=(Line(value=0.0, role="neutral", dash="dot"),),
                     series=tuple(
                         Series(

@@ -48,7 +48,7 @@ def runs_of(model: Model, count: int, damage: float) -> list[Model]:
 def test_agreeing_runs_are_good_news(model):
     """Without a difference the page is green, and shows the runs over their number."""
     page = comparison_page(compare(runs_of(model, 5, 1.0)))
-    assert page.status == "good"
+    assert page.level == "good"
     assert [picture.name for picture in page.pictures] == [
         "friction_runs",
         "friction_difference",
@@ -63,7 +63,7 @@ def test_agreeing_runs_are_good_news(model):
 def test_damage_is_never_green(model):
     """Friction that changed on one joint alone makes the page red, and its sentence is on it."""
     page = comparison_page(compare(runs_of(model, 2, 1.3)))
-    assert page.status == "bad"
+    assert page.level == "act"
     assert "Friction changed on joint 2 alone: inspect it." in page.verdict
     friction = next(section for section in page.sections if section.title == "Friction")
     assert any(text.startswith("Joint 2: friction +3") and "inspect this joint" in text for text in friction.paragraphs)

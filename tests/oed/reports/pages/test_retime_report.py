@@ -42,7 +42,7 @@ def test_tells_before_and_after(case: SimpleNamespace) -> None:
 
 def test_warns_of_assumed_values(case: SimpleNamespace) -> None:
     """What no source backs is said."""
-    assert any("limits.jerk" in warning for warning in case.page.warnings)
+    assert any("limits.jerk" in finding.text for finding in case.page.findings)
 
 
 @pytest.mark.slow
