@@ -7,6 +7,7 @@ from itertools import groupby
 import numpy as np
 
 from oed.campaigns import Campaign, Slot, Stage
+from oed.campaigns.checking import closest_bodies
 from oed.reports.pictures.campaign_pictures import temperature_picture, velocity_picture
 from oed.reports.rendering.page import Cell, Fact, Finding, Page, Section, Table, findings_of
 from oed.reports.rendering.provenance import footer
@@ -22,16 +23,13 @@ def save_campaign_report(campaign: Campaign, folder: ResultFolder, *, png: bool 
 def campaign_page(campaign: Campaign) -> Page:
     """Builds the page: what runs when, how each stage moves, and how hot the robot is expected to get."""
     robot = campaign.robot
-    verdict = (
-        f"Play {len(campaign.stages)} files in {campaign.cycles} cycles, {campaign.duration / 60:.1f} min in all, by the "
-        "timetable below."
-    )
+    findings = _findings(campaign)
     temperature = _temperature_sections(campaign)
     return Page(
         title="Campaign",
         robot=robot.title or robot.name,
-        verdict=verdict if campaign.success else "Do not play this campaign: at least one stage exceeds a limit.",
-        findings=_findings(campaign),
+        verdict=_verdict(campaign, findings),
+        findings=findings,
         facts=_facts(campaign),
         sections=(
             Section(
@@ -74,6 +72,18 @@ def _facts(campaign: Campaign) -> tuple[Fact, ...]:
     return tuple(facts)
 
 
+def _verdict(campaign: Campaign, findings: tuple[Finding, ...]) -> str:
+    codes = {finding.code for finding in findings}
+    if "limit.exceeded" in codes:
+        return "Do not play this campaign: at least one stage exceeds a limit."
+    if "collision.found" in codes:
+        return "Do not play this campaign before its collisions are checked."
+    return (
+        f"Play {len(campaign.stages)} files in {campaign.cycles} cycles by the timetable below, "
+        f"{campaign.duration / 60:.1f} min in all."
+    )
+
+
 def _findings(campaign: Campaign) -> tuple[Finding, ...]:
     found = [
         Finding(
@@ -86,9 +96,21 @@ def _findings(campaign: Campaign) -> tuple[Finding, ...]:
         for margin in stage.margins
         if margin.violated
     ]
+    colliding = []
+    for stage in campaign.stages:
+        closest = closest_bodies(campaign.robot, stage.motion)
+        if closest is not None and closest[1] < 0.0:
+            pair, clearance, time = closest
+            text = f"in the collision model {pair} overlap by {-1e3 * clearance:.0f} mm at {time:.1f} s."
+            action = "Design it again with oed design --collision." if stage.kind == "excitation" else "Check it first."
+            found.append(Finding(code="collision.found", subject=f"{stage.name}:", text=text, action=action))
+            colliding.append(stage.name)
+    # The notes say the same of collisions.
+    own = tuple(f"COLLISION in the {name} stage" for name in colliding)
+    notes = [note for note in campaign.notes if not (own and note.startswith(own))]
     assumed = campaign.robot.assumed
     texts = [f"Assumed values without a source: {', '.join(assumed)}."] if assumed else []
-    return (*found, *findings_of("experiment.note", campaign.notes), *findings_of("value.assumed", texts))
+    return (*found, *findings_of("experiment.note", notes), *findings_of("value.assumed", texts))
 
 
 def _phases(campaign: Campaign) -> Table:

@@ -168,8 +168,8 @@ def _verdict(design: Design, findings: tuple[Finding, ...]) -> str:
     if codes & {"excitation.incomplete", "excitation.weak"}:
         return "Design the experiment again: this motion does not determine all parameters."
     return (
-        f"Play trajectory.csv on the robot: in {design.motion.duration:.0f} s it determines all {design.base.size} base "
-        "parameters within all limits."
+        f"Play trajectory.csv on the robot: in {design.motion.duration:.0f} s it determines all {design.base.size} "
+        "base parameters within all limits."
     )
 
 

@@ -8,16 +8,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from estimation.diagnosis.calibration import CLOSE_RIVAL_BIC
-from estimation.diagnosis.experiment_plans.detection_limits import summarise_limits
 from estimation.diagnosis.results.diagnosis import Diagnosis
-from oed.reports.pages.diagnosis_actions import action_for, sentence_for
+from oed.reports.pages.diagnosis_actions import findings_in, verdict_of
 from oed.reports.pages.diagnosis_limits import limits_section
 from oed.reports.pages.diagnosis_simulation import simulation_section
 from oed.reports.pages.diagnosis_view import DiagnosisView, view_of
 from oed.reports.pictures.diagnosis_pictures import cause_picture, gain_picture
 from oed.reports.pictures.torque_pictures import torque_picture
 from oed.reports.rendering.joint_units import joint_titles, joint_units
-from oed.reports.rendering.page import Cell, Fact, Finding, Page, Section, Table, findings_of
+from oed.reports.rendering.page import Cell, Fact, Page, Section, Table
 from oed.reports.rendering.picture import Picture
 from oed.reports.rendering.provenance import footer
 from oed.reports.rendering.saving import save_page
@@ -48,53 +47,13 @@ def diagnosis_page(view: DiagnosisView) -> Page:
     return Page(
         title="Diagnosis",
         robot=view.robot,
-        verdict=_verdict(view),
+        verdict=verdict_of(view),
         logs=view.logs,
-        findings=_findings(view),
+        findings=findings_in(view),
         facts=_facts(view),
         sections=tuple(sections),
         footer=footer(view.seed),
     )
-
-
-def _verdict(view: DiagnosisView) -> str:
-    if view.verdict == "none":
-        return "No missing effect was found: use the model as it is."
-    if view.verdict == "named":
-        known = sentence_for((finding.effect, finding.joint) for finding in view.findings)
-        return f"{known} {view.findings[0].sentence}" if len(view.findings) == 1 else known
-    # A free function does not name a cause, whatever its gain.
-    helps = any(finding.interval[0] > 0 and finding.named for finding in view.findings)
-    why = "part of the error has no known cause" if helps else "no effect of the catalogue explains the residual"
-    if view.verdict == "ambiguous":
-        why = "several causes fit"
-    if view.next_kind:
-        return f"Record {view.next_kind} and diagnose again: {why}."
-    return f"Check logs and robot: {why}, and no known experiment finds it."
-
-
-def _findings(view: DiagnosisView) -> tuple[Finding, ...]:
-    found = [
-        Finding(
-            code=f"effect.{finding.effect}" if finding.named else "diagnosis.unexplained",
-            subject=f"{finding.title[:1].upper()}{finding.title[1:]}:",
-            text=finding.sentence,
-            action=action_for(finding.effect, [finding.joint]) if finding.named else "",
-        )
-        for finding in view.findings
-    ]
-    found += findings_of("diagnosis.unexplained", view.unexplained)
-    if view.verdict == "unexplained" and not any(item.code == "diagnosis.unexplained" for item in found):
-        found += findings_of("diagnosis.unexplained", ["Part of the residual is not noise and has no known cause."])
-    for finding in view.findings:
-        close = [title for title, worse in finding.rivals if worse < CLOSE_RIVAL_BIC]
-        if view.verdict == "ambiguous" and close:
-            text = f"{finding.title} explains the logs hardly better than {', '.join(close)}."
-            found.append(Finding(code="diagnosis.ambiguous", text=f"{text[:1].upper()}{text[1:]}"))
-    if view.verdict == "ambiguous" and not any(item.code == "diagnosis.ambiguous" for item in found):
-        found.append(Finding(code="diagnosis.ambiguous", text="Several causes explain the logs about as well."))
-    seen = summarise_limits(view.limits) if view.verdict == "none" else ""
-    return (*found, *findings_of("diagnosis.note", view.warnings), *findings_of("done", [f"{seen}."] if seen else []))
 
 
 def _facts(view: DiagnosisView) -> tuple[Fact, ...]:

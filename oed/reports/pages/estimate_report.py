@@ -2,17 +2,15 @@
 
 from __future__ import annotations
 
-from itertools import chain, repeat
-
 import numpy as np
 from numpy.typing import NDArray
 
 from estimation.identifications.estimate import Estimate
 from estimation.predictions.method_table import MethodTable
-from oed.reports.pages.diagnosis_actions import place_of
+from oed.reports.pages.estimates.estimate_findings import findings_in, verdict_of
 from oed.reports.pictures.parameter_pictures import error_bars_picture, friction_picture, parameter_picture
 from oed.reports.pictures.torque_pictures import residual_picture, torque_picture
-from oed.reports.rendering.page import Cell, Fact, Finding, Page, Section, Table
+from oed.reports.rendering.page import Cell, Fact, Page, Section, Table
 from oed.reports.rendering.picture import Picture
 from oed.reports.rendering.provenance import footer, recordings_of
 from oed.reports.rendering.saving import save_page
@@ -99,9 +97,9 @@ def estimate_page(estimate: Estimate, methods: MethodTable | None = None) -> Pag
     return Page(
         title="Identified dynamics",
         robot=robot.title or robot.name,
-        verdict=_verdict(estimate),
+        verdict=verdict_of(estimate),
         logs=recordings_of(model.provenance["logs"]),
-        findings=_findings(estimate),
+        findings=findings_in(estimate),
         facts=(
             Fact(label="Parameters determined", value=f"{known} of {len(model.names)}"),
             Fact(label="Worst joint, held-out data", value=f"{100 * max(joint.nrmse for joint in joints):.1f} %"),
@@ -115,33 +113,6 @@ def estimate_page(estimate: Estimate, methods: MethodTable | None = None) -> Pag
         sections=tuple(sections),
         footer=footer(model.provenance.get("seed")),
     )
-
-
-def _verdict(estimate: Estimate) -> str:
-    lost = [joint.joint for joint in estimate.joints if not joint.identified]
-    if lost:
-        return f"Record more motion of {place_of(lost)} and identify again: these logs do not determine it."
-    if estimate.choice.contradiction is not None:
-        return "State the payload or base of each log, or run oed diagnose: the logs contradict each other."
-    error = 100 * np.median([joint.nrmse for joint in estimate.joints])
-    return f"Use model.json: it predicts held-out torque to {error:.1f} % of the torque RMS (median joint)."
-
-
-def _findings(estimate: Estimate) -> tuple[Finding, ...]:
-    # `Estimate.warnings` begins with these three, as far as they apply, in this order.
-    urgent = (
-        ("joint.not_identified", not all(joint.identified for joint in estimate.joints)),
-        ("logs.contradict", estimate.choice.contradiction is not None),
-        ("parameters.undetermined", not estimate.model.determined.all()),
-    )
-    codes = chain((code for code, applies in urgent if applies), repeat("model.warning"))
-    found = [Finding(code=code, text=text) for code, text in zip(codes, estimate.warnings, strict=False)]
-    found += [
-        Finding(code=f"log.{finding.severity}", subject=f"{gate.log}:", text=f"{finding}.")
-        for gate in estimate.gates
-        for finding in gate.findings
-    ]
-    return tuple(found)
 
 
 def _errors(estimate: Estimate) -> Picture:

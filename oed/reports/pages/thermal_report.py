@@ -55,9 +55,12 @@ def thermal_page(
     gain = 1.0 - estimate.residual_rms / np.maximum(estimate.residual_without, 1e-300)
     moving = [fit for fit in fits if fit is not None]
     open_ = sorted({q.name for fit in moving for q in fit.parameters if not q.determined})
+    share = round(100 * float(np.median(gain)))
     verdict = (
-        f"Use model.json with heat: the thermal model reduces the torque error of the median joint by "
-        f"{100 * np.median(gain):.0f} %, compared with temperature-independent friction."
+        f"Use this thermal model: it reduces the torque error of the median joint by {share} %, compared with "
+        "temperature-independent friction."
+        if share > 0
+        else "These logs show no effect of temperature: record from cold to warm, or use the model without heat."
     )
     coefficients = _coefficients(estimate)
     fit = fits[joint - 1]

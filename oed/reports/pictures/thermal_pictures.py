@@ -60,7 +60,8 @@ def friction_time_picture(fits: Fits, *, joint_names: Sequence[str] | None = Non
     for title, fit in zip(titles, fits, strict=True):
         series: list[Series] = []
         for run in _friction_runs(fit):
-            series += _pair(*break_at_pauses(run.t / 60.0, run.measured, run.predicted), "measured", "predicted")
+            t, dots, line = break_at_pauses(run.t / 60.0, run.measured, run.predicted)
+            series += _pair(t, dots, line, "measured", "predicted")
         panels.append(
             Panel(
                 title=title,

@@ -98,7 +98,7 @@ def torque_picture(
         columns=2,
         shared_x=True,
         panel_height=150,
-        caption="First measured and predicted torque, then measured minus predicted, on its own scale. Lines end at pauses."
+        caption="Measured and predicted torque, and measured minus predicted on its own scale. Lines end at pauses."
         + ("" if widths is None else " The band is to contain 95 % of the errors.")
         + (f" The predicted line has gaps {why_gaps}." if gaps.any() and why_gaps else ""),
     )

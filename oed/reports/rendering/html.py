@@ -12,15 +12,15 @@ from markupsafe import Markup
 
 from oed.reports.rendering.page import Cell, Page, is_number
 from oed.reports.rendering.palette import INK
-from oed.reports.rendering.picture import Picture
-from oed.reports.rendering.plotly_ import for_page, legend_entries
+from oed.reports.rendering.picture import Picture, legend_entries
+from oed.reports.rendering.plotly_ import MARGINS, height_of, to_plotly
 from oed.reports.rendering.severity import WORDS
 from oed.reports.rendering.significant import significant
 
 TEMPLATES = Path(__file__).parent / "templates"
 
-# The basic bundle has all that pictures use, scatter and bar, in 1.2 MB; the script of the Python package has 4.8 MB. It
-# is a plain file of this package: no step of the build fetches it, and a browser needs no decompression to run it.
+# The basic bundle has all that pictures use, scatter and bar, in 1.2 MB; the script of the Python package has 4.8 MB.
+# It is a plain file of this package: no step of the build fetches it, and no browser has to decompress it.
 SCRIPT = Path(__file__).parent / "plotly_js" / "plotly-basic.min.js"
 
 
@@ -97,7 +97,26 @@ def _anchors(titles: Sequence[str]) -> list[str]:
 
 def _figure_json(picture: Picture) -> Markup:
     # "<" cannot end the script element once it is written as an escape of JSON.
-    return Markup(for_page(picture).to_json().replace("<", "\\u003c"))
+    return Markup(_for_page(picture).to_json().replace("<", "\\u003c"))
+
+
+def _for_page(picture: Picture) -> Any:
+    """Draws a picture without its legend, with what the page needs to arrange the panels by its own width."""
+    figure = to_plotly(picture)
+    height, gap = height_of(picture)
+    figure.update_layout(
+        showlegend=False,
+        height=height,
+        margin=MARGINS,
+        meta={
+            "columns": picture.columns,
+            "panelHeight": picture.panel_height,
+            "gap": gap,
+            "margin": height - picture.rows * picture.panel_height - (picture.rows - 1) * gap,
+            "panels": [{"title": p.title, "x": p.x_label, "y": p.y_label} for p in picture.panels],
+        },
+    )
+    return figure
 
 
 @lru_cache(maxsize=1)

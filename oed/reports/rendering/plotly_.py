@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -41,7 +40,7 @@ def to_plotly(picture: Picture, *, points: int = POINTS) -> Figure:
     from plotly.graph_objects import Figure
     from plotly.subplots import make_subplots
 
-    height, gap = _height(picture)
+    height, gap = height_of(picture)
     figure: Any = make_subplots(
         rows=picture.rows,
         cols=picture.columns,
@@ -84,69 +83,6 @@ def to_plotly(picture: Picture, *, points: int = POINTS) -> Figure:
     return figure
 
 
-def for_page(picture: Picture) -> Figure:
-    """Draws a picture for a page, which has its legend and buttons in HTML and arranges the panels by its width.
-
-    Args:
-        picture: what to draw.
-    """
-    figure = to_plotly(picture)
-    height, gap = _height(picture)
-    figure.update_layout(
-        showlegend=False,
-        height=height,
-        margin=MARGINS,
-        meta={
-            "columns": picture.columns,
-            "panelHeight": picture.panel_height,
-            "gap": gap,
-            "margin": height - picture.rows * picture.panel_height - (picture.rows - 1) * gap,
-            "panels": [{"title": p.title, "x": p.x_label, "y": p.y_label} for p in picture.panels],
-        },
-    )
-    return figure
-
-
-@dataclass(frozen=True, kw_only=True)
-class LegendEntry:
-    """One name of a picture's legend.
-
-    Attributes:
-        name: what is drawn so.
-        colour: as ``#RRGGBB`` or ``rgba()``.
-        shape: lines, steps, markers, bars, or area.
-        dash: of a line.
-    """
-
-    name: str
-    colour: str
-    shape: str
-    dash: str = "solid"
-
-
-def legend_entries(picture: Picture) -> tuple[LegendEntry, ...]:
-    """Lists each name of a picture once, as it is drawn first.
-
-    Args:
-        picture: with named series, stripes or bands.
-    """
-    entries: dict[str, LegendEntry] = {}
-    for panel in picture.panels:
-        for series in panel.series:
-            entry = LegendEntry(
-                name=series.name,
-                colour=colour(series.role) if series.opacity else translucent(series.role, 0.4),
-                shape=series.kind if series.opacity else "area",
-                dash=series.dash,
-            )
-            entries.setdefault(series.name, entry)
-        for stripe in (*panel.spans, *panel.bands):
-            entry = LegendEntry(name=stripe.label, colour=translucent(stripe.role, 0.4), shape="area")
-            entries.setdefault(stripe.label, entry)
-    entries.pop("", None)
-    return tuple(entries.values())
-
-
 def _cells(picture: Picture) -> list[list[dict[str, Any] | None]]:
     """Panels as cells of a grid; those after the last panel have no axes."""
     count = len(picture.panels)
@@ -156,7 +92,12 @@ def _cells(picture: Picture) -> list[list[dict[str, Any] | None]]:
     ]
 
 
-def _height(picture: Picture) -> tuple[int, int]:
+def height_of(picture: Picture) -> tuple[int, int]:
+    """Gives the height of a picture and the gap between its rows [px].
+
+    Args:
+        picture: with its rows and the length of its names.
+    """
     gap = ROW_GAP + (0 if picture.shared_x else AXIS_GAP)
     longest = max((len(name) for panel in picture.panels for name in panel.categories), default=0)
     gap += min(5 * max(longest - 6, 0), 80)
@@ -208,12 +149,14 @@ def _ribbon(x: FloatArray, y: FloatArray, error: FloatArray, series: Series) -> 
     known = np.isfinite(y) & np.isfinite(error)
     starts = np.flatnonzero(known & ~np.concatenate([[False], known[:-1]]))
     ends = np.flatnonzero(known & ~np.concatenate([known[1:], [False]])) + 1
-    edge_x, edge_y = [], []
+    edge_x: list[FloatArray] = []
+    edge_y: list[FloatArray] = []
+    gap = np.array([np.nan])
     # One closed outline for each stretch without a gap.
     for start, end in zip(starts, ends, strict=True):
         part = slice(start, end)
-        edge_x += [x[part], x[part][::-1], [np.nan]]
-        edge_y += [(y - error)[part], (y + error)[part][::-1], [np.nan]]
+        edge_x += [x[part], x[part][::-1], gap]
+        edge_y += [(y - error)[part], (y + error)[part][::-1], gap]
     return {
         "type": "scatter",
         "x": np.concatenate(edge_x, dtype=np.float32) if edge_x else [],

@@ -8,6 +8,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from importlib.metadata import PackageNotFoundError, version
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -141,7 +142,7 @@ def _typed_seed(words: Sequence[str]) -> int | None:
 def _inputs(words: Sequence[str]) -> Iterator[InputFile]:
     """Lists each word of the command line that names an existing file or folder, or ends with ``=`` and one."""
     seen: set[Path] = set()
-    for before, word in zip(words, words[1:], strict=False):
+    for before, word in pairwise(words):
         name = word.rpartition("=")[2]
         if before in RESULTS or word.startswith(RESULTS) or not name or name in seen:
             continue

@@ -42,6 +42,7 @@ LEVELS: dict[str, Level] = {
     "limit.assumed": "note",
     "value.assumed": "note",
     "torque.unchecked": "note",
+    "collision.found": "act",
     "collision.unchecked": "note",
     "collision.sampled": "note",
     "stroke.left_out": "note",

@@ -44,7 +44,11 @@ def test_prismatic_joints_are_in_metres(case: Any) -> None:
     torque = torque_picture(m.t, case.measured, case.predicted, kinds=["prismatic"] * case.n)
     assert torque.panels[0].y_label == "force [N]"
     turned = trajectory_picture(m.t, m.q, m.dq, m.ddq, degrees=True)
-    assert [panel.y_label for panel in turned.panels[:3]] == ["[°]", "[°/s]", "[°/s²]"]
+    assert [panel.y_label for panel in turned.panels[:3]] == [
+        "position [°]",
+        "velocity [°/s]",
+        "acceleration [°/s²]",
+    ]
     np.testing.assert_allclose(turned.panels[1].series[0].y, np.rad2deg(m.dq[:, 0]))
 
 

@@ -18,6 +18,7 @@ from oed.reports.pictures.comparison_pictures import (
     course_picture,
     friction_difference_picture,
     friction_runs_picture,
+    significance_picture,
 )
 from oed.reports.rendering.page import Cell, Fact, Finding, Page, Section, Table, findings_of
 from oed.reports.rendering.picture import Picture
@@ -69,7 +70,13 @@ def comparison_page(comparison: ModelComparison) -> Page:
                     "family, p-values are adjusted by Holm's method, which needs no independence of the tests. The "
                     "prior that the models share makes differences rather too small: tests are conservative.",
                 ),
-                tables=(whole_table(comparison), parts_table(comparison), parameters_table(comparison)),
+                pictures=(parts_picture(comparison),),
+                tables=(whole_table(comparison),),
+            ),
+            Section(
+                title="Tests of each part and parameter",
+                tables=(parts_table(comparison), parameters_table(comparison)),
+                folded=True,
             ),
             *_friction(comparison, last),
             *_courses(comparison),
@@ -86,6 +93,20 @@ def comparison_page(comparison: ModelComparison) -> Page:
         ),
         footer=footer(),
     )
+
+
+def parts_picture(comparison: ModelComparison) -> Picture:
+    """Shows the smallest adjusted p-value over the runs of each part of each joint.
+
+    Args:
+        comparison: the comparison.
+    """
+    smallest: dict[str, dict[int, float]] = {}
+    for item in comparison.differences:
+        if item.level == "part" and item.joint is not None:
+            row = smallest.setdefault(item.name.partition(" of joint ")[0], {})
+            row[item.joint] = min(row.get(item.joint, 1.0), item.adjusted)
+    return significance_picture(smallest, comparison.alpha, joint_names=comparison.runs[0].model.robot.joint_names)
 
 
 def _findings(comparison: ModelComparison) -> tuple[Finding, ...]:
@@ -166,7 +187,11 @@ def _friction(comparison: ModelComparison, last: int) -> tuple[Section, ...]:
                     joint_names=robot.joint_names,
                 ),
             ),
-            tables=(Table(headings=headings, rows=tuple(rows), caption="Change of friction, run by run."),),
+        ),
+        Section(
+            title="Change of friction, run by run",
+            tables=(Table(headings=headings, rows=tuple(rows)),),
+            folded=True,
         ),
     )
 

@@ -44,7 +44,7 @@ def force_page(forces: ForceEstimate, kinds: tuple[str, ...], logs: tuple[Record
     threshold, count = forces.calibration.threshold, len(forces.contacts)
     windows = [(contact.start, contact.end) for contact in forces.contacts]
     largest = max(forces.contacts, key=lambda contact: contact.magnitude, default=None)
-    verdict = "No contact was found: nothing to do."
+    verdict = "No contact was found in this log."
     if largest is not None:
         verdict = f"Check the robot's surroundings: {'one contact' if count == 1 else f'{count} contacts'}"
         verdict += f", at {largest.start:.4g} s" if count == 1 else f", the largest at {largest.start:.4g} s"

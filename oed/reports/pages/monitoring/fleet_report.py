@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from estimation.monitoring.fleets import FleetResult, RobotRow
-from oed.reports.rendering.page import Cell, Fact, Finding, Page, Section, Table
+from oed.reports.rendering.page import Cell, Fact, Finding, Page, Section, Status, Table
 from oed.reports.rendering.palette import joint_role
 from oed.reports.rendering.picture import Line, Panel, Picture, Series
 from oed.reports.rendering.provenance import footer
@@ -27,26 +27,16 @@ def fleet_page(result: FleetResult) -> Page:
     drawn = [row for row in result.rows if row.trend.hours][:DRAWN]
     return Page(
         title="Fleet",
-        verdict=result.verdict(),
+        verdict=_verdict(result),
         findings=tuple(
             Finding(code=f"fleet.{row.light}", subject=f"{row.name}:", text=row.text, action=row.advice)
             for row in result.rows
         ),
         facts=(
-            Fact(
-                label="Red",
-                value=result.count("red"),
-                note="need action",
-                status="act" if result.count("red") else "neutral",
-            ),
-            Fact(
-                label="Amber",
-                value=result.count("amber"),
-                note="to be watched",
-                status="note" if result.count("amber") else "neutral",
-            ),
-            Fact(label="Green", value=result.count("green"), note="no finding"),
-            Fact(label="Grey", value=result.count("grey"), note="no usable log"),
+            _count(result, "red", "need action", "act"),
+            _count(result, "amber", "to be watched", "note"),
+            _count(result, "green", "no finding"),
+            _count(result, "grey", "no usable log"),
             Fact(label="Logs", value=sum(len(row.logs) for row in result.rows), note=f"{len(left_out)} left out"),
         ),
         sections=(
@@ -80,6 +70,16 @@ def fleet_page(result: FleetResult) -> Page:
         ),
         footer=footer(),
     )
+
+
+def _verdict(result: FleetResult) -> str:
+    worst = result.rows[0]
+    return f"{result.verdict()} Begin with {worst.name}. {worst.advice}".strip() if worst.advice else result.verdict()
+
+
+def _count(result: FleetResult, light: str, note: str, status: Status = "neutral") -> Fact:
+    count = result.count(light)
+    return Fact(label=light.capitalize(), value=count, note=note, status=status if count else "neutral")
 
 
 def _robots(result: FleetResult) -> Table:

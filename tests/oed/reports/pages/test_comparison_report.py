@@ -10,6 +10,7 @@ import pytest
 from estimation.comparisons import compare
 from estimation.models.model import Model
 from oed.reports import comparison_page, render
+from oed.reports.pages.comparisons.comparison_report import parts_picture
 from robots import load_robot
 from robots.base_parameters import find_base_parameters
 from robots.regressor import default_model
@@ -50,6 +51,7 @@ def test_agreeing_runs_are_good_news(model):
     page = comparison_page(compare(runs_of(model, 5, 1.0)))
     assert page.level == "good"
     assert [picture.name for picture in page.pictures] == [
+        "tests",
         "friction_runs",
         "friction_difference",
         "friction_course",
@@ -58,6 +60,17 @@ def test_agreeing_runs_are_good_news(model):
     text = render(page)
     assert all(f"run {number}" in text for number in range(1, 6))
     assert "settled from" in text
+
+
+def test_all_tests_are_one_chart(model):
+    """Each part of each joint has one bar; that of the changed friction is above the line."""
+    comparison = compare(runs_of(model, 2, 1.3))
+    picture = parts_picture(comparison)
+    bars = {series.name: series.y for series in picture.panels[0].series}
+    assert int(np.nanargmax(bars["friction"])) == 1
+    assert bars["friction"][1] > picture.panels[0].lines[0].value
+    parts = {item.name for item in comparison.differences if item.level == "part"}
+    assert sum(np.isfinite(values).sum() for values in bars.values()) == len(parts)
 
 
 def test_damage_is_never_green(model):
