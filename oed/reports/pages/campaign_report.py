@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from itertools import groupby
+from warnings import catch_warnings, simplefilter
 
 import numpy as np
 
@@ -12,6 +13,7 @@ from oed.reports.pictures.campaign_pictures import temperature_picture, velocity
 from oed.reports.rendering.page import Cell, Fact, Finding, Page, Section, Table, findings_of
 from oed.reports.rendering.provenance import footer
 from oed.reports.rendering.saving import save_page
+from robots.common.errors import AssumedValueWarning
 from robots.common.files import ResultFolder
 
 
@@ -98,7 +100,10 @@ def _findings(campaign: Campaign) -> tuple[Finding, ...]:
     ]
     colliding = []
     for stage in campaign.stages:
-        closest = closest_bodies(campaign.robot, stage.motion)
+        with catch_warnings():
+            # The first screen has assumed values as a finding.
+            simplefilter("ignore", AssumedValueWarning)
+            closest = closest_bodies(campaign.robot, stage.motion)
         if closest is not None and closest[1] < 0.0:
             pair, clearance, time = closest
             text = f"in the collision model {pair} overlap by {-1e3 * clearance:.0f} mm at {time:.1f} s."
