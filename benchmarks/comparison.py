@@ -1,7 +1,7 @@
 """Whether `oed compare` finds what changed and nothing else, on a plant that shares no code with it.
 
 Run it with ``python benchmarks/comparison.py [PAIRS [CYCLES]]``. Robots, motions and coloured noise come from
-``tests/truth``. Three studies:
+``oed/benchmarks/truth``. Three studies:
 
 1. Pairs of logs of one unchanged virtual er3a, of the same motion and of two motions: how often the 95 % intervals of
    the differences hold zero, how p-values are distributed, and in how many pairs anything is called significant at a
@@ -31,16 +31,16 @@ from estimation import compare, fit_campaign, identify
 from estimation.comparisons import ModelComparison, identify_runs
 from estimation.preprocessing import resample, smooth
 from estimation.thermal import start_temperatures
+from oed.benchmarks.truth.description import write_description
+from oed.benchmarks.truth.effects.base import Effect
+from oed.benchmarks.truth.effects.friction import FrictionStep, Warming
+from oed.benchmarks.truth.machines import Machine, draw_machine
+from oed.benchmarks.truth.noise import draw_noise
+from oed.benchmarks.truth.plant import PAUSE, Record, play
+from oed.benchmarks.truth.references import draw_periodic
 from robots import load_robot
 from robots.robot import Robot
 from robots.signals import Log
-from tests.truth.description import write_description
-from tests.truth.effects.base import Effect
-from tests.truth.effects.friction import FrictionStep, Warming
-from tests.truth.machines import Machine, draw_machine
-from tests.truth.noise import draw_noise
-from tests.truth.plant import PAUSE, Record, play
-from tests.truth.references import draw_periodic
 
 Array = NDArray[np.float64]
 

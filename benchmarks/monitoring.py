@@ -33,9 +33,9 @@ from benchmarks.monitoring_parts.virtual_robot import DAY, Cause, VirtualRobot
 from estimation import fit_campaign, identify
 from estimation.models.model import model_from_dict
 from estimation.monitoring import Baseline, Finding, Monitor, MonitorSettings, baseline_of
+from oed.benchmarks.truth.description import write_description
 from robots import load_robot
 from robots.signals import Log
-from tests.truth.description import write_description
 
 ROBOTS = (1,)
 # Friction falls by half at full duty, so that a cold joint has 60 to 70 % more of it than a warm one.

@@ -1,10 +1,11 @@
 """How well the diagnosis sizes a payload that was picked up or put down, beside another effect.
 
-Run it with ``python benchmarks/payload_changes.py --seeds 2``. Cases are drawn by ``tests/truth``: virtual er3a, ur10
-and panda, 60 s of motion with 2.5 % of coloured noise, a description whose masses, centres of mass and second moments
-are up to 20 % off, and one other effect of 2 %. At some time a payload of .2, .5, 1 or 3 kg is picked up or put down.
-The script prints how often the sign is right, how often the 95 % intervals of mass and first moments hold the truth,
-and how many stated bodies are physical. Rows go to a JSON-lines file; a run that was stopped goes on where it was.
+Run it with ``python benchmarks/payload_changes.py --seeds 2``. Cases are drawn by ``oed/benchmarks/truth``: virtual
+er3a, ur10 and panda, 60 s of motion with 2.5 % of coloured noise, a description whose masses, centres of mass and
+second moments are up to 20 % off, and one other effect of 2 %. At some time a payload of .2, .5, 1 or 3 kg is picked
+up or put down. The script prints how often the sign is right, how often the 95 % intervals of mass and first moments
+hold the truth, and how many stated bodies are physical. Rows go to a JSON-lines file; a run that was stopped goes on
+where it was.
 """
 
 from __future__ import annotations
@@ -27,14 +28,14 @@ import pinocchio as pin  # noqa: E402
 
 from benchmarks.diagnosis_parts.running import described, logs_of  # noqa: E402
 from estimation import diagnose  # noqa: E402
+from oed.benchmarks.truth.cases import Case, Hidden, draw_case  # noqa: E402
+from oed.benchmarks.truth.dynamics import with_tool  # noqa: E402
+from oed.benchmarks.truth.effects import KNOWN  # noqa: E402
+from oed.benchmarks.truth.effects.surroundings import Payload  # noqa: E402
+from oed.benchmarks.truth.machines import perturbed  # noqa: E402
+from oed.benchmarks.truth.plant import play  # noqa: E402
+from oed.benchmarks.truth.ride import Ride  # noqa: E402
 from robots.common.errors import AssumedValueWarning, OedError  # noqa: E402
-from tests.truth.cases import Case, Hidden, draw_case  # noqa: E402
-from tests.truth.dynamics import with_tool  # noqa: E402
-from tests.truth.effects import KNOWN  # noqa: E402
-from tests.truth.effects.surroundings import Payload  # noqa: E402
-from tests.truth.machines import perturbed  # noqa: E402
-from tests.truth.plant import play  # noqa: E402
-from tests.truth.ride import Ride  # noqa: E402
 
 ROBOTS = ("er3a", "ur10", "panda")
 MASSES = (0.2, 0.5, 1.0, 3.0)

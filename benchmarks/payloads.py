@@ -1,8 +1,8 @@
 """Payloads on virtual robots: errors of mass and centre of mass, and how often the 95 % intervals hold the truth.
 
-Run it with ``python benchmarks/payloads.py [SEEDS [WORKERS [OUT]]]``. The robots are those of `tests/truth`: pinocchio
-models under position control, with 2.5 % coloured torque noise and quantised encoders. Their friction has a Stribeck
-part, which no fitted model has. Each case has 60 s without payload, 60 s of the same path with it (way a: the
+Run it with ``python benchmarks/payloads.py [SEEDS [WORKERS [OUT]]]``. The robots are those of `oed/benchmarks/truth`:
+pinocchio models under position control, with 2.5 % coloured torque noise and quantised encoders. Their friction has a
+Stribeck part, which no fitted model has. Each case has 60 s without payload, 60 s of the same path with it (way a: the
 difference of the logs), and 60 s of another path with it (way b: a model of the log without payload). A body is a
 random box; its centre lies up to 0.15 m in front of the flange.
 """
@@ -25,18 +25,18 @@ sys.path.insert(0, str(Path(__file__).parents[1]))
 
 from estimation import identify
 from estimation.payloads import PayloadEstimate, identify_payload
+from oed.benchmarks.truth.description import write_description
+from oed.benchmarks.truth.dynamics import with_tool
+from oed.benchmarks.truth.effects import Effect
+from oed.benchmarks.truth.effects.friction import Stribeck
+from oed.benchmarks.truth.machines import Machine, draw_machine
+from oed.benchmarks.truth.noise import draw_noise
+from oed.benchmarks.truth.plant import Record, play
+from oed.benchmarks.truth.references import draw_aperiodic, draw_periodic
 from robots import load_robot
 from robots.common.errors import AssumedValueWarning, OedError
 from robots.common.parallel import parallel_map
 from robots.signals import Log
-from tests.truth.description import write_description
-from tests.truth.dynamics import with_tool
-from tests.truth.effects import Effect
-from tests.truth.effects.friction import Stribeck
-from tests.truth.machines import Machine, draw_machine
-from tests.truth.noise import draw_noise
-from tests.truth.plant import Record, play
-from tests.truth.references import draw_aperiodic, draw_periodic
 
 SEEDS = 20
 KINDS = ("ur10", "panda")

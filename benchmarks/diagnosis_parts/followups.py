@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from typing import Any
 
+from oed.benchmarks.truth.cases import Case
+from oed.benchmarks.truth.experiments import Stage, follow_up
 from robots.robot import Robot
 from robots.signals import Log
-from tests.truth.cases import Case
-from tests.truth.experiments import Stage, follow_up
 
 
 def follow(case: Case, robot: Robot, diagnosis: Any) -> dict[str, Any]:

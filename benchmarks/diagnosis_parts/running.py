@@ -17,15 +17,15 @@ import numpy as np
 
 from benchmarks.diagnosis_parts.followups import follow
 from benchmarks.diagnosis_parts.strata import STRATA, Task, draw
+from oed.benchmarks.truth.cases import Case
+from oed.benchmarks.truth.description import write_description
+from oed.benchmarks.truth.oracle import ask_oracle
+from oed.benchmarks.truth.plant import Record
 from robots import load_robot
 from robots.common.errors import AssumedValueWarning, OedError
 from robots.common.memory import give_back
 from robots.robot import Robot
 from robots.signals import Log
-from tests.truth.cases import Case
-from tests.truth.description import write_description
-from tests.truth.oracle import ask_oracle
-from tests.truth.plant import Record
 
 
 def run(task: Task) -> dict[str, Any]:

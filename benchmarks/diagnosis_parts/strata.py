@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass
 
-from tests.truth.cases import Case, Hidden, draw_case
-from tests.truth.effects import KNOWN, STRANGERS
-from tests.truth.effects.base import Effect
-from tests.truth.machines import KINDS
+from oed.benchmarks.truth.cases import Case, Hidden, draw_case
+from oed.benchmarks.truth.effects import KNOWN, STRANGERS
+from oed.benchmarks.truth.effects.base import Effect
+from oed.benchmarks.truth.machines import KINDS
 
 TUNING = 1000
 """Seeds below this one are the benchmark's: no threshold may be tuned on them."""

@@ -12,11 +12,11 @@ from dataclasses import dataclass
 import numpy as np
 import pinocchio as pin
 
+from oed.benchmarks.truth.dynamics import massless, point_force_torque, rigid_torque, with_tool
+from oed.benchmarks.truth.machines import Machine, draw_machine
+from oed.benchmarks.truth.noise import Noise, draw_noise
+from oed.benchmarks.truth.references import Reference, draw_periodic
 from robots.signals import Log
-from tests.truth.dynamics import massless, point_force_torque, rigid_torque, with_tool
-from tests.truth.machines import Machine, draw_machine
-from tests.truth.noise import Noise, draw_noise
-from tests.truth.references import Reference, draw_periodic
 
 STEP = 0.004
 PERIOD = 10.0

@@ -12,13 +12,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from benchmarks.transfer_parts.splits import Split
+from oed.benchmarks.truth.description import write_description
+from oed.benchmarks.truth.machines import Machine, draw_machine
+from oed.benchmarks.truth.noise import Noise, draw_noise
+from oed.benchmarks.truth.plant import play
+from oed.benchmarks.truth.references import Reference, draw_periodic
 from robots import load_robot
 from robots.signals import Log
-from tests.truth.description import write_description
-from tests.truth.machines import Machine, draw_machine
-from tests.truth.noise import Noise, draw_noise
-from tests.truth.plant import play
-from tests.truth.references import Reference, draw_periodic
 
 KINDS = ("er3a", "ur10", "panda")
 SLOWER = 2.5

@@ -7,6 +7,7 @@ from typing import Annotated
 import typer
 
 from oed.cli.command import HELP
+from oed.cli.commands.benchmark import benchmark
 from oed.cli.commands.campaign import campaign
 from oed.cli.commands.check import check
 from oed.cli.commands.compare import compare
@@ -55,6 +56,7 @@ FUNCTIONS = (
     fleet,
     payload,
     force,
+    benchmark,
     example,
     robot,
     robots,

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
-from tests.truth.effects.base import Effect
+from oed.benchmarks.truth.effects.base import Effect
 
 # Names of the truth's parameters and those of the diagnosis, with the error that is allowed: seconds or a share.
 TIMES = {"change_time": ("change_time", 0.2), "start": ("start", 0.2)}

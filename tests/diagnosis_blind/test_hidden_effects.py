@@ -14,15 +14,15 @@ import numpy as np
 import pytest
 
 from estimation import diagnose
+from oed.benchmarks.truth.cases import Case, draw_case, write_log
+from oed.benchmarks.truth.description import write_description
+from oed.benchmarks.truth.effects import actuator, friction, strangers, surroundings, transmission, whole_strangers
+from oed.benchmarks.truth.effects.base import Effect
+from oed.benchmarks.truth.oracle import ask_oracle
 from oed.cli import main
 from robots import load_robot
 from robots.signals import Log
 from tests.diagnosis_blind.judging import Truth, complaints
-from tests.truth.cases import Case, draw_case, write_log
-from tests.truth.description import write_description
-from tests.truth.effects import actuator, friction, strangers, surroundings, transmission, whole_strangers
-from tests.truth.effects.base import Effect
-from tests.truth.oracle import ask_oracle
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)

@@ -16,6 +16,7 @@ from estimation.diagnosis.recordings.unusable_logs import find_unusable_logs
 from estimation.logs.clocks import put_on_clock
 from robots.base_parameters import BaseParameters
 from robots.common.errors import NotIdentifiableError
+from robots.common.forks import forked
 from robots.robot import Robot
 from robots.signals import Log
 from robots.terms import BendingFriction
@@ -95,7 +96,8 @@ _UNUSABLE = (
 
 def _repaired(robot: Robot, logs: Sequence[Log], kind: str) -> tuple[list[Log], list[str]]:
     """Returns the usable stretches of logs, and notes about them."""
-    repaired = [repair_log(robot, log, f"{kind} {k}{_in_brackets(log.name)}") for k, log in enumerate(logs, start=1)]
+    names = [f"{kind} {k}{_in_brackets(log.name)}" for k, log in enumerate(logs, start=1)]
+    repaired = forked(lambda named: repair_log(robot, *named), zip(logs, names, strict=True))
     return [part for one in repaired for part in one.logs], [note for one in repaired for note in one.notes]
 
 

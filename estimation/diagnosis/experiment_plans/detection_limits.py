@@ -22,6 +22,7 @@ from estimation.diagnosis.hypothesis_tests.power import (
 from estimation.diagnosis.hypothesis_tests.problem import Problem
 from estimation.diagnosis.hypothesis_tests.scan import Entry
 from estimation.diagnosis.hypothesis_tests.scoring import accept, visible_root
+from robots.common.forks import forked
 from robots.common.plain import finite
 from robots.terms.effect_bases.capabilities import AtReversals, Persistence
 from robots.terms.effects import EFFECTS
@@ -44,6 +45,8 @@ SHAPES = 3
 """Number of shapes of an effect over which its limit is the median."""
 RIVAL_SHAPES = 4
 """Number of shapes of a rival that are compared with it."""
+CHUNK = 8
+"""Number of limits that a process computes at once."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -100,14 +103,14 @@ def find_limits(problem: Problem, entries: Sequence[Entry], *, false_alarm: floa
     """
     tries = sum(entry.tries for entry in entries)
     known = {(entry.hypothesis.name, entry.hypothesis.joint): entry for entry in entries}
-    limits = []
-    for hypothesis in all_hypotheses(problem.situation.robot, list(EFFECTS.values())):
+
+    def limit(hypothesis: Hypothesis) -> Limit:
         entry = known.get((hypothesis.name, hypothesis.joint))
         if entry is None:
-            limits.append(_none(hypothesis, _why_nothing(problem, hypothesis)))
-        else:
-            limits.append(_limit(problem, entry, known, tries, false_alarm))
-    return tuple(limits)
+            return _none(hypothesis, _why_nothing(problem, hypothesis))
+        return _limit(problem, entry, known, tries, false_alarm)
+
+    return tuple(forked(limit, all_hypotheses(problem.situation.robot, list(EFFECTS.values())), chunk=CHUNK))
 
 
 def summarise_limits(limits: Sequence[Limit]) -> str:

@@ -6,7 +6,7 @@ import math
 import sys
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, partial
 from typing import TypeVar
 
 import numpy as np
@@ -17,18 +17,15 @@ from estimation.diagnosis.hypothesis_tests.groups import Group
 from estimation.diagnosis.hypothesis_tests.hypotheses import Hypothesis
 from estimation.diagnosis.hypothesis_tests.problem import Problem
 from estimation.diagnosis.hypothesis_tests.scoring import Accepted, score
-from robots.common.memory import give_back
-from robots.common.parallel import threaded
+from robots.common.forks import forked
 
 Array = NDArray[np.float64]
 
 # Longer grids are not scanned completely: the effect proposes points. The p-value still counts the whole grid.
 LONG = 60
 PROPOSED = 6
-# Number of hypotheses after which freed memory is returned to the system.
-OFTEN = 20
-# Number of columns that are whitened together.
-WIDE = 32
+# Number of columns that are whitened together, and of hypotheses that a process takes at once.
+WIDE, CHUNK = 32, 4
 
 T = TypeVar("T")
 
@@ -106,18 +103,8 @@ def measure(
     Returns:
         One entry per hypothesis that the data can show.
     """
-    done = 0
-
-    def one(hypothesis: Hypothesis) -> Entry | None:
-        nonlocal done
-        entry = _entry(problem, hypothesis)
-        done += 1
-        if done % OFTEN == 0:
-            give_back()
-        advance(done / len(hypotheses))
-        return entry
-
-    return [entry for entry in threaded(one, hypotheses) if entry is not None]
+    entries = forked(partial(_entry, problem), hypotheses, advance, chunk=CHUNK)
+    return [entry for entry in entries if entry is not None]
 
 
 def _entry(problem: Problem, hypothesis: Hypothesis) -> Entry | None:

@@ -18,8 +18,7 @@ from estimation.diagnosis.recordings.log_reading import Recording
 Array = NDArray[np.float64]
 Small = NDArray[np.float32]
 
-# Length of the windows of spectra [s], and the fewest rows of one. Power densities and columns below `QUIETEST` are
-# zero.
+# Length of the windows of spectra [s], and the fewest rows of one. Power densities below `QUIETEST` are zero.
 WINDOW, FEWEST, QUIETEST = 8.0, 16, 1e-100
 # Lowest cut-off [Hz], and the highest as a share of the sampling rate: above it, sampling distorts acceleration jumps.
 SLOWEST, FASTEST = 4.0, 0.2
@@ -86,38 +85,43 @@ class Band:
         # Zeros between logs, as many as the filters reach.
         size, response, reach = _response(self, sum(lengths), len(runs), 0 if after is None else len(after))
         places = np.cumsum([0, *lengths[:-1]]) + reach * np.arange(len(runs))
-        # Filters are real, so that one complex transform serves two real columns. Both are scaled to the same size:
-        # rounding errors of one then do not show in the other, and zeros stay zero.
-        sizes = np.maximum(columns.max(axis=1, initial=0.0), -columns.min(axis=1, initial=0.0))[:, None]
-        units = 1.0 / np.where(sizes > QUIETEST, sizes, 1.0)
-        half = len(columns) // 2
-        packed = np.zeros((len(columns) - half, size), dtype=np.complex64 if single else np.complex128)
+        apart: Array | Small = np.zeros((len(columns), size), dtype=kind)
         for run, place in zip(runs, places * self.stride, strict=True):
-            there = slice(place, place + run.stop - run.start)
-            np.multiply(columns[::2, run], units[::2], out=packed.real[:, there], casting="same_kind")
-            np.multiply(columns[1::2, run], units[1::2], out=packed.imag[:half, there], casting="same_kind")
-        spectrum = scipy.fft.fft(packed, axis=1, overwrite_x=True)
+            apart[:, place : place + run.stop - run.start] = columns[:, run]
+        spectrum = scipy.fft.rfft(apart, axis=1, overwrite_x=True)
         if response is not None:
-            spectrum *= response.astype(spectrum.dtype, copy=False)
-        # Decimation averages the spectra that alias onto each other.
-        folded = spectrum
-        if self.stride > 1:
-            folded = spectrum.reshape(len(packed), self.stride, -1).sum(axis=1) / self.stride
+            spectrum *= response.astype(kind, copy=False)
+        short = size // self.stride
+        spectrum = _decimated(spectrum, size, short)
         if after is not None:
-            folded *= scipy.fft.fft(after, folded.shape[1]).astype(folded.dtype, copy=False)
-        thin = scipy.fft.ifft(folded, axis=1, overwrite_x=True)
+            spectrum *= scipy.fft.rfft(after, short).astype(spectrum.dtype, copy=False)
+        thin = scipy.fft.irfft(spectrum, short, axis=1, overwrite_x=True)
         result: Array | Small = np.empty((len(columns), sum(lengths)), dtype=kind)
         first = 0
         for place, length in zip(places, lengths, strict=True):
-            own, there = slice(first, first + length), slice(place, place + length)
-            np.multiply(thin.real[:, there], sizes[::2], out=result[::2, own], casting="same_kind")
-            np.multiply(thin.imag[:half, there], sizes[1::2], out=result[1::2, own], casting="same_kind")
+            result[:, first : first + length] = thin[:, place : place + length]
             first += length
         return result[0] if series.ndim == 1 else result.T
 
 
+def _decimated(spectrum: Array, size: int, short: int) -> Array:
+    """Keeps one row in `size / short`: averages the half spectra (k, size // 2 + 1) that alias onto each other."""
+    if size == short:
+        return spectrum
+    half, result = short // 2, spectrum[:, : short // 2 + 1].copy()
+    for start in range(short, size // 2 + 1, short):
+        part = spectrum[:, start : start + half + 1]
+        result[:, : part.shape[1]] += part
+    # Those of negative frequencies are the conjugates of the positive ones.
+    for stop in range(short, (size - 1) // 2 + half + 1, short):
+        part = spectrum[:, stop - half : min(stop, (size - 1) // 2) + 1]
+        result[:, half + 1 - part.shape[1] :] += part[:, ::-1].conj()
+    result *= short / size
+    return result
+
+
 @lru_cache(maxsize=64)
-def _response(band: Band, rows: int, logs: int, after: int) -> tuple[int, NDArray[np.complex128] | None, int]:
+def _response(band: Band, rows: int, logs: int, after: int) -> tuple[int, Array | None, int]:
     """Computes the transform length without wrap-around, the zero-phase response of the filter, and its reach.
 
     Args:
@@ -137,7 +141,7 @@ def _response(band: Band, rows: int, logs: int, after: int) -> tuple[int, NDArra
     centred = np.zeros(size)
     centred[: half + 1] = band.taps[half:]
     centred[-half:] = band.taps[:half]
-    return size, scipy.fft.fft(centred), reach
+    return size, scipy.fft.rfft(centred).real, reach
 
 
 def find_bands(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -52,13 +53,15 @@ class ImpulseResponse:
     values: Array
 
     @staticmethod
-    def of(cutoff: float, step: float, half: Array) -> ImpulseResponse:
+    @lru_cache(maxsize=16)
+    def of(cutoff: float, step: float, edges: tuple[float, ...]) -> ImpulseResponse:
         """Evaluates the response for a low-pass [Hz], a sample period [s] and the edges on one side [s]."""
-        edges = np.concatenate([-half[:0:-1], half])
+        half = np.array(edges)
+        both = np.concatenate([-half[:0:-1], half])
         dx = step / FINE
         count = int(np.ceil((half[-1] + RINGS / cutoff) / dx))
         x: Array = dx * np.arange(-count, count + 1, dtype=np.float64)
-        low, high, at = edges[:-1], edges[1:], x[:, None]
+        low, high, at = both[:-1], both[1:], x[:, None]
         force = ((at >= low) & (at < high)).astype(float)
         speed = np.clip(at - low, 0.0, high - low)
         way = speed**2 / 2 + (high - low) * np.maximum(at - high, 0.0)
@@ -79,12 +82,20 @@ class ImpulseResponse:
         share = (place - low)[:, None]
         return np.asarray((1 - share) * self.values[:, low] + share * self.values[:, low + 1])
 
+    def sampled(self, first: float, count: int) -> Array:
+        """Interpolates as `at` does, at `count` sample periods from a first time [s] on, all of them in the table."""
+        place = (first - self.x[0]) / (self.x[1] - self.x[0])
+        low = min(max(int(place), 0), len(self.x) - 2 - FINE * (count - 1))
+        share, stop = place - low, low + FINE * (count - 1) + 1
+        before, after = self.values[:, low:stop:FINE], self.values[:, low + 1 : stop + 1 : FINE]
+        return np.asarray((1 - share) * before + share * after)
 
-def edges_of(cutoff: float, step: float) -> Array:
+
+def edges_of(cutoff: float, step: float) -> tuple[float, ...]:
     """Returns the edges on one side of a reversal [s], for a low-pass [Hz] and a sample period [s]."""
     wider = max(1.0, step / CLOSE)
     edges = wider * np.array(EDGES)
-    return edges[edges <= max(PERIODS / cutoff, wider * SHORTEST)]
+    return tuple(edges[edges <= max(PERIODS / cutoff, wider * SHORTEST)].tolist())
 
 
 @dataclass(frozen=True, eq=False)
@@ -197,8 +208,11 @@ def impulse_columns(
         table, rows = tables[k], recording.runs[k]
         reach = table.x[-1] / step
         start, stop = max(rows.start, int(np.ceil(moment - reach))), min(rows.stop, int(moment + reach) + 1)
-        here = way * table.at((np.arange(start, stop) - moment) * step)
-        for whole, part in zip(columns, (here[0] / inertia, here[1] / inertia, here[2]), strict=True):
+        if stop <= start:
+            continue
+        here = table.sampled((start - moment) * step, stop - start)
+        for whole, part, scale in zip(columns, here, (way / inertia, way / inertia, way), strict=True):
+            part *= scale
             whole[start:stop] += part
         far = np.abs(np.arange(start, stop) - moment)
         closer = far < away[start:stop]

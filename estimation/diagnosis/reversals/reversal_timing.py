@@ -20,6 +20,7 @@ from estimation.diagnosis.reversals.reversal_impulses import (
     impulse_columns,
     shift_reversals,
 )
+from robots.common.forks import forked
 
 Array = NDArray[np.float64]
 
@@ -125,11 +126,14 @@ def measure_reversal_timing(
     lags, errors, kicks = np.zeros(recording.n), np.full(recording.n, np.inf), np.zeros(recording.n)
     coulomb = {column.joint - 1: i for i, column in enumerate(base.columns) if column.symbol == "f1"}
     signs = base_torque(base, recording, np.isin(np.arange(base.size), list(coulomb.values())).astype(float))
-    for j, i in coulomb.items():
+
+    def measured(j: int) -> tuple[float, float, float] | None:
         turns = find_reversals(recording, j, base, values)
         if turns is None:
-            continue
-        found = _joint(recording, j, turns, residual[:, j], float(abs(values[i])), signs[:, j])
+            return None
+        return _joint(recording, j, turns, residual[:, j], float(abs(values[coulomb[j]])), signs[:, j])
+
+    for j, found in zip(coulomb, forked(measured, coulomb), strict=True):
         if found is not None:
             lags[j], errors[j], kicks[j] = found
     return ReversalTiming(lags, errors, kicks)

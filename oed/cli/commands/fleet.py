@@ -8,7 +8,17 @@ from typing import Annotated
 import typer
 
 from oed.cli.console import Console
-from oed.cli.options import ForceOption, JsonOption, MappingOption, OutOption, PngOption, QuietOption, WorkersOption
+from oed.cli.options import (
+    ClusterOption,
+    ForceOption,
+    JsonOption,
+    MappingOption,
+    OutOption,
+    PngOption,
+    QuietOption,
+    WorkersOption,
+    executor_from,
+)
 
 
 def fleet(
@@ -35,6 +45,7 @@ def fleet(
     ] = 1000.0,
     window: Annotated[float, typer.Option(help="Length of a window [s].")] = 10.0,
     workers: WorkersOption = None,
+    cluster: ClusterOption = None,
     out: OutOption = Path("fleet"),
     png: PngOption = False,
     force: ForceOption = False,
@@ -54,7 +65,10 @@ def fleet(
         from robots.common.files import ResultFolder
 
         settings = MonitorSettings(window=window, false_alarm_hours=false_alarm_hours, heat=heat)  # type: ignore[arg-type]
-        with ResultFolder(out, force, names=["fleet.json", "fleet.csv", "report.html"]) as results:
+        with (
+            executor_from(workers, cluster) as executor,
+            ResultFolder(out, force, names=["fleet.json", "fleet.csv", "report.html"]) as results,
+        ):
             result = monitor_fleet(
                 folder,
                 model,
@@ -62,6 +76,7 @@ def fleet(
                 settings=settings,
                 mapping=mapping,
                 workers=workers,
+                executor=executor,
                 progress=progress,
             )
             result.save(results.path("fleet.json").parent)

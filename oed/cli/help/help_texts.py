@@ -9,7 +9,7 @@ COMMANDS: dict[str, tuple[str, ...]] = {
     "Experiments": ("design", "pareto", "retime", "campaign", "export"),
     "Robot and virtual robot": ("stream", "record", "loop", "controller", "simulate"),
     "Models": ("check", "identify", "thermal", "predict", "payload"),
-    "Diagnosis": ("diagnose", "compare", "monitor", "fleet", "force"),
+    "Diagnosis": ("diagnose", "compare", "monitor", "fleet", "force", "benchmark"),
 }
 """Commands by purpose; those that are not listed come last."""
 
@@ -35,10 +35,24 @@ OPTIONS = {
             "model",
             "campaign_folder",
         ),
-        *("payload", "gravity", "ambient", "plant", "after", "task", "design", "extension"),
+        *("payload", "gravity", "ambient", "plant", "after", "task", "design", "extension", "answers"),
     ),
     "Output": (
-        *("out", "force", "png", "json", "quiet", "urdf", "mjcf", "c_code", "to", "degrees", "positions_only", "bare"),
+        *(
+            "out",
+            "force",
+            "png",
+            "json",
+            "quiet",
+            "urdf",
+            "mjcf",
+            "c_code",
+            "to",
+            "degrees",
+            "positions_only",
+            "bare",
+            "markdown",
+        ),
         *("install_completion", "show_completion", "help", "version"),
     ),
 }
@@ -102,7 +116,10 @@ EXAMPLES = {
         "oed monitor --model thermal --log day1.csv day2.csv day3.csv --out monitored",
         "oed monitor --model model --log-dir logs --state robot7.state --out monitored --force",
     ),
-    "fleet": ("oed fleet logs_of_all_robots --model model --workers 4 --out fleet",),
+    "fleet": (
+        "oed fleet logs_of_all_robots --model model --workers 4 --out fleet",
+        "oed fleet logs_of_all_robots --model model --cluster tcp://192.168.1.10:8786 --out fleet",
+    ),
     "payload": (
         "oed payload --robot ur10 --log with.csv --without without.csv --to urscript --out payload",
         "oed payload --model model --log with.csv --to franka kuka --out payload",
@@ -110,6 +127,11 @@ EXAMPLES = {
     "force": (
         "oed force --model model --log log.csv --healthy healthy.csv --out forces",
         "oed force --model model --log log.csv --calibration forces/forces.json --out other",
+    ),
+    "benchmark": (
+        "oed benchmark make blind --cases 24",
+        "oed benchmark answer blind --by residual-fit",
+        "oed benchmark score blind blind.residual-fit others/answers.json --markdown table.md",
     ),
     "example": ("oed example --out example",),
     "robots": ("oed robots",),

@@ -165,7 +165,8 @@ def least_inertia(situation: Situation, joint: int, rotor: float = KNOWN) -> Arr
 
     A wrist's inertia is so small that its fit may be negative, which would make the link unstable.
     """
-    own = link_inertia(situation, joint, rotor)[:, joint - 1]
+    j = joint - 1
+    own = situation.sensitivity("inertia")[:, j, j] - (situation.rotors[1, j] + rotor)
     return np.asarray(np.maximum(own, LIGHTEST * max(float(np.abs(own).max(initial=0.0)), 1e-9)))
 
 

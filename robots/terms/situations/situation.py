@@ -21,6 +21,10 @@ if TYPE_CHECKING:
     from robots.regressor import TorqueModel
 
 Array = NDArray[np.float64]
+
+ENDS = 6
+"""Rows at an end from which derivatives of second order in its first three rows follow."""
+
 Kept = TypeVar("Kept")
 
 
@@ -166,11 +170,13 @@ class Situation:
             t, x = self.t[run], values[run]
             if len(t) < 3:
                 continue
-            first[run] = np.gradient(x, t, axis=0)
-            second[run] = np.gradient(first[run], t, axis=0)
             steps = np.diff(t)
             h = float(steps.mean())
-            if len(t) > 7 and np.abs(steps - h).max() < 1e-3 * h:
+            even = len(t) > 2 * ENDS and np.abs(steps - h).max() < 1e-3 * h
+            for part in (slice(0, ENDS), slice(-ENDS, None)) if even else (slice(None),):
+                slope = np.gradient(x[part], t[part], axis=0)
+                first[run][part], second[run][part] = slope, np.gradient(slope, t[part], axis=0)
+            if even:
                 a, b, c = x[4:-2] - x[2:-4], x[5:-1] - x[1:-5], x[6:] - x[:-6]
                 first[run.start + 3 : run.stop - 3] = (45 * a - 9 * b + c) / (60 * h)
                 a, b, c = x[4:-2] + x[2:-4], x[5:-1] + x[1:-5], x[6:] + x[:-6]

@@ -21,7 +21,7 @@ NUMERICS = {
     "power.py": {"DIRECTIONS"},
     "problem.py": {"FAINT"},
     "refinement.py": {"EFFORT", "ZOOMS", "AGAIN", "WIDE", "FACTOR", "SHARE", "SHORT_TRAVEL_FACTOR"},
-    "scan.py": {"LONG", "PROPOSED", "OFTEN", "WIDE"},
+    "scan.py": {"LONG", "PROPOSED", "WIDE", "CHUNK"},
     "shocks.py": {"BETWEEN", "TAIL", "FEWEST", "MOST"},
     "time_windows.py": {"COARSE", "FINE", "BESIDE", "FAINT", "ROUNDING"},
     "acceptance.py": {"ANSWERS", "MOSTLY", "ASIDE", "SURE"},

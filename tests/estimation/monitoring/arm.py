@@ -8,13 +8,13 @@ import numpy as np
 import pinocchio as pin
 
 from estimation.models.model import Model
+from oed.benchmarks.truth.description import write_description
+from oed.benchmarks.truth.dynamics import massless, rigid_torque, with_tool
+from oed.benchmarks.truth.machines import draw_machine
+from oed.benchmarks.truth.references import draw_periodic
 from robots import load_robot
 from robots.regressor import default_model
 from robots.signals import Log
-from tests.truth.description import write_description
-from tests.truth.dynamics import massless, rigid_torque, with_tool
-from tests.truth.machines import draw_machine
-from tests.truth.references import draw_periodic
 
 PERIOD, STEP = 10.0, 0.008
 NOISE = 0.02

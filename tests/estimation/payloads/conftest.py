@@ -10,15 +10,15 @@ import pinocchio as pin
 import pytest
 
 from estimation import Estimate, identify
+from oed.benchmarks.truth.description import write_description
+from oed.benchmarks.truth.dynamics import with_tool
+from oed.benchmarks.truth.machines import draw_machine
+from oed.benchmarks.truth.noise import draw_noise
+from oed.benchmarks.truth.plant import play
+from oed.benchmarks.truth.references import draw_periodic
 from robots import load_robot
 from robots.robot import Robot
 from robots.signals import Log
-from tests.truth.description import write_description
-from tests.truth.dynamics import with_tool
-from tests.truth.machines import draw_machine
-from tests.truth.noise import draw_noise
-from tests.truth.plant import play
-from tests.truth.references import draw_periodic
 
 MASS, CENTRE, INERTIA = 2.0, np.array([0.03, -0.02, 0.11]), np.diag([0.006, 0.007, 0.004])
 

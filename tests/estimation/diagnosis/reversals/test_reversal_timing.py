@@ -24,13 +24,13 @@ from estimation.diagnosis.recordings.smoothed_motion import low_pass_gain
 from estimation.diagnosis.reversals.reversal_impulses import ImpulseResponse, edges_of
 from estimation.diagnosis.reversals.reversal_timing import ReversalTiming, measure_reversal_timing
 from estimation.diagnosis.searches.search import fit_plain
+from oed.benchmarks.truth.cases import Case, draw_case
+from oed.benchmarks.truth.description import write_description
+from oed.benchmarks.truth.effects.actuator import Delay
 from robots import load_robot
 from robots.robot import Robot
 from robots.signals import Log
 from robots.terms.effects import EFFECTS
-from tests.truth.cases import Case, draw_case
-from tests.truth.description import write_description
-from tests.truth.effects.actuator import Delay
 
 COUNTS = 2.0**17
 
@@ -143,8 +143,11 @@ def test_a_table_is_the_motion_of_a_force_that_a_loop_undoes(cutoff: float, step
     assert summed - summed[0] == pytest.approx(velocity - velocity[0], abs=2.0 * off)
     assert len(edges) >= 4
     assert acceleration.shape[1] == 2 * (len(edges) - 1) - 2
-    # The table is interpolated linearly.
+    # The table is interpolated linearly, at single times as in a series of samples.
     assert table.at(table.x[5:6] + dx / 2)[0] == pytest.approx((position[5:6] + position[6:7]) / 2)
+    first, count = table.x[0] + 0.3 * dx, int((table.x[-1] - table.x[0]) / step)
+    whole = table.at(first + step * np.arange(count))
+    assert table.sampled(first, count) == pytest.approx(whole, abs=1e-9 * np.abs(whole).max())
     # Its spectrum has little energy in the band that passes.
     f = np.fft.rfftfreq(len(table.x), dx)
     power = np.abs(np.fft.rfft(position, axis=0)) ** 2

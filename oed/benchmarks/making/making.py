@@ -1,0 +1,140 @@
+"""The verb `make_benchmark`: blind cases in a folder, and the sealed answers in a file beside it."""
+
+from __future__ import annotations
+
+import json
+import secrets
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import partial
+from os import PathLike
+from pathlib import Path
+
+import numpy as np
+
+from oed.benchmarks.folders import FORMAT, MANIFEST, VERSION, Benchmark, default_sealed, read_benchmark
+from oed.benchmarks.making.drawing import DrawnCase, draw
+from oed.benchmarks.making.strata import tasks
+from oed.benchmarks.making.writing import write_case
+from oed.benchmarks.sealing import seal
+from oed.benchmarks.taxonomy import CLASSES, PARAMETERS, UNKNOWN
+from oed.benchmarks.truth.machines import KINDS
+from robots.common.errors import InputError
+from robots.common.files import ResultFolder, open_atomic, sha256
+from robots.common.parallel import parallel_map
+from robots.common.progress import Progress
+from robots.version import VERSION as TOOL
+
+SHORTEST = 10.0  # [s]: a shorter log determines no base model
+
+
+@dataclass(frozen=True, kw_only=True)
+class MakeOptions:
+    """What a benchmark holds.
+
+    Args:
+        cases: number of cases.
+        robots: kinds of robots, of ``ur10``, ``panda``, ``heavy`` and ``er3a``.
+        size: visible size of a single effect: RMS of what the base model cannot fit, over the joint's torque RMS. Two
+            effects have three times this size.
+        noise: RMS of the torque noise over each joint's torque RMS; half of its variance is coloured.
+        duration: of each log [s].
+        unseen: duration of each unseen motion [s].
+
+    Raises:
+        InputError: a number out of its range, or a robot that the plant does not have.
+    """
+
+    cases: int = 24
+    robots: Sequence[str] = KINDS
+    size: float = 0.01
+    noise: float = 0.025
+    duration: float = 60.0
+    unseen: float = 30.0
+
+    def __post_init__(self) -> None:
+        if self.cases < 1:
+            raise InputError(f"{self.cases} cases", allowed="1 or more")
+        for robot in self.robots or ("",):
+            if robot not in KINDS:
+                raise InputError(f"the plant has no robot {robot!r}", allowed=", ".join(KINDS))
+        for name, value, lower, upper in (
+            ("size", self.size, 1e-3, 0.2),
+            ("noise", self.noise, 1e-4, 0.5),
+            ("duration", self.duration, SHORTEST, 3600.0),
+            ("unseen", self.unseen, SHORTEST, 3600.0),
+        ):
+            if not lower <= value <= upper:
+                raise InputError(f"{name} {value:g}", allowed=f"{lower:g} to {upper:g}")
+
+
+def make_benchmark(
+    folder: str | PathLike[str],
+    *,
+    options: MakeOptions | None = None,
+    seed: int | None = None,
+    sealed: str | PathLike[str] | None = None,
+    force: bool = False,
+    workers: int | None = 1,
+    progress: Progress | None = None,
+) -> Benchmark:
+    """Writes blind cases to a folder, and what they hide to a file that is sealed by its hash in the folder.
+
+    Args:
+        folder: for the public part: robots, logs, unseen motions.
+        options: what the benchmark holds.
+        seed: of everything random except the salt. By default a secret one: whoever knows the seed knows the answers.
+        sealed: the file for the sealed answers; by default the folder's name with ``.answers``.
+        force: whether files of the same names may be replaced.
+        workers: number of processes; None for one per core.
+        progress: receives the number of finished cases.
+
+    Returns:
+        The benchmark.
+
+    Raises:
+        InputError: an option out of its range; a folder or file that exists, or cannot be written.
+        InfeasibleError: no robot shows an effect of the size that was asked for.
+    """
+    options = options or MakeOptions()
+    folder = Path(folder)
+    target = Path(sealed) if sealed is not None else default_sealed(folder)
+    if target.resolve().is_relative_to(folder.resolve()):
+        raise InputError("lies in the public folder", file=target, remedy="choose a file outside of it")
+    rng = np.random.default_rng(secrets.randbits(128) if seed is None else seed)
+    todo = list(tasks(options.cases, options.robots, rng))
+    names = [f"case-{task.number:03d}" for task in todo]
+    identity = secrets.token_hex(8)
+    with ResultFolder(folder, force, names=[MANIFEST]) as out, open_atomic(target, force=force) as stream:
+        drawn = parallel_map(
+            partial(draw, size=options.size, noise=options.noise, duration=options.duration, unseen=options.unseen),
+            todo,
+            workers=workers,
+            progress=progress,
+            task="drawing cases",
+        )
+        for name, case in zip(names, drawn, strict=True):
+            write_case(out, name, case)
+        digest = seal(stream, identity, dict(zip(names, map(_hidden, drawn), strict=True)))
+        out.path(MANIFEST).write_text(json.dumps(_manifest(identity, names, digest), indent=2) + "\n", encoding="utf-8")
+    assert sha256(target) == digest
+    return read_benchmark(folder)
+
+
+def _hidden(case: DrawnCase) -> tuple[dict[str, object], np.ndarray]:
+    joints = case.machine.n
+    return case.truth, np.delete(case.unseen, np.s_[1 : 1 + joints], axis=1)
+
+
+def _manifest(identity: str, names: Sequence[str], digest: str) -> dict[str, object]:
+    return {
+        "format": FORMAT,
+        "format_version": VERSION,
+        "id": identity,
+        "tool_version": TOOL,
+        "cases": list(names),
+        "hidden": "each case hides nothing, one effect, two effects, or one effect that no name below fits",
+        "commitment": {"sha256": digest, "of": "the file of sealed answers, which contains 32 random bytes"},
+        "effects": {kind: list(group.effects) for kind, group in CLASSES.items()} | {UNKNOWN: []},
+        "parameters": {name: {"unit": p.unit, "effects": list(p.effects)} for name, p in PARAMETERS.items()},
+    }

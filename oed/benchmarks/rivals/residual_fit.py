@@ -1,0 +1,193 @@
+"""A free fit of the residual by generic columns: the group that explains most of it gives the effect's name."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import pinocchio as pin
+from numpy.typing import NDArray
+from scipy.linalg import lstsq, qr
+from scipy.signal import lfilter
+from scipy.stats import f as f_distribution
+
+from oed.benchmarks.answers.answer import CaseAnswer, NamedEffect
+from oed.benchmarks.folders import BlindCase
+from oed.benchmarks.rivals.base_model import BaseFit, away_from_reversals, base_columns, filtered, fit, motion_of
+from oed.benchmarks.rivals.dictionary import groups
+from oed.benchmarks.rivals.gears import gear_ratios
+from oed.benchmarks.rivals.logs import read_motion
+from oed.benchmarks.rivals.whitening import whitening_filter
+
+Array = NDArray[np.float64]
+
+FALSE_ALARMS = 0.01
+"""Probability of any significant group if the base model is right."""
+
+LEAST = 0.02
+"""Share of the torque RMS that an effect explains at least: one in ten cases without an effect has a group above it."""
+
+MOST = 3
+"""Largest number of effects."""
+
+HALF = 0.5
+"""Share of what all groups together explain that one must explain to give the name."""
+
+SMALL, TINY = 1e-6, 1e-300
+
+WHOLE = ("delay",)
+"""Groups that stand for an effect of the whole robot."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Pick:
+    """A group of columns at a joint.
+
+    Attributes:
+        name: of the group.
+        j: the joint, from 0.
+        explained: share of the whitened residual's sum of squares that the group explains.
+        of_possible: the same over what all groups together explain.
+        p_value: of the F test, without correction.
+        size: RMS of the filtered torque that it explains, over the RMS of the joint's filtered torque.
+    """
+
+    name: str
+    j: int
+    explained: float
+    of_possible: float
+    p_value: float
+    size: float
+
+
+def by_residual_fit(case: BlindCase) -> CaseAnswer:
+    """Answers a case by a stepwise fit of the base model's residual.
+
+    At each joint the residual, whitened by an autoregressive model, is fitted by each group of columns. The group that
+    explains the largest share enters the model, which is fitted again, until no group is significant. A group is
+    significant by an F test with Bonferroni's correction for all groups and joints, if it explains at least `LEAST`.
+
+    Args:
+        case: the public part of the case.
+    """
+    model = pin.buildModelFromUrdf(str(case.urdf))
+    gears = gear_ratios(case.yaml, case.joints)
+    t, q, tau = read_motion(case.log, case.joints, torque=True)
+    motion = motion_of(t, q)
+    log_columns = base_columns(model, motion)
+    slow = filtered(log_columns, motion.period), filtered(tau, motion.period), away_from_reversals(motion)
+    base = fit(*slow)
+    level = np.sqrt((slow[1] ** 2).mean(axis=0))
+    torque = log_columns @ base.parameters
+    listed = [
+        [(name, filtered(group, motion.period)) for name, group in groups(motion, torque, j, gear)]
+        for j, gear in enumerate(gears)
+    ]
+    picks: list[Pick] = []
+    found = base
+    while len(picks) < MOST:
+        best = _best(found, level, listed, picks)
+        if best is None:
+            break
+        picks.append(best)
+        found = fit(*slow, _chosen(picks, [dict(names) for names in listed]))
+    t, q, _ = read_motion(case.unseen, case.joints, torque=False)
+    unseen = motion_of(t, q)
+    columns = base_columns(model, unseen)
+    if picks:
+        other = columns @ base.parameters
+        named_groups = [dict(groups(unseen, other, j, gear)) for j, gear in enumerate(gears)]
+        columns = np.concatenate([columns, _chosen(picks, named_groups)], axis=2)
+    named = [pick for pick in picks if pick.of_possible >= HALF]
+    return CaseAnswer(
+        verdict="nothing" if not picks else "effects" if named else "unexplained",
+        effects=tuple(
+            NamedEffect(effect=pick.name, joints=() if pick.name in WHOLE else (pick.j + 1,)) for pick in named
+        ),
+        torque=columns @ found.parameters,
+    )
+
+
+def _best(found: BaseFit, level: Array, listed: list[list[tuple[str, Array]]], picks: list[Pick]) -> Pick | None:
+    """Finds the significant group that explains the largest share of a joint's residual; None if there is none."""
+    used = {pick.name if pick.name in WHOLE else (pick.name, pick.j) for pick in picks}
+    tried = [
+        pick
+        for j, candidates in enumerate(listed)
+        for pick in _explained(found, level[j], j, candidates)
+        if used.isdisjoint({pick.name, (pick.name, pick.j)})
+    ]
+    significant = [pick for pick in tried if pick.p_value * len(tried) < FALSE_ALARMS and pick.size >= LEAST]
+    return max(significant, key=lambda pick: pick.explained, default=None)
+
+
+def _explained(found: BaseFit, level: float, j: int, listed: list[tuple[str, Array]]) -> list[Pick]:
+    residual = found.residual[:, j]
+    scaled = [(name, group / np.sqrt((group**2).mean(axis=0) + TINY)) for name, group in listed]
+    together = np.concatenate([group for _, group in scaled], axis=1)
+    rows = found.counted[:, j]
+    rest = residual - together @ lstsq(together[rows], residual[rows], cond=SMALL)[0]
+    whitener = whitening_filter(np.where(rows, rest, 0.0))
+    base = found.columns[:, j]
+    base = base[:, np.any(base != 0, axis=0)]
+
+    def white(values: Array) -> Array:
+        return np.asarray(lfilter(whitener, [1.0], values, axis=0)[rows])
+
+    # What the joint's own base model absorbs is no evidence for a group.
+    own = _span(white(base / np.sqrt((base**2).mean(axis=0))))
+
+    def left(values: Array) -> Array:
+        return np.asarray(white(values) - _projected(own, white(values)))
+
+    target = left(residual)
+    whole = float(target @ target)
+
+    slow_own, slow_residual = _span(base[rows]), residual[rows]
+
+    def size(columns: Array) -> float:
+        beyond = columns[rows] - _projected(slow_own, columns[rows])
+        return float(np.sqrt((_projected(_span(beyond), slow_residual) ** 2).mean()) / level)
+
+    def gain(columns: Array) -> float:
+        along = _span(left(columns)).T @ target
+        return float(along @ along)
+
+    possible, free = gain(together), len(target) - own.shape[1]
+    picks = []
+    for name, group in scaled:
+        k, explained = group.shape[1], gain(group)
+        statistic = explained / k / ((whole - explained) / (free - k))
+        picks.append(
+            Pick(
+                name=name,
+                j=j,
+                explained=explained / whole,
+                of_possible=explained / max(possible, TINY),
+                size=size(group),
+                p_value=float(f_distribution.sf(statistic, k, free - k)),
+            )
+        )
+    return picks
+
+
+def _chosen(picks: list[Pick], named: list[dict[str, Array]]) -> Array:
+    """Collects the columns (N, n, k) of the groups that entered the model, from the groups of each joint."""
+    parts = []
+    for pick in picks:
+        group = named[pick.j][pick.name]
+        columns = np.zeros((len(group), len(named), group.shape[1]))
+        columns[:, pick.j] = group
+        parts.append(columns)
+    return np.concatenate(parts, axis=2)
+
+
+def _span(columns: Array) -> Array:
+    """Computes an orthonormal basis of columns, without directions that are hardly there."""
+    basis, triangle, _ = qr(columns, mode="economic", pivoting=True)
+    sizes = np.abs(np.diag(triangle))
+    return np.asarray(basis[:, sizes > SMALL * max(float(sizes.max(initial=0.0)), TINY)])
+
+
+def _projected(basis: Array, values: Array) -> Array:
+    return np.asarray(basis @ (basis.T @ values))

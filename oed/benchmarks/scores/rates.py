@@ -1,0 +1,130 @@
+"""Rates with their intervals."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.stats import beta, binom, norm
+
+LEVEL = 0.95
+
+
+@dataclass(frozen=True, kw_only=True)
+class Rate:
+    """A share of cases, with the Clopper-Pearson interval at 95 %."""
+
+    hits: int
+    tries: int
+
+    @property
+    def value(self) -> float | None:
+        """The share; None without a case."""
+        return self.hits / self.tries if self.tries else None
+
+    @property
+    def interval(self) -> tuple[float, float] | None:
+        """The interval; None without a case."""
+        if not self.tries:
+            return None
+        tail = (1 - LEVEL) / 2
+        lower = 0.0 if self.hits == 0 else float(beta.ppf(tail, self.hits, self.tries - self.hits + 1))
+        upper = 1.0 if self.hits == self.tries else float(beta.ppf(1 - tail, self.hits + 1, self.tries - self.hits))
+        return lower, upper
+
+    def text(self) -> str:
+        """Writes counts and interval, such as ``7 of 8 (47 to 100 %)``."""
+        if self.interval is None:
+            return "-"
+        low, high = (100 * bound for bound in self.interval)
+        return f"{self.hits} of {self.tries} ({low:.0f} to {high:.0f} %)"
+
+    def to_dict(self) -> dict[str, object]:
+        """Gives the rate as plain data."""
+        interval = None if self.interval is None else list(self.interval)
+        return {"hits": self.hits, "cases": self.tries, "rate": self.value, "ci95": interval}
+
+
+@dataclass(frozen=True, kw_only=True)
+class Median:
+    """A median, with the interval at 95 % that holds for every continuous distribution.
+
+    Attributes:
+        values: sorted.
+    """
+
+    values: tuple[float, ...]
+
+    @property
+    def value(self) -> float | None:
+        """The median; None without a value."""
+        return float(np.median(self.values)) if self.values else None
+
+    @property
+    def interval(self) -> tuple[float, float] | None:
+        """The interval by order statistics; None where there are too few values for one."""
+        n = len(self.values)
+        below = int(binom.ppf((1 - LEVEL) / 2, n, 0.5)) if n else 0
+        # The k smallest and k largest values are left out, k the largest number with the probability that is allowed.
+        while below > 0 and 2 * binom.cdf(below - 1, n, 0.5) > 1 - LEVEL:
+            below -= 1
+        return (self.values[below - 1], self.values[n - below]) if below > 0 else None
+
+    def text(self) -> str:
+        """Writes median, interval and count."""
+        if self.value is None:
+            return "-"
+        if self.interval is None:
+            return f"{self.value:.3g} ({len(self.values)} cases)"
+        return f"{self.value:.3g} ({self.interval[0]:.3g} to {self.interval[1]:.3g}, {len(self.values)} cases)"
+
+    def to_dict(self) -> dict[str, object]:
+        """Gives the median as plain data."""
+        interval = None if self.interval is None else list(self.interval)
+        return {"cases": len(self.values), "median": self.value, "ci95": interval}
+
+
+@dataclass(frozen=True, kw_only=True)
+class Mean:
+    """A mean, with the interval at 95 % of a normal distribution.
+
+    Attributes:
+        values: of which it is the mean.
+    """
+
+    values: tuple[float, ...]
+
+    @property
+    def value(self) -> float:
+        """The mean."""
+        return float(np.mean(self.values))
+
+    @property
+    def interval(self) -> tuple[float, float] | None:
+        """The interval; None with one value."""
+        if len(self.values) < 2:
+            return None
+        half = float(norm.ppf((1 + LEVEL) / 2) * np.std(self.values, ddof=1) / np.sqrt(len(self.values)))
+        return self.value - half, self.value + half
+
+    def text(self) -> str:
+        """Writes mean, interval and count."""
+        between = "" if self.interval is None else f"{self.interval[0]:.2g} to {self.interval[1]:.2g}, "
+        return f"{self.value:.2g} ({between}{len(self.values)} effects)"
+
+    def to_dict(self) -> dict[str, object]:
+        """Gives the mean as plain data."""
+        interval = None if self.interval is None else list(self.interval)
+        return {"effects": len(self.values), "mean": self.value, "ci95": interval}
+
+
+def rate(values: Iterable[bool]) -> Rate:
+    """Counts hits among tries."""
+    counted = list(map(bool, values))
+    return Rate(hits=sum(counted), tries=len(counted))
+
+
+def median(values: Iterable[float]) -> Median:
+    """Collects values for their median."""
+    return Median(values=tuple(sorted(values)))

@@ -1,0 +1,72 @@
+"""True effects that cases hide: those of the catalogue (`KNOWN`), and others (`STRANGERS`)."""
+
+from __future__ import annotations
+
+from oed.benchmarks.truth.effects.actuator import Clipping, Delay, Drift, EncoderOffset, Saturation, TorqueConstant
+from oed.benchmarks.truth.effects.base import Effect
+from oed.benchmarks.truth.effects.friction import (
+    Asymmetric,
+    FrictionStep,
+    LoadDependent,
+    LuGre,
+    PositionDependent,
+    Stribeck,
+    Warming,
+)
+from oed.benchmarks.truth.effects.strangers import (
+    BeltFriction,
+    BorrowedFriction,
+    CrossWave,
+    DeadZone,
+    Drag,
+    DraggingBrake,
+    Interpolation,
+    SlippedZero,
+    TiredCable,
+)
+from oed.benchmarks.truth.effects.surroundings import Contact, Payload, Tilt
+from oed.benchmarks.truth.effects.transmission import Backlash, Balancer, Cable, Elastic, Ripple, WristCoupling
+from oed.benchmarks.truth.effects.whole_strangers import Conveyor, FloorVibration, Hose, LeaningBase, SlippedBase, Slosh
+
+KNOWN: tuple[type[Effect], ...] = (
+    Stribeck,
+    LuGre,
+    Asymmetric,
+    LoadDependent,
+    PositionDependent,
+    FrictionStep,
+    Warming,
+    Ripple,
+    Elastic,
+    Backlash,
+    WristCoupling,
+    Balancer,
+    Cable,
+    TorqueConstant,
+    Saturation,
+    Clipping,
+    Drift,
+    Delay,
+    EncoderOffset,
+    Payload,
+    Tilt,
+    Contact,
+)
+STRANGERS: tuple[type[Effect], ...] = (
+    CrossWave,
+    TiredCable,
+    FloorVibration,
+    Interpolation,
+    Slosh,
+    Hose,
+    Drag,
+    BorrowedFriction,
+    DraggingBrake,
+    BeltFriction,
+    LeaningBase,
+    DeadZone,
+    SlippedBase,
+    SlippedZero,
+    Conveyor,
+)
+__all__ = ["KNOWN", "STRANGERS", "Effect"]
