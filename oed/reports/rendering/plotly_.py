@@ -213,7 +213,7 @@ def _decorate(
                     "x": 1.0,
                     "y": np.log10(line.value) if panel.y_log else line.value,
                     "text": _escape(line.label),
-                    "font": {"size": LABEL_SIZE, "color": colour(line.role)},
+                    "font": {"size": LABEL_SIZE, "color": INK},
                     "showarrow": False,
                     "xanchor": "right",
                     "yanchor": "bottom" if _labels_above(line.value, panel) else "top",

@@ -86,13 +86,22 @@ class Browser:
 
     def open(self, path: Path, *, width: int, dark: bool = False, scripts: bool = True) -> None:
         """Loads a file in a window of a width [px]."""
-        self.call("Emulation.setScriptExecutionDisabled", value=not scripts)
-        self.call("Emulation.setDeviceMetricsOverride", width=width, height=900, deviceScaleFactor=1, mobile=False)
+        self.scripts(allowed=scripts)
+        self.resize(width)
         self.theme(dark=dark)
         self.events.clear()
         self.call("Page.navigate", url=path.as_uri())
         while not any(event["method"] == "Page.loadEventFired" for event in self.events):
             self.events.append(self._next())
+
+    def resize(self, width: int, *, height: int = 900) -> None:
+        """Sets the size of the window [px]."""
+        size = {"width": width, "height": height, "deviceScaleFactor": 1, "mobile": False}
+        self.call("Emulation.setDeviceMetricsOverride", **size)
+
+    def scripts(self, *, allowed: bool) -> None:
+        """Sets whether scripts run."""
+        self.call("Emulation.setScriptExecutionDisabled", value=not allowed)
 
     def theme(self, *, dark: bool) -> None:
         """Sets what the reader prefers."""
