@@ -39,10 +39,10 @@ class Browser:
         self._profile = tempfile.TemporaryDirectory(ignore_cleanup_errors=True)
         their_input, self._out = os.pipe()
         self._in, their_output = os.pipe()
-        # The protocol has fixed numbers: the browser reads from 3 and writes to 4.
+        # The protocol has fixed numbers: the browser reads from 3 and writes to 4. Other shells know numbers to 9 only.
         words = shlex.join([found, *FLAGS, f"--user-data-dir={self._profile.name}", "about:blank"])
         self._process = subprocess.Popen(
-            ["sh", "-c", f"exec {words} 3<&{their_input} 4>&{their_output}"],
+            ["bash", "-c", f"exec {words} 3<&{their_input} 4>&{their_output}"],
             pass_fds=(their_input, their_output),
             stdout=subprocess.DEVNULL,
             stderr=subprocess.DEVNULL,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -9,7 +10,7 @@ import pytest
 
 from estimation.comparisons import compare
 from estimation.models.model import Model
-from oed.reports import comparison_page, render
+from oed.reports import Page, comparison_page, render
 from oed.reports.pages.comparisons.comparison_report import parts_picture
 from robots import load_robot
 from robots.base_parameters import find_base_parameters
@@ -80,3 +81,8 @@ def test_damage_is_never_green(model):
     assert "Friction changed on joint 2 alone: inspect it." in page.verdict
     friction = next(section for section in page.sections if section.title == "Friction")
     assert any(text.startswith("Joint 2: friction +3") and "inspect this joint" in text for text in friction.paragraphs)
+
+
+def test_works_in_a_browser(model: Model, in_browser: Callable[[Page], None]) -> None:
+    """The page of a damaged joint passes all checks of `browser_checks`."""
+    in_browser(comparison_page(compare(runs_of(model, 2, 1.3))))

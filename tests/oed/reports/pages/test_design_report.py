@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
@@ -10,7 +11,7 @@ import numpy as np
 import pytest
 
 from oed.experiments import Design, Effort, Ipopt
-from oed.reports import design_page, render, save_design_report, significant
+from oed.reports import Page, design_page, render, save_design_report, significant
 from oed.reports.pages.design_report import excitation_findings
 from robots.common.files import ResultFolder
 from robots.geometry.chain import Chain, Joint
@@ -133,3 +134,8 @@ def test_pictures_on_request(design: Design, tmp_path: Path) -> None:
     pictures = sorted((tmp_path / "pictures").glob("*.png"))
     assert [p.stem for p in pictures] == sorted(picture.name for picture in design_page(design).pictures)
     assert all(p.read_bytes().startswith(b"\x89PNG") for p in pictures)
+
+
+def test_works_in_a_browser(design: Design, in_browser: Callable[[Page], None]) -> None:
+    """The page passes all checks of `browser_checks`."""
+    in_browser(design_page(design))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -9,6 +10,7 @@ import pytest
 
 from estimation.diagnosis.experiment_plans.detection_limits import Limit
 from estimation.diagnosis.simulations.simulation_result import Curves, Simulation
+from oed.reports import Page
 from oed.reports.pages.diagnosis_limits import limits_page, limits_section
 from oed.reports.pages.diagnosis_report import diagnosis_page
 from oed.reports.pages.diagnosis_view import DiagnosisView, FindingView
@@ -310,3 +312,10 @@ def test_the_page_of_a_plan():
     assert "on joint 3: joint hardly moves." in text
     assert "hidden" in text
     assert "Stribeck friction" in page.findings[0].text
+
+
+@pytest.mark.slow
+def test_works_in_a_browser(view: DiagnosisView, in_browser: Callable[[Page], None]) -> None:
+    """The pages of a diagnosis and of a plan pass all checks of `browser_checks`."""
+    in_browser(diagnosis_page(view))
+    in_browser(limits_page(LIMITS, "two"))

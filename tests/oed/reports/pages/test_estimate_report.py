@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -10,7 +11,7 @@ import pytest
 
 from estimation import identify
 from estimation.identifications.estimate import Estimate
-from oed.reports import estimate_page, render, save_estimate_report, significant, significant_error
+from oed.reports import Page, estimate_page, render, save_estimate_report, significant, significant_error
 from robots.common.files import ResultFolder
 from robots.geometry.chain import Chain, Joint
 from robots.limits import Limits
@@ -99,3 +100,8 @@ def test_pictures_on_request(estimate: Estimate, tmp_path: Path) -> None:
         save_estimate_report(estimate, folder, png=True)
     names = {path.stem for path in (tmp_path / "out").glob("*.png")}
     assert names == {picture.name for picture in estimate_page(estimate).pictures}
+
+
+def test_works_in_a_browser(estimate: Estimate, in_browser: Callable[[Page], None]) -> None:
+    """The page passes all checks of `browser_checks`."""
+    in_browser(estimate_page(estimate))
