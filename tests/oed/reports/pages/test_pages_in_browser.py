@@ -168,7 +168,8 @@ def heated() -> CampaignEstimate:
 def loop(folder: Path) -> LoopResult:
     """One experiment of the er3a after which a backlash is named."""
     robot = load_robot("er3a")
-    motion = Motion(T, *(np.tile(part, (1, 3)) for part in (0.1 * WAVE, 0.3 * WAVE, 0.9 * WAVE)))
+    parts = (0.1 * np.sin(3.0 * T), 0.3 * np.cos(3.0 * T), -0.9 * np.sin(3.0 * T))
+    motion = Motion(T, *(np.tile(part[:, None], (1, 6)) for part in parts))
     write_trajectory(folder / "first.csv", motion)
     finding = {
         "effect": "backlash",
@@ -177,7 +178,14 @@ def loop(folder: Path) -> LoopResult:
         "sentence": "Joint 2 has 0.1 mrad of play.",
         "gain": {"nrmse_before": 0.05, "nrmse_after": 0.02},
     }
-    verdict = Verdict("diagnosis_1", "named", [finding], [0.05] * 6, [0.02] * 6, "backlash of joint 2")
+    verdict = Verdict(
+        folder="diagnosis_1",
+        verdict="named",
+        findings=[finding],
+        before=[0.05] * 6,
+        after=[0.02] * 6,
+        summary="backlash of joint 2",
+    )
     recorded = SimpleNamespace(log="log_1.csv", rows=N, lost=0, delay=0.002)
     run = LoopRun(trajectory="first.csv", pause=60.0, recorded=recorded)  # type: ignore[arg-type]
     experiment = Experiment(kind="excitation", why="first experiment", resolves=None, runs=[run], diagnosis=verdict)
