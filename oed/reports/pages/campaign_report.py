@@ -110,6 +110,9 @@ def _findings(campaign: Campaign) -> tuple[Finding, ...]:
             action = "Design it again with oed design --collision." if stage.kind == "excitation" else "Check it first."
             found.append(Finding(code="collision.found", subject=f"{stage.name}:", text=text, action=action))
             colliding.append(stage.name)
+    if campaign.success:
+        text = "Every stage respects all limits, and starts and ends at rest in the home pose."
+        found += findings_of("done", [text])
     # The notes say the same of collisions.
     own = tuple(f"COLLISION in the {name} stage" for name in colliding)
     notes = [note for note in campaign.notes if not (own and note.startswith(own))]
