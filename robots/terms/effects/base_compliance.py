@@ -148,10 +148,7 @@ class BaseCompliance(Effect):
     ) -> str:
         """Describes the values in one sentence."""
         softest = 1e3 * float(np.max(coefficients[:2]))
-        return (
-            f"The base is compliant: it tilts by up to {np.degrees(softest):.2g} deg under 1000 N m. Check its bolts, "
-            "the pedestal and the floor."
-        )
+        return f"The base is compliant: it tilts by up to {np.degrees(softest):.2g} deg under 1000 N m."
 
     def coordinate(self, situation: Situation, joint: Place, shape: tuple[float, ...] = ()) -> tuple[str, Array]:
         """Returns the moment about the first horizontal axis."""
