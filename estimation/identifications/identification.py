@@ -112,7 +112,7 @@ def identify(
     prepared = prepare_all(robot, usable)
     by_position = friction == "auto" if position is None else position
     if friction == "auto":
-        friction = BendingFriction.within(_usual_speeds(prepared))
+        friction = BendingFriction.within(usual_speeds(prepared))
 
     def model(scales: float | tuple[float, ...], with_position: bool) -> TorqueModel:
         plain = default_model(robot, friction=friction, velocity_scale=scales, rotor=rotor, offset=offset)
@@ -133,11 +133,11 @@ def identify(
         base = replace(base, model=model(choice.velocity_scales, choice.position))
     found = fit(base, prepared, chosen, choice, seed)
     joints = _joint_fits(found, predictable)
-    determined = _determined(found, joints)
+    determined = determined_parameters(found, joints)
     bar.finish()
     colour = colour_of(np.sqrt(np.maximum(np.diag(found.covariance), 0.0)), found.white, determined)
     base, rows = found.base, found.rows
-    provenance = {**_provenance(data, chosen, found.choice, joints, seed), "colour": colour}
+    provenance = {**describe_fit(data, chosen, found.choice, joints, seed), "colour": colour}
     provenance["recorded"] = _recorded(found)
     provenance |= {} if found.prior_share is None else {"prior_share": found.prior_share.tolist()}
     provenance["gravities"] = [list(gravity) for gravity in base.gravities]
@@ -167,7 +167,7 @@ def identify(
     )
 
 
-def _usual_speeds(logs: Sequence[Prepared]) -> Array:
+def usual_speeds(logs: Sequence[Prepared]) -> Array:
     """Speed of each joint (n,) that it exceeds in a thousandth of the time only."""
     found = []
     for log in logs:
@@ -202,6 +202,23 @@ def _predictable(prepared: Sequence[Prepared], choice: Choice) -> NDArray[np.boo
     moves = np.any([np.ptp(log.log.q, axis=0) > 0 for log in prepared], axis=0)
     highest = np.max([log.tau.max(axis=0) for log in prepared], axis=0)
     lowest = np.min([log.tau.min(axis=0) for log in prepared], axis=0)
+    return require_predictable(moves, lowest, highest, choice)
+
+
+def require_predictable(
+    moves: NDArray[np.bool_], lowest: Array, highest: Array, choice: Choice
+) -> NDArray[np.bool_]:
+    """Marks the joints (n,) that move, and have a torque that varies and follows from the motion.
+
+    Args:
+        moves: which joints move (n,).
+        lowest: torque (n,) [N m or N].
+        highest: torque (n,).
+        choice: with the errors on held-out data.
+
+    Raises:
+        NotIdentifiableError: none.
+    """
     varies = highest - lowest > ROUNDING * np.maximum(1.0, np.maximum(highest, -lowest))
     follows = choice.held_out < HOPELESS * choice.spread
     if (moves & varies & follows).any():
@@ -264,7 +281,8 @@ def _noise_floor(found: Fit) -> Array:
     return fast_noise(residuals)
 
 
-def _determined(found: Fit, joints: Sequence[JointFit]) -> NDArray[np.bool_]:
+def determined_parameters(found: Fit, joints: Sequence[JointFit]) -> NDArray[np.bool_]:
+    """Tells which parameters (b,) the data determine: by their standard errors, or because they hardly matter."""
     values, moments, columns = found.solution.values, found.moments, found.base.columns
     errors = np.sqrt(np.maximum(np.diag(found.covariance), 0.0))
     excited = np.einsum("jpp->jp", moments.gram) / np.maximum(moments.count, 1)[:, None]  # mean square of each column
@@ -276,9 +294,10 @@ def _determined(found: Fit, joints: Sequence[JointFit]) -> NDArray[np.bool_]:
     return known & (excited.sum(axis=0) > 0) & ~(own & lost)
 
 
-def _provenance(
+def describe_fit(
     logs: Sequence[Log], method: Estimator, choice: Choice, joints: Sequence[JointFit], seed: int
 ) -> dict[str, object]:
+    """Lists logs, method, choices and errors of a fit, for `model.json`."""
     return {
         "logs": describe_logs(logs),
         "method": method.name,
