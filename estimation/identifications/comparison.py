@@ -63,7 +63,7 @@ class Comparison:
         tau = np.concatenate([log.tau for log in logs]) if len(logs) > 1 else logs[0].tau
         deviation = tau.std(axis=0) if spread is None else spread
         self.spread = np.maximum(deviation, 1e-9 * np.maximum(1.0, np.abs(tau).max(axis=0)))
-        self.sampled = count > MOST_ROWS
+        self.sampled = count > MOST_ROWS or spread is not None
         self.logs: list[Prepared] = []
         self.names = [log.log.name or f"log {index}" for index, log in enumerate(logs, start=1)]
         self.source: list[int] = []  # of each stretch, which log it is part of

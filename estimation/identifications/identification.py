@@ -205,9 +205,7 @@ def _predictable(prepared: Sequence[Prepared], choice: Choice) -> NDArray[np.boo
     return require_predictable(moves, lowest, highest, choice)
 
 
-def require_predictable(
-    moves: NDArray[np.bool_], lowest: Array, highest: Array, choice: Choice
-) -> NDArray[np.bool_]:
+def require_predictable(moves: NDArray[np.bool_], lowest: Array, highest: Array, choice: Choice) -> NDArray[np.bool_]:
     """Marks the joints (n,) that move, and have a torque that varies and follows from the motion.
 
     Args:

@@ -84,7 +84,15 @@ class LogStream:
                 at += count
         signals = {name: np.concatenate(values) for name, values in found.items()}
         try:
-            return Log(**signals, payload=self.payload, gravity=self.gravity, name=self.path.stem)
+            return Log(
+                t=signals["t"],
+                q=signals["q"],
+                tau=signals.get("tau"),
+                current=signals.get("current"),
+                payload=self.payload,
+                gravity=self.gravity,
+                name=self.path.stem,
+            )
         except InputError as error:
             row = 0 if error.row is None else error.row - 1
             part, inside = self.place(first + row)

@@ -30,7 +30,7 @@ class Errors:
 
     def __init__(self, total: int, highest: Array) -> None:
         n = len(highest)
-        self._total, self._scale = total, np.maximum(highest, np.finfo(float).tiny)
+        self._scale = np.maximum(highest, np.finfo(float).tiny)
         self.rows = 0
         self.torque, self.squares = np.zeros((2, n))
         self.kept: list[tuple[Rows, Array]] = []
@@ -39,8 +39,8 @@ class Errors:
         self._lower, self._upper = np.full(n, np.inf), np.full(n, -np.inf)
         self._fastest, self._hardest = np.zeros((2, n))
         length = MOST_ROWS // STRETCHES
-        whole = total <= MOST_ROWS
-        self._places = [(0, total)] if whole else [(s, length) for s in _spread(total - length, STRETCHES)]
+        self._places = [] if total <= MOST_ROWS else _spread(total - length, STRETCHES)
+        self._length = length
 
     def add(self, part: Rows, predicted: Array) -> None:
         """Adds a piece.
@@ -65,9 +65,11 @@ class Errors:
         for joint in range(error.shape[1]):
             if part.held is None or not part.held[joint]:
                 self._counts[joint] += np.bincount(bins[:, joint], minlength=BINS)
-        for begin, length in self._places:
+        if not self._places:
+            self.kept.append((part, predicted))
+        for begin in self._places:
             if self.rows <= begin < self.rows + len(error):
-                self._keep(part, predicted, begin - self.rows, length)
+                self._keep(part, predicted, begin - self.rows)
         self.rows += len(error)
 
     @property
@@ -92,13 +94,10 @@ class Errors:
             "acceleration": [self._hardest.tolist()],
         }
 
-    def _keep(self, part: Rows, predicted: Array, begin: int, length: int) -> None:
+    def _keep(self, part: Rows, predicted: Array, begin: int) -> None:
         """Copies some rows, so that the piece can go."""
-        if self._total <= MOST_ROWS:
-            self.kept.append((part, predicted))
-            return
-        begin = max(0, min(begin, len(predicted) - length))
-        at = slice(begin, begin + length)
+        begin = max(0, min(begin, len(predicted) - self._length))
+        at = slice(begin, begin + self._length)
         motion = Motion(*(getattr(part.motion, name)[at].copy() for name in ("t", "q", "dq", "ddq")))
         rows = replace(part, motion=motion, tau=part.tau[at].copy(), mask=part.mask[at].copy())
         self.kept.append((rows, predicted[at].copy()))

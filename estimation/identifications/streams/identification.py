@@ -118,7 +118,8 @@ def identify_stream(
     bar.advance(0, "choosing smoothing and model")
     stretches = pieces.stretches(STRETCHES, MOST_ROWS // STRETCHES)
     low_pass = replace(candidates or Candidates(), smoothers=())
-    choice = choose(base, stretches, chosen, low_pass, position=position, spread=found.spread)
+    spread = found.spread if found.rows > MOST_ROWS else None
+    choice = choose(base, stretches, chosen, low_pass, position=position, spread=spread)
     # The stretches are one log: how they differ is no contradiction between logs.
     choice = replace(choice, contradiction=None)
     predictable = require_predictable(moves, found.lowest, found.highest, choice)

@@ -83,9 +83,7 @@ class Pieces:
         margin = round(OVERLAP / (smoother.cutoff * segment.period))
         edge = smoother.edge(segment.end - segment.start)
         count = segment.stop - segment.first
-        ready = self._prepared(
-            k, segment.first + max(first - margin, 0), segment.first + min(stop + margin, count)
-        )
+        ready = self._prepared(k, segment.first + max(first - margin, 0), segment.first + min(stop + margin, count))
         t = ready.log.t
         if len(t) < 20:
             return None

@@ -100,9 +100,16 @@ class Survey:
             self._add_torque(ready.tau)
             begin, end = np.searchsorted(log.t, [part.t[0], part.t[-1]])
             period = ready.positions.period
-            ranges = part.q.min(axis=0), part.q.max(axis=0)
             self._add_segment(
-                Segment(first + int(begin), first + int(end) + 1, *part.t[[0, -1]].tolist(), period, *ranges)
+                Segment(
+                    first=first + int(begin),
+                    stop=first + int(end) + 1,
+                    start=float(part.t[0]),
+                    end=float(part.t[-1]),
+                    period=period,
+                    lower=part.q.min(axis=0),
+                    upper=part.q.max(axis=0),
+                )
             )
 
     def _add_torque(self, tau: Array) -> None:
@@ -178,9 +185,7 @@ def merged_report(found: Survey, stream: LogStream) -> GateReport:
             severity = "warning"
         where = f" (in {len(blocks)} of {total} blocks, first in {part.path.name} from row {inside + 1})"
         row = None if finding.row is None else stream.place(found.blocks[blocks[0]] + finding.row - 1)[1] + 1
-        findings.append(
-            replace(finding, severity=severity, row=row, text=finding.text + (where if total > 1 else ""))
-        )
+        findings.append(replace(finding, severity=severity, row=row, text=finding.text + (where if total > 1 else "")))
     first = found.reports[0]
     return replace(
         first,
