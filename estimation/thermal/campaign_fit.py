@@ -51,7 +51,8 @@ def fit_campaign(
     """Fits rigid body, friction at T0 and each joint's heat to all logs of a campaign.
 
     The logs are condensed to normal equations of short times, in which a temperature is constant. Linear parameters and
-    thermal models are fitted in turn until both converge. Standard errors come from the joint information.
+    thermal models (thesis chapter 4) are fitted in turn until both converge. Standard errors come from the joint
+    information.
 
     Args:
         robot: the robot.
