@@ -58,7 +58,7 @@ def fleet(
     goes on from there, and a later run takes in new logs only.
     """
     console = Console(json=json, quiet=quiet)
-    with console.working() as progress:
+    with console.working(f"finished robots are kept in {out / 'robots'}, and the same command goes on") as progress:
         from estimation.monitoring import MonitorSettings
         from estimation.monitoring.fleets import monitor_fleet
         from oed.reports.pages.monitoring.fleet_report import save_fleet_report
