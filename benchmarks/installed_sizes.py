@@ -74,7 +74,9 @@ def main() -> None:
     for size, name, alone in sorted(rows, reverse=True):
         place = found(name)
         brought = ", ".join(sorted(alone - {name}, key=own_size, reverse=True)[:6])
-        if not alone:
+        if not alone and name.startswith("["):
+            brought = "not installed"
+        elif not alone:
             brought = "needed by " + ", ".join(sorted(one for one in everything if name in needs(one))[:6])
         print(f"| {name} | {place.version if place else ''} | {megabytes([name])} | {size / 1e6:.1f} | {brought} |")
     shared = everything - set(plain) - {one for _, _, alone in rows for one in alone}
