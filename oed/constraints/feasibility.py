@@ -136,11 +136,14 @@ def nearest_feasible(limits: GeometricLimits, home: ArrayLike, *, seed: int = 0,
     def values(x: Array) -> Array:
         return np.array(function(x)[0])[:, 0] - room
 
+    def distance(x: Array) -> tuple[float, Array]:
+        return float((x - q) @ (x - q)), 2.0 * (x - q)
+
     rows: Any = {"type": "ineq", "fun": values, "jac": lambda x: np.array(function(x)[1])}
     for attempt in range(STARTS):
         start = np.clip(q + random.normal(scale=0.2 * attempt, size=robot.n), lower, upper)
         result = minimize(
-            lambda x: (float((x - q) @ (x - q)), 2.0 * (x - q)),
+            distance,
             start,
             jac=True,
             bounds=list(zip(lower, upper, strict=True)),
