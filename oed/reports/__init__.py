@@ -17,20 +17,26 @@ from oed.reports.pages.retime_report import retime_page, save_retime_report
 from oed.reports.pictures.parameter_pictures import error_bars_picture, friction_picture, parameter_picture
 from oed.reports.pictures.torque_pictures import residual_picture, torque_picture
 from oed.reports.pictures.trajectory_pictures import margins_picture, spectrum_picture, trajectory_picture
+from oed.reports.rendering.html import render
 from oed.reports.rendering.matplotlib_ import save_png, to_matplotlib
-from oed.reports.rendering.page import Fact, Footer, Page, Section, Table, render
+from oed.reports.rendering.page import Fact, Finding, Page, Section, Table
 from oed.reports.rendering.picture import Band, Line, Panel, Picture, Series, Span
 from oed.reports.rendering.plotly_ import to_plotly
+from oed.reports.rendering.provenance import Footer, InputFile, Recording
+from oed.reports.rendering.severity import severity
 from oed.reports.rendering.significant import percent, significant, significant_error, with_error
 
 __all__ = [
     "Band",
     "Fact",
+    "Finding",
     "Footer",
+    "InputFile",
     "Line",
     "Page",
     "Panel",
     "Picture",
+    "Recording",
     "Section",
     "Series",
     "Span",
@@ -66,6 +72,7 @@ __all__ = [
     "save_payload_report",
     "save_png",
     "save_retime_report",
+    "severity",
     "significant",
     "significant_error",
     "spectrum_picture",
