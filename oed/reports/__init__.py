@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from oed.reports.animations.animation import Animation
+from oed.reports.animations.building import animate
 from oed.reports.pages.campaign_report import campaign_page, save_campaign_report
 from oed.reports.pages.comparisons.comparison_report import comparison_page, save_comparison_report
 from oed.reports.pages.design_report import design_page, save_design_report
@@ -10,6 +12,7 @@ from oed.reports.pages.diagnosis_report import diagnosis_page, save_diagnosis_re
 from oed.reports.pages.estimate_report import estimate_page, save_estimate_report
 from oed.reports.pages.forces.force_report import force_page, save_force_report
 from oed.reports.pages.loops.loop_report import loop_page, save_loop_report
+from oed.reports.pages.motion_report import motion_page
 from oed.reports.pages.pareto_report import pareto_page, save_pareto_report
 from oed.reports.pages.payload_report import payload_page, save_payload_report
 from oed.reports.pages.prediction_report import prediction_page
@@ -27,6 +30,7 @@ from oed.reports.rendering.severity import severity
 from oed.reports.rendering.significant import percent, significant, significant_error, with_error
 
 __all__ = [
+    "Animation",
     "Band",
     "Fact",
     "Finding",
@@ -41,6 +45,7 @@ __all__ = [
     "Series",
     "Span",
     "Table",
+    "animate",
     "campaign_page",
     "comparison_page",
     "design_page",
@@ -52,6 +57,7 @@ __all__ = [
     "limits_page",
     "loop_page",
     "margins_picture",
+    "motion_page",
     "parameter_picture",
     "pareto_page",
     "payload_page",

@@ -17,10 +17,10 @@ from oed.reports.animations.surfaces import (
     cylinder_surface,
     decimated,
 )
-from robots.collision import Box, Plane, collision_model, reach
+from robots.collision import Box, Capsule, Plane, collision_model, reach, segment_capsules
 from robots.collision.boxes import stated_scene
 from robots.collision.drawn.fitting import load_mesh
-from robots.collision.loading import stated_collision
+from robots.collision.loading import RADIUS_FRACTION, stated_collision
 from robots.common.errors import AssumedValueWarning, InputError
 from robots.geometry.urdf_shapes import UrdfShape, drawn_shapes
 from robots.robot import Robot
@@ -58,38 +58,48 @@ def bodies_of(robot: Robot) -> tuple[Body, ...]:
     Args:
         robot: the robot.
 
-    Raises:
-        InputError: a file of the robot that is wrong.
-
     Warns:
-        AssumedValueWarning: for each mesh that is not found or cannot be read; capsules are drawn instead.
+        AssumedValueWarning: for each mesh that is not found or cannot be read, and for a robot's file that has moved;
+            capsules are drawn instead.
     """
     drawn = _drawn(robot)
     without = set(range(robot.n + 1)) - {body.link for body in drawn}
-    if without - {0} or not drawn:
-        with warnings.catch_warnings():
-            # Whether a shape is assumed matters for distances, which a picture does not state.
-            warnings.simplefilter("ignore", AssumedValueWarning)
-            model = collision_model(robot)
-        capsules = tuple(
+    capsules = _capsules(robot) if without - {0} or not drawn else ()
+    return (
+        *drawn,
+        *(
             Body(
                 name=capsule.name,
                 link=capsule.link,
                 kind="capsule",
                 surface=capsule_surface(capsule.start, capsule.end, capsule.radius),
             )
-            for capsule in model.capsules
+            for capsule in capsules
             if capsule.link in without
-        )
-    else:
-        capsules = ()
-    return (*drawn, *capsules, *_obstacles(robot))
+        ),
+        *_obstacles(robot),
+    )
+
+
+def _capsules(robot: Robot) -> tuple[Capsule, ...]:
+    """Capsules of the collision model; along the links where the robot's file gives none that fit."""
+    with warnings.catch_warnings():
+        # Whether a shape is assumed matters for distances, which a picture does not state.
+        warnings.simplefilter("ignore", AssumedValueWarning)
+        try:
+            return collision_model(robot).capsules
+        except InputError:
+            return segment_capsules(robot.chain, RADIUS_FRACTION)
 
 
 def _drawn(robot: Robot) -> tuple[Body, ...]:
     if not robot.urdf or not robot.links:
         return ()
-    visual, collision = drawn_shapes(robot.urdf, "visual"), drawn_shapes(robot.urdf, "collision")
+    try:
+        visual, collision = drawn_shapes(robot.urdf, "visual"), drawn_shapes(robot.urdf, "collision")
+    except InputError as error:
+        warnings.warn(f"{robot.name}: {error}; capsules are drawn instead", AssumedValueWarning, stacklevel=4)
+        return ()
     found: list[Body] = []
     places = [place for place in robot.links if place.name in visual or place.name in collision]
     most = TRIANGLES // max(len(places), 1)
@@ -125,7 +135,11 @@ def _surface(shape: UrdfShape, source: str | Path, most: int) -> Surface:
 
 
 def _obstacles(robot: Robot) -> tuple[Body, ...]:
-    stated, _ = stated_collision(robot)
+    try:
+        stated, _ = stated_collision(robot)
+    except InputError as error:
+        warnings.warn(f"{robot.name}: {error}; obstacles are not drawn", AssumedValueWarning, stacklevel=4)
+        return ()
     bodies = []
     for obstacle in stated_scene(stated).obstacles:
         if isinstance(obstacle, Plane):

@@ -2,17 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 
 from estimation.diagnosis.calibration import CLOSE_RIVAL_BIC
+from estimation.diagnosis.findings import Finding as DiagnosisFinding
 from estimation.diagnosis.results.diagnosis import Diagnosis
+from oed.reports.animations.animation import Animation
+from oed.reports.animations.building import animate
 from oed.reports.pages.diagnosis_actions import findings_in, verdict_of
 from oed.reports.pages.diagnosis_limits import limits_section
 from oed.reports.pages.diagnosis_simulation import simulation_section
 from oed.reports.pages.diagnosis_view import DiagnosisView, view_of
+from oed.reports.pages.motion_report import animation_section
 from oed.reports.pictures.diagnosis_pictures import cause_picture, gain_picture
 from oed.reports.pictures.torque_pictures import torque_picture
 from oed.reports.rendering.joint_units import joint_titles, joint_units
@@ -22,6 +26,7 @@ from oed.reports.rendering.provenance import footer
 from oed.reports.rendering.saving import save_page
 from oed.reports.rendering.significant import NORMAL_95, significant
 from robots.common.files import ResultFolder
+from robots.signals import Log
 
 Array = NDArray[np.float64]
 
@@ -29,14 +34,47 @@ SMALL = 1e-12
 """Smallest probability that is written: the tail of the noise distribution is unknown beyond it."""
 
 
-def save_diagnosis_report(diagnosis: Diagnosis, folder: ResultFolder, *, png: bool = False) -> None:
-    """Writes the page of a diagnosis, and its pictures as PNG on request."""
-    save_page(diagnosis_page(view_of(diagnosis)), folder, png=png)
+def save_diagnosis_report(
+    diagnosis: Diagnosis, folder: ResultFolder, *, log: Log | None = None, png: bool = False
+) -> None:
+    """Writes the page of a diagnosis, and its pictures as PNG on request.
+
+    Args:
+        diagnosis: what was found.
+        folder: where the page goes.
+        log: one of the logs, which the robot plays in 3-D.
+        png: whether to write the pictures.
+    """
+    animation = None
+    if log is not None:
+        marks = joint_marks(diagnosis.findings)
+        animation = animate(diagnosis.model.robot, log, marks=marks, source=f"log {log.name}".strip())
+    save_page(diagnosis_page(view_of(diagnosis), animation), folder, png=png)
 
 
-def diagnosis_page(view: DiagnosisView) -> Page:
-    """Builds the page: findings with their evidence, gain of the extended model, detection limits, next step."""
+def joint_marks(findings: Iterable[DiagnosisFinding]) -> dict[int, str]:
+    """Names the effects of each joint, counted from 1, that has any.
+
+    Args:
+        findings: of a diagnosis.
+    """
+    marks: dict[int, list[str]] = {}
+    for finding in findings:
+        if finding.joint is not None:
+            marks.setdefault(finding.joint, []).append(finding.effect.replace("_", " "))
+    return {joint: ", ".join(names) for joint, names in marks.items()}
+
+
+def diagnosis_page(view: DiagnosisView, animation: Animation | None = None) -> Page:
+    """Builds the page: findings with their evidence, gain of the extended model, detection limits, next step.
+
+    Args:
+        view: the diagnosis.
+        animation: the robot in 3-D with the joints marked that have a finding.
+    """
     sections = [_torque(view)]
+    if animation is not None:
+        sections.append(animation_section(animation))
     sections += [_finding(view, index) for index in range(len(view.findings))]
     if view.simulation is not None:
         sections.append(simulation_section(view.simulation, view.joint_names, view.kinds))

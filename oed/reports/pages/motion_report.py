@@ -29,7 +29,7 @@ def motion_page(
             code="limit.exceeded",
             subject=f"Joint {margin.joint}:",
             text=f"the {animation.source} exceeds the limit of {approach_text(margin)}.",
-            action="Do not play it." if animation.source != "log" else "Check the limits in the robot's description.",
+            action="Do not play it." if not animation.source.startswith("log") else "Check the limits in the robot's description.",
         )
         for margin in beyond
     ]
