@@ -21,7 +21,15 @@ LARGEST = 64_000_000
 HEAD = 4096
 """Where a report states its verdict, and a robot file its name [bytes]."""
 
-PRIMARY = ("design.json", "diagnosis.json", "monitor.json", "compare.json", "fleet.json", "campaign.json", "pareto.json")
+PRIMARY = (
+    "design.json",
+    "diagnosis.json",
+    "monitor.json",
+    "compare.json",
+    "fleet.json",
+    "campaign.json",
+    "pareto.json",
+)
 """Files that a report of their folder is about, whichever others lie beside them."""
 
 REPORT = "report.html"
@@ -81,7 +89,9 @@ def find_results(folder: str | Path) -> tuple[Entry, ...]:
     entries = [entry for place in _folders(root) for entry in _entries(root, *place)]
     entries.sort(key=lambda entry: entry.path)
     entries.sort(key=lambda entry: entry.date, reverse=True)
-    return tuple(sorted(entries, key=lambda entry: -1 if entry.level is None else ORDER.index(entry.level), reverse=True))
+    return tuple(
+        sorted(entries, key=lambda entry: -1 if entry.level is None else ORDER.index(entry.level), reverse=True)
+    )
 
 
 def _folders(root: Path) -> Iterator[tuple[Path, list[str]]]:
@@ -118,7 +128,9 @@ def _entry(root: Path, path: Path) -> Entry | None:
         common["date"] = f"{datetime.fromtimestamp(facts.st_mtime, UTC):%Y-%m-%d %H:%M}"
         if suffix in (".yaml", ".yml", ".urdf"):
             name = _robot_name(path)
-            return None if name is None else Entry(**common, kind="robot", robot=name, verdict="Description of a robot.")
+            return (
+                None if name is None else Entry(**common, kind="robot", robot=name, verdict="Description of a robot.")
+            )
         if facts.st_size > LARGEST:
             return Entry(**common, kind="unreadable", verdict=f"Not read: {facts.st_size / 1e6:.0f} MB is too large.")
         data = _parsed(path.read_bytes())

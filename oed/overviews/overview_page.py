@@ -27,7 +27,7 @@ def overview_html(entries: Sequence[Entry], *, folder: str, links: str = "") -> 
     """
     kinds = Counter(entry.kind for entry in entries)
     act = sum(entry.level == "act" for entry in entries)
-    counted = ", ".join(f"{count} {kind}" for kind, count in sorted(kinds.items()))
+    counted = ", ".join(f"{kind} {count}" for kind, count in sorted(kinds.items()))
     verdict = f"{len(entries)} results, {act} of them ask for action." if entries else "This folder has no results."
     page = Page(title=f"Results in {folder}", verdict=verdict, footer=footer())
     return render(

@@ -49,7 +49,9 @@ class OverviewServer(ThreadingHTTPServer):
             super().__init__(("127.0.0.1", port), _Handler)
         except (OSError, OverflowError) as error:
             raise InputError(
-                f"port {port} cannot be used ({error})", allowed="a free port up to 65535", remedy="choose another --port"
+                f"port {port} cannot be used ({error})",
+                allowed="a free port up to 65535",
+                remedy="choose another --port",
             ) from error
 
     @property

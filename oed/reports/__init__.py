@@ -12,7 +12,7 @@ from oed.reports.pages.diagnosis_report import diagnosis_page, save_diagnosis_re
 from oed.reports.pages.estimate_report import estimate_page, save_estimate_report
 from oed.reports.pages.forces.force_report import force_page, save_force_report
 from oed.reports.pages.loops.loop_report import loop_page, save_loop_report
-from oed.reports.pages.motion_report import motion_page
+from oed.reports.pages.motions.motion_report import motion_page
 from oed.reports.pages.pareto_report import pareto_page, save_pareto_report
 from oed.reports.pages.payload_report import payload_page, save_payload_report
 from oed.reports.pages.prediction_report import prediction_page

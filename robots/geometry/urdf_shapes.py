@@ -79,7 +79,9 @@ def _shape(element: ElementTree.Element, link: str, read: UrdfReader) -> UrdfSha
     geometry = element.find("geometry")
     drawn = [] if geometry is None else [child for child in geometry if child.tag in (*_SIZES, "mesh")]
     if len(drawn) != 1:
-        raise read.error(f"<{element.tag}> has no shape", allowed="one box, cylinder, sphere, capsule or mesh in <geometry>")
+        raise read.error(
+            f"<{element.tag}> has no shape", allowed="one box, cylinder, sphere, capsule or mesh in <geometry>"
+        )
     (shape,) = drawn
     if shape.tag == "mesh":
         file = shape.get("filename", "")

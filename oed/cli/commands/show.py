@@ -114,7 +114,7 @@ def _is_trajectory(path: Path) -> bool:
 def _findings(path: Path, robot: Robot) -> tuple[dict[int, str], Any]:
     """Reads the joints that a diagnosis marks, and its findings."""
     from estimation.diagnosis.results.diagnosis import Diagnosis
-    from oed.reports.pages.diagnosis_report import joint_marks
+    from oed.reports.pages.motions.diagnosis_motion import joint_marks
     from oed.reports.rendering.page import Finding
     from robots.common.errors import InputError
     from robots.terms.effects import EFFECTS

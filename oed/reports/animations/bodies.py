@@ -105,7 +105,9 @@ def _drawn(robot: Robot) -> tuple[Body, ...]:
     most = TRIANGLES // max(len(places), 1)
     for place in places:
         for shapes in (visual.get(place.name, ()), collision.get(place.name, ())):
-            bodies = [body for shape in shapes if (body := _body(robot, shape, place.body, place.pose, most)) is not None]
+            bodies = [
+                body for shape in shapes if (body := _body(robot, shape, place.body, place.pose, most)) is not None
+            ]
             if bodies:
                 found += bodies
                 break

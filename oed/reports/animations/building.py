@@ -131,7 +131,5 @@ def _shares(robot: Robot, motion: Motion, torque: Array | None, rows: NDArray[np
     # The largest since the last frame, so that no peak falls between two frames.
     starts = np.concatenate([[0], rows[:-1] + 1])
     return {
-        name: np.maximum.reduceat(values, starts, axis=0)
-        for name, values in found.items()
-        if np.isfinite(values).any()
+        name: np.maximum.reduceat(values, starts, axis=0) for name, values in found.items() if np.isfinite(values).any()
     }

@@ -9,7 +9,7 @@ from oed.experiments import Design
 from oed.experiments.quality import Quality
 from oed.experiments.safety_checks.margins import missing_limits, nominal_torque
 from oed.reports.animations.building import animate
-from oed.reports.pages.motion_report import animation_section
+from oed.reports.pages.motions.motion_report import animation_section
 from oed.reports.pictures.trajectory_pictures import margins_picture, spectrum_picture, trajectory_picture
 from oed.reports.rendering.page import Cell, Fact, Finding, Page, Section, Table, findings_of
 from oed.reports.rendering.provenance import footer

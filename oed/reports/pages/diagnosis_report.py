@@ -2,21 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 
 from estimation.diagnosis.calibration import CLOSE_RIVAL_BIC
-from estimation.diagnosis.findings import Finding as DiagnosisFinding
 from estimation.diagnosis.results.diagnosis import Diagnosis
 from oed.reports.animations.animation import Animation
-from oed.reports.animations.building import animate
 from oed.reports.pages.diagnosis_actions import findings_in, verdict_of
 from oed.reports.pages.diagnosis_limits import limits_section
 from oed.reports.pages.diagnosis_simulation import simulation_section
 from oed.reports.pages.diagnosis_view import DiagnosisView, view_of
-from oed.reports.pages.motion_report import animation_section
+from oed.reports.pages.motions.diagnosis_motion import diagnosis_animation
+from oed.reports.pages.motions.motion_report import animation_section
 from oed.reports.pictures.diagnosis_pictures import cause_picture, gain_picture
 from oed.reports.pictures.torque_pictures import torque_picture
 from oed.reports.rendering.joint_units import joint_titles, joint_units
@@ -45,24 +44,8 @@ def save_diagnosis_report(
         log: one of the logs, which the robot plays in 3-D.
         png: whether to write the pictures.
     """
-    animation = None
-    if log is not None:
-        marks = joint_marks(diagnosis.findings)
-        animation = animate(diagnosis.model.robot, log, marks=marks, source=f"log {log.name}".strip())
+    animation = None if log is None else diagnosis_animation(diagnosis, log)
     save_page(diagnosis_page(view_of(diagnosis), animation), folder, png=png)
-
-
-def joint_marks(findings: Iterable[DiagnosisFinding]) -> dict[int, str]:
-    """Names the effects of each joint, counted from 1, that has any.
-
-    Args:
-        findings: of a diagnosis.
-    """
-    marks: dict[int, list[str]] = {}
-    for finding in findings:
-        if finding.joint is not None:
-            marks.setdefault(finding.joint, []).append(finding.effect.replace("_", " "))
-    return {joint: ", ".join(names) for joint, names in marks.items()}
 
 
 def diagnosis_page(view: DiagnosisView, animation: Animation | None = None) -> Page:

@@ -9,7 +9,7 @@ from oed.experiments import RetimedExperiment
 from oed.experiments.safety_checks.margins import nominal_torque
 from oed.reports.animations.building import animate
 from oed.reports.pages.design_report import excitation_findings, margins_section, parameters_section, quality_section
-from oed.reports.pages.motion_report import animation_section
+from oed.reports.pages.motions.motion_report import animation_section
 from oed.reports.pictures.trajectory_pictures import trajectory_picture
 from oed.reports.rendering.page import Cell, Fact, Finding, Page, Section, Table, findings_of
 from oed.reports.rendering.provenance import footer

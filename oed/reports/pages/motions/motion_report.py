@@ -12,9 +12,7 @@ from robots.limits import Margin
 TITLE = "Robot in 3-D"
 
 
-def motion_page(
-    animation: Animation, *, logs: Sequence[Recording] = (), findings: Sequence[Finding] = ()
-) -> Page:
+def motion_page(animation: Animation, *, logs: Sequence[Recording] = (), findings: Sequence[Finding] = ()) -> Page:
     """Builds the page: whether the motion keeps the limits, and the robot that plays it.
 
     Args:
@@ -29,7 +27,9 @@ def motion_page(
             code="limit.exceeded",
             subject=f"Joint {margin.joint}:",
             text=f"the {animation.source} exceeds the limit of {approach_text(margin)}.",
-            action="Do not play it." if not animation.source.startswith("log") else "Check the limits in the robot's description.",
+            action="Do not play it."
+            if not animation.source.startswith("log")
+            else "Check the limits in the robot's description.",
         )
         for margin in beyond
     ]
@@ -85,4 +85,6 @@ def _verdict(animation: Animation, beyond: Sequence[Margin], tightest: Margin | 
     if tightest is None:
         return f"The robot's description states no limits; the {animation.source} was not checked."
     kept = f"The {animation.source} of {animation.duration:.1f} s keeps the robot's limits"
-    return f"{kept}; the diagnosis has {effects} {'finding' if effects == 1 else 'findings'}." if effects else f"{kept}."
+    return (
+        f"{kept}; the diagnosis has {effects} {'finding' if effects == 1 else 'findings'}." if effects else f"{kept}."
+    )
