@@ -35,7 +35,8 @@ PRIMARY = (
 REPORT = "report.html"
 
 # A long array of numbers holds no key figure, but takes nearly all the time of reading a file.
-_NUMBERS = re.compile(rb"\[[\s\d.,eE+\-\[\]]{4000,}\]")
+# It starts where a run of such characters starts: a search from each of them would take the square of the time.
+_NUMBERS = re.compile(rb"(?<![\s\d.,eE+\-\[\]])[\s\d.,eE+\-\[\]]{4000,}")
 _META = re.compile(r'<meta name="oed:(urgency|verdict)" content="([^"]*)">')
 _ROBOT_YAML = re.compile(r"^(?:geometry|urdf):", re.MULTILINE)
 _NAME_YAML = re.compile(r"^name:\s*[\"']?([^\"'#\n]+?)[\"']?\s*(?:#.*)?$", re.MULTILINE)
@@ -111,7 +112,7 @@ def _entries(root: Path, place: Path, names: list[str]) -> list[Entry]:
     level, verdict = stated.get("urgency"), stated.get("verdict")
     reported = replace(first, report=report)
     if verdict and level in ORDER and first.kind != "other version":
-        reported = replace(reported, level=level, verdict=verdict)
+        reported = replace(reported, level=next(known for known in ORDER if known == level), verdict=verdict)
     return [reported if entry is first else entry for entry in found]
 
 
@@ -120,25 +121,24 @@ def _entry(root: Path, path: Path) -> Entry | None:
     suffix = path.suffix.lower()
     if suffix not in (".json", ".state", ".yaml", ".yml", ".urdf"):
         return None
-    common = {"path": path.relative_to(root).as_posix()}
+    entry = Entry(path=path.relative_to(root).as_posix(), kind="unreadable")
     try:
         if path.is_symlink() and not path.resolve().is_relative_to(root.resolve()):
             return None
         facts = path.stat()
-        common["date"] = f"{datetime.fromtimestamp(facts.st_mtime, UTC):%Y-%m-%d %H:%M}"
+        entry = replace(entry, date=f"{datetime.fromtimestamp(facts.st_mtime, UTC):%Y-%m-%d %H:%M}")
         if suffix in (".yaml", ".yml", ".urdf"):
             name = _robot_name(path)
-            return (
-                None if name is None else Entry(**common, kind="robot", robot=name, verdict="Description of a robot.")
-            )
+            found = replace(entry, kind="robot", robot=name or "", verdict="Description of a robot.")
+            return None if name is None else found
         if facts.st_size > LARGEST:
-            return Entry(**common, kind="unreadable", verdict=f"Not read: {facts.st_size / 1e6:.0f} MB is too large.")
+            return replace(entry, verdict=f"Not read: {facts.st_size / 1e6:.0f} MB is too large.")
         data = _parsed(path.read_bytes())
     except (OSError, ValueError, RecursionError) as error:
         reason = error.strerror if isinstance(error, OSError) else "it is no whole JSON file"
         if suffix == ".state":
             return None
-        return Entry(**common, kind="unreadable", level="note", verdict=f"The file cannot be read: {reason}.")
+        return replace(entry, level="note", verdict=f"The file cannot be read: {reason}.")
     if not isinstance(data, Mapping):
         return None
     try:
@@ -148,16 +148,16 @@ def _entry(root: Path, path: Path) -> Entry | None:
             return None
         what = f"the field {error} is missing" if isinstance(error, KeyError) else "a field has another form"
         text = f"Written by another version of oed: {what}. Make it again, or open its file."
-        return Entry(**common, kind="other version", level="note", verdict=text)
-    return None if reading is None else _made(common, reading)
+        return replace(entry, kind="other version", level="note", verdict=text)
+    return None if reading is None else _filled(entry, reading)
 
 
-def _made(common: Mapping[str, str], reading: Reading) -> Entry:
-    return Entry(
-        **common,
+def _filled(entry: Entry, reading: Reading) -> Entry:
+    return replace(
+        entry,
         kind=reading.kind,
         robot=reading.robot,
-        level=severity(code for code in reading.codes) if reading.codes else None,
+        level=severity(reading.codes) if reading.codes else None,
         verdict=reading.verdict,
         figures=reading.figures,
     )
@@ -165,9 +165,19 @@ def _made(common: Mapping[str, str], reading: Reading) -> Entry:
 
 def _parsed(content: bytes) -> object:
     try:
-        return json.loads(_NUMBERS.sub(b"[]", content))
+        return json.loads(_NUMBERS.sub(_emptied, content))
     except ValueError:
         return json.loads(content)
+
+
+def _emptied(run: re.Match[bytes]) -> bytes:
+    """Takes the numbers out of a run of arrays, if it opens and closes as many."""
+    text = run[0]
+    if text.count(b"[") != text.count(b"]"):
+        return text
+    before, _, _ = text.partition(b"[")
+    _, _, after = text.rpartition(b"]")
+    return before + b"[]" + after
 
 
 def _stated(report: Path) -> dict[str, str]:

@@ -55,7 +55,9 @@ def read_kind(name: str, data: Data) -> Reading | None:
         return None
     if form in BY_FORMAT:
         return BY_FORMAT[form](data)
-    return Reading(kind=form.removeprefix("robot-oed "), verdict="No summary of this kind of file.", robot=_robot(data))
+    return Reading(
+        kind=form.removeprefix("robot-oed "), verdict="No summary of this kind of file.", codes=(), robot=_robot(data)
+    )
 
 
 def _design(data: Data) -> Reading:
@@ -85,7 +87,7 @@ def _design(data: Data) -> Reading:
         "tightest limit [% left]": None if tightest is None else 100.0 * tightest,
     }
     kind = "retimed path" if retimed else "design"
-    return Reading(kind=kind, verdict=verdict, codes=tuple(codes), figures=figures, robot=_robot(data))
+    return Reading(kind=kind, verdict=verdict, codes=tuple(codes) or ("done",), figures=figures, robot=_robot(data))
 
 
 def _discrimination(data: Data) -> Reading:
@@ -171,7 +173,7 @@ def _monitoring(data: Data) -> Reading:
 
 
 def _state(data: Data) -> Reading:
-    return Reading(kind="state of a monitor", verdict="The monitor continues from here.", robot=_robot(data))
+    return Reading(kind="state of a monitor", verdict="The monitor continues from here.", codes=(), robot=_robot(data))
 
 
 def _fleet(data: Data) -> Reading:

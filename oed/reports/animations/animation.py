@@ -66,7 +66,7 @@ class Animation:
 
     def summary(self) -> str:
         """Says in words what is drawn."""
-        kinds = Counter(body.kind for body in self.bodies)
+        kinds = Counter[str](body.kind for body in self.bodies)
         words = {"mesh": "meshes", "shape": "shapes of the URDF", "capsule": "capsules"}
         parts = [f"{kinds[kind]} {word}" for kind, word in words.items() if kinds[kind]]
         length = float(np.linalg.norm(np.diff(self.path, axis=0), axis=1).sum())

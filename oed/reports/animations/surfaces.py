@@ -44,8 +44,8 @@ def capsule_surface(start: Array, end: Array, radius: float) -> Surface:
     """
     heights = np.sin(np.linspace(-0.5 * np.pi, 0.5 * np.pi, 2 * CAP + 1))
     length = float(np.linalg.norm(end - start))
-    # The equator twice: once at each end of the spine.
-    rings = np.concatenate([heights[: CAP + 1], heights[CAP:]])
+    # The equator twice, once at each end of the spine; of a sphere once.
+    rings = np.concatenate([heights[: CAP + 1], heights[CAP + (length == 0.0) :]])
     along = radius * rings + np.where(np.arange(len(rings)) <= CAP, 0.0, length)
     turned = _turned(along, radius * np.sqrt(np.maximum(1.0 - rings**2, 0.0)))
     axis = (end - start) / length if length > 0.0 else np.array([0.0, 0.0, 1.0])
@@ -104,22 +104,23 @@ def decimated(surface: Surface, most: int) -> Surface:
     reduced = surface
     while len(reduced.triangles) > most and cells > 1:
         reduced = _clustered(surface, cells)
-        cells = int(cells * 0.8)
+        # The number of triangles grows with the square of the cells along an edge.
+        cells = int(cells * min(0.95 * np.sqrt(most / max(len(reduced.triangles), 1)), 0.95))
     return reduced
 
 
 def _clustered(surface: Surface, cells: int) -> Surface:
     low = surface.vertices.min(axis=0)
     size = float(np.ptp(surface.vertices, axis=0).max()) / cells or 1.0
-    cell = np.floor((surface.vertices - low) / size).astype(np.int64)
-    _, place, count = np.unique(cell, axis=0, return_inverse=True, return_counts=True)
+    cell = np.floor((surface.vertices - low) / size).astype(np.int64) @ [(cells + 2) ** 2, cells + 2, 1]
+    _, place, count = np.unique(cell, return_inverse=True, return_counts=True)
     place = place.reshape(-1)
     sums = np.zeros((len(count), 3))
     np.add.at(sums, place, surface.vertices)
     triangles = place[surface.triangles]
     a, b, c = triangles.T
     triangles = triangles[(a != b) & (b != c) & (a != c)]
-    first = np.unique(np.sort(triangles, axis=1), axis=0, return_index=True)[1]
+    first = np.unique(np.sort(triangles, axis=1) @ [len(count) ** 2, len(count), 1], return_index=True)[1]
     triangles = triangles[np.sort(first)]
     used, renumbered = np.unique(triangles, return_inverse=True)
     return Surface((sums / count[:, None])[used], renumbered.reshape(-1, 3).astype(np.int64), closed=False)
