@@ -166,6 +166,15 @@ def test_folders_that_are_none(tmp_path: Path) -> None:
         find_results(write(tmp_path, "a.txt", "x"))
 
 
+def test_long_arrays_do_not_matter(tmp_path: Path) -> None:
+    """A model with a covariance of a megabyte reads as without, also where a text looks like an array."""
+    large = {"a": "[1, 2" + " " * 200_000, "b": "[3]]", "covariance": [[0.25] * 300] * 300}
+    write(tmp_path, "large/model.json", large | MODEL | {"covariance": large["covariance"]})
+    write(tmp_path, "small/model.json", MODEL | {"covariance": []})
+    large_entry, small_entry = (by_path(tmp_path)[f"{size}/model.json"] for size in ("large", "small"))
+    assert (large_entry.verdict, large_entry.figures) == (small_entry.verdict, small_entry.figures)
+
+
 @pytest.mark.slow
 def test_many_results_are_read_at_once(tmp_path: Path) -> None:
     """A thousand results are read in about a second; the bound leaves room for a busy machine."""
