@@ -64,7 +64,7 @@ def test_bad_input(run, robot, log, tmp_path: Path) -> None:
         ([log], "give --robot"),
         ([log, "--robot", "er3a"], "q3"),
         ([log, "--robot", robot, "--diagnosis", tmp_path / "nowhere"], "no such file"),
-        ([log, "--robot", robot, "--diagnosis", diagnosis], "diagnosis.json"),
+        ([log, "--robot", robot, "--diagnosis", diagnosis], "model.json"),
         ([tmp_path, "--robot", robot], "folder"),
     ):
         done = run("show", *words, "--out", out)
