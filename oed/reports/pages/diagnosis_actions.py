@@ -14,6 +14,7 @@ MODEL = "Use the extended model (model.json) instead of the robot's description.
 
 ACTIONS = {
     "backlash": "Inspect the gear of {place} for play.",
+    "base_compliance": "Check the bolts of the base, its pedestal and the floor.",
     "base_tilt": "Level the base, or state its orientation (--gravity).",
     "current_clipping": "Check the drive's current limit at {place}; record with less acceleration.",
     "encoder_eccentricity": "Inspect the encoder mounting of {place}.",

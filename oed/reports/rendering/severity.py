@@ -18,6 +18,7 @@ WORDS: dict[Level, str] = {"good": "No action needed", "note": "Note", "act": "A
 
 FAULTS = (
     "backlash",
+    "base_compliance",
     "base_tilt",
     "current_clipping",
     "encoder_eccentricity",
