@@ -224,12 +224,7 @@ class Model:
 
 
 def load_model(path: str | Path) -> Model:
-    """Reads a `model.json`, or the one in a folder.
-
-    The file holds what the model refers to of the robot, so that a prediction needs nothing else.
-
-    Args:
-        path: the file, or its folder.
+    """Reads the `model.json` at `path`, or in the folder there. It holds all of the robot that a prediction needs.
 
     Raises:
         InputError: a missing file, or one that is no model.

@@ -216,9 +216,8 @@ def predict(
         The torques at the log's own times, without parts that are too short to be smoothed.
 
     Raises:
-        InputError: another number of joints, too few rows, or a motion that the gate refuses; a gravity that shows
-            parameters which the model lacks; a payload or a gravity beside heat; logs before the motion that come after
-            it, or of a model that keeps none.
+        InputError: another number of joints, too few rows, a motion that the gate refuses; a gravity that needs missing
+            parameters; a payload or gravity beside heat; `before` after the motion, or for a model that keeps no heat.
     """
     robot = model.robot
     if log.n != robot.n:
