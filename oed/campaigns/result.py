@@ -152,7 +152,11 @@ class Campaign:
         return pd.DataFrame([slot.to_dict() for slot in self.slots])
 
     def plot(self, ax: Axes | None = None) -> Axes:
-        """Draws the expected temperatures where heat is produced; without a thermal model, the heat so far."""
+        """Draws the expected temperatures where heat is produced; without a thermal model, the heat so far.
+
+        Args:
+            ax: where to draw; a new figure by default.
+        """
         from matplotlib.figure import Figure
 
         axes = ax if ax is not None else Figure(figsize=(9, 4)).subplots()
@@ -212,6 +216,10 @@ class Campaign:
 
     def save(self, folder: str | PathLike[str], *, force: bool = False) -> None:
         """Writes a CSV per stage and `campaign.json` into a folder that is there.
+
+        Args:
+            folder: an existing one.
+            force: replace files that are there.
 
         Raises:
             InputError: a file is there, and force is not given.
