@@ -35,7 +35,7 @@ print(f"{log.duration:.0f} s to diagnose, {held_out.duration:.0f} s of another m
 # %% [markdown]
 # ## Diagnosis
 #
-# Each effect of the catalogue is tested at each joint. To keep this notebook short, six effects of joints are candidates
+# Each effect of the catalogue is tested at each joint. To keep this notebook short, six effects are candidates
 # here; leave `candidates` out to test all of them. The model is extended by effects that are significant and that
 # improve the prediction of the held-out log.
 
@@ -72,9 +72,9 @@ finding = diagnosis.findings[0]
 joint = finding.joint - 1
 trace = diagnosis.trace
 figure, axes = plt.subplots(1, 2, figsize=(10, 4), sharey=True, layout="constrained")
-for ax, torque, title in zip(axes, (trace.before, trace.after), ("usual model", "extended model"), strict=True):
-    residual = trace.measured[:, joint] - torque[:, joint]
-    q = np.interp(trace.t, held_out.t - held_out.t[0] + trace.t[0], held_out.q[:, joint])
+for ax, residuals, title in zip(axes, (trace.before, trace.after), ("usual model", "extended model"), strict=True):
+    counted = np.isfinite(residuals[:, joint])  # rows at reversals of a joint do not count
+    residual, q = residuals[counted, joint], trace.coordinate[0][counted]
     ax.plot(q, residual, ".", markersize=1.5, color="tab:gray")
     edges = np.linspace(q.min(), q.max(), 16)
     number = np.clip(np.digitize(q, edges) - 1, 0, 14)

@@ -14,8 +14,8 @@
 # %% [markdown]
 # # Your own effect
 #
-# The catalogue of effects is open. This notebook adds a hose that pulls at a joint beyond some angle. A virtual robot has
-# such a hose, and the diagnosis finds it.
+# The catalogue of effects is open. This notebook adds a hose that pulls at a joint beyond some angle. A virtual robot
+# has such a hose, and the diagnosis finds it.
 #
 # The class is that of `examples/extending/effect.py`. It is read from there, so that both stay the same.
 

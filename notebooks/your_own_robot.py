@@ -14,7 +14,7 @@
 # %% [markdown]
 # # Your own robot: from nothing to a model
 #
-# This notebook writes a small URDF, designs an experiment for it, plays it on a virtual robot, and identifies the model.
+# This notebook writes a small URDF, designs an experiment, plays it on a virtual robot, and identifies a model.
 # With a real robot, replace the URDF by yours and the virtual log by that of your controller.
 
 # %%
