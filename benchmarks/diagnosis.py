@@ -11,13 +11,10 @@ from __future__ import annotations
 
 import argparse
 import json
-import multiprocessing
 import os
 import platform
 import sys
 import time
-from collections.abc import Iterable
-from concurrent.futures import Executor, ProcessPoolExecutor, as_completed
 from pathlib import Path
 from typing import Any
 
@@ -28,29 +25,20 @@ for _name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
 from benchmarks.diagnosis_parts.figures import figures  # noqa: E402
 from benchmarks.diagnosis_parts.running import run  # noqa: E402
 from benchmarks.diagnosis_parts.strata import STRATA, TUNING, Task, tasks  # noqa: E402
+from benchmarks.parallel_work import add_options, finished  # noqa: E402
 
 
 def arguments() -> argparse.Namespace:
     parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
     parser.add_argument("--count", type=float, default=1.0, help="share of the full number of cases (1540)")
     parser.add_argument("--strata", nargs="+", default=list(STRATA), choices=list(STRATA))
-    parser.add_argument("--workers", type=int, default=1, help="processes")
-    parser.add_argument("--cluster", help="address of a Dask scheduler, whose workers have this folder")
+    add_options(parser)
     parser.add_argument("--out", type=Path, default=Path("diagnosis_benchmark.jsonl"), help="rows; continued if there")
     parser.add_argument("--first-seed", type=int, default=0, help=f"{TUNING} or more to tune")
     parser.add_argument(
         "--figures", action="store_true", help="print the figures of the rows that are there, run nothing"
     )
     return parser.parse_args()
-
-
-def executor(workers: int, cluster: str | None) -> Executor:
-    """Processes of this machine, or a cluster's workers."""
-    if cluster:
-        from distributed import Client
-
-        return Client(cluster).get_executor()  # type: ignore[no-any-return]
-    return ProcessPoolExecutor(workers, mp_context=multiprocessing.get_context("spawn"))
 
 
 def read_rows(path: Path) -> list[dict[str, Any]]:
@@ -64,13 +52,11 @@ def read_rows(path: Path) -> list[dict[str, Any]]:
     return rows
 
 
-def work(todo: Iterable[Task], pool: Executor, path: Path) -> None:
+def work(todo: list[Task], options: argparse.Namespace) -> None:
     """Runs cases and appends their rows."""
-    todo = list(todo)
     start = time.perf_counter()
-    with pool, path.open("a") as file:
-        for done, future in enumerate(as_completed([pool.submit(run, task) for task in todo]), start=1):
-            row = future.result()
+    with options.out.open("a") as file:
+        for done, (_, row) in enumerate(finished(run, todo, options), start=1):
             file.write(json.dumps(row, default=float) + "\n")
             file.flush()
             said = ", ".join(f"{f['effect']} {f['joint'] or ''}" for f in row.get("findings", ()))
@@ -90,7 +76,7 @@ def main() -> int:
         known = {row["key"] for row in rows}
         todo = [t for t in tasks(options.strata, options.count, options.first_seed) if t.key not in known]
         if todo:
-            work(todo, executor(options.workers, options.cluster), options.out)
+            work(todo, options)
         rows = read_rows(options.out)
     print(f"{platform.processor() or platform.machine()}, Python {platform.python_version()}, {len(rows)} cases")
     print(figures(rows))

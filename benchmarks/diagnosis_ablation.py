@@ -15,14 +15,16 @@ import warnings
 from collections.abc import Iterator
 from contextlib import AbstractContextManager
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
 
-from benchmarks.diagnosis import executor, read_rows
+from benchmarks.diagnosis import read_rows
 from benchmarks.diagnosis_parts.running import described, logs_of
 from benchmarks.diagnosis_parts.strata import STRATA, Task, draw
+from benchmarks.parallel_work import add_options, finished
 
 # Seeds of tuning; the benchmark has those below 1000. From here on the logs are of 60 s.
 FIRST = 6016
@@ -160,7 +162,7 @@ def main() -> int:
     runs.add_argument("--constants", action="store_true", help="halve and double constants instead of rules off")
     runs.add_argument("--share", type=float, default=1.0, help="share of the cases")
     runs.add_argument("--first-seed", type=int, default=FIRST)
-    runs.add_argument("--workers", type=int, default=2, help="processes")
+    add_options(runs)
     prints = verbs.add_parser("table", help="print what rows say")
     prints.add_argument("rows", type=Path, nargs="+")
     options = parser.parse_args()
@@ -176,10 +178,10 @@ def main() -> int:
         for stratum, count in COUNTS.items()
         if k < round(options.share * count)
     ]
-    with executor(options.workers, None) as pool, options.out.open("a", encoding="utf-8") as file:
-        todo = [pool.submit(run_case, task, options.constants) for task in tasks if task.key not in known]
-        for done, future in enumerate(todo, start=1):
-            row = future.result()
+    todo = [task for task in tasks if task.key not in known]
+    with options.out.open("a", encoding="utf-8") as file:
+        results = finished(partial(run_case, constants=options.constants), todo, options)
+        for done, (_, row) in enumerate(results, start=1):
             file.write(json.dumps(row, default=float) + "\n")
             file.flush()
             print(f"{done}/{len(todo)} {row['key']}: {row.get('base', 'hidden')}", flush=True)

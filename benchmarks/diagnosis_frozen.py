@@ -16,16 +16,17 @@ import sys
 import tempfile
 import warnings
 from collections.abc import Iterator
-from concurrent.futures import as_completed
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
 
-from benchmarks.diagnosis import executor, read_rows
+from benchmarks.diagnosis import read_rows
 from benchmarks.diagnosis_parts.running import described, logs_of
 from benchmarks.diagnosis_parts.strata import STRATA, Task, draw
 from benchmarks.diagnosis_real import SETS
+from benchmarks.parallel_work import add_options, finished
 
 # Seeds of logs of 60 s (most) and 120 s; no threshold was tuned on them. Singles cover every effect of the catalogue.
 FIRST = 9600
@@ -122,14 +123,18 @@ def compare(old: Path, new: Path, most: int) -> int:
     return 1 if changed or not common else 0
 
 
+def call(task: partial[dict[str, Any]]) -> dict[str, Any]:
+    """Does one task."""
+    return task()
+
+
 def work(options: argparse.Namespace) -> int:
     """Runs what is not in the file yet and appends it."""
     known = {row["key"] for row in read_rows(options.out)}
-    with executor(options.workers, None) as pool, options.out.open("a", encoding="utf-8") as file:
-        todo = [pool.submit(run_set, name, options.data) for name in SETS if options.data and name not in known]
-        todo += [pool.submit(run_case, task) for task in CASES[:: options.every] if task.key not in known]
-        for done, future in enumerate(as_completed(todo), start=1):
-            row = future.result()
+    todo = [partial(run_set, name, options.data) for name in SETS if options.data and name not in known]
+    todo += [partial(run_case, task) for task in CASES[:: options.every] if task.key not in known]
+    with options.out.open("a", encoding="utf-8") as file:
+        for done, (_, row) in enumerate(finished(call, todo, options), start=1):
             file.write(json.dumps(row, default=float, sort_keys=True) + "\n")
             file.flush()
             print(f"{done}/{len(todo)} {row['key']}: {verdict_of(row)}", flush=True)
@@ -142,7 +147,7 @@ def main() -> int:
     runs = verbs.add_parser("run", help="diagnose the set")
     runs.add_argument("--out", type=Path, required=True, help="rows; continued if there")
     runs.add_argument("--data", type=Path, help="folder of the published logs; without, the real logs are left out")
-    runs.add_argument("--workers", type=int, default=2, help="processes")
+    add_options(runs)
     runs.add_argument("--every", type=int, default=1, help="run each N-th case alone: a quick look")
     compares = verbs.add_parser("compare", help="two files of rows")
     compares.add_argument("old", type=Path)

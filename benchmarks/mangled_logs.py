@@ -8,7 +8,7 @@ seven formats, and goes through reader, gate and identification. Result of a cas
 - ``told``: a result that is not right, with a warning of the gate or marked parameters that say so;
 - ``silent``: a wrong result without a word; ``traceback``: any other exception. Neither may happen.
 
-    python benchmarks/mangled_logs.py --cases 10000 --seed 0 --processes 2 --out mangled.jsonl
+    python benchmarks/mangled_logs.py --cases 10000 --seed 0 --workers 2 --out mangled.jsonl
 """
 
 from __future__ import annotations
@@ -211,12 +211,12 @@ def main() -> int:
     parser.add_argument("--cases", type=int, default=1000)
     parser.add_argument("--first", type=int, default=0)
     parser.add_argument("--seed", type=int, default=0)
-    parser.add_argument("--processes", type=int, default=2)
+    parser.add_argument("--workers", type=int, default=2, help="number of parallel processes")
     parser.add_argument("--out", type=Path, default=None, help="one JSON object a case")
     options = parser.parse_args()
     done = []
     with options.out.open("w", encoding="utf-8") if options.out else nullcontext() as out:
-        for case in run(options.cases, options.seed, options.processes, options.first):
+        for case in run(options.cases, options.seed, options.workers, options.first):
             done.append(case)
             if out is not None:
                 print(json.dumps(case.__dict__), file=out, flush=True)

@@ -13,19 +13,18 @@ Row = dict[str, Any]
 STATED = {
     "backlash": ("half_play", 2.0),
     "joint_elasticity": ("compliance", 1.0),
+    "base_compliance": ("compliance_1", 1.0),
     "spring": ("stiffness", 1.0),
 }
 QUANTILE = 1.96
 
 
 def is_right(row: Row) -> bool:
-    """Returns whether the first finding is the hidden effect at its joint; for a base, the generic correction of it."""
+    """Returns whether the first finding is the hidden effect, at its joint."""
     if not row["findings"]:
         return False
     first = row["findings"][0]
-    if row["kind"] == "base_compliance":
-        return bool((first.get("pattern") or "").startswith("pattern:leaning"))
-    return bool(first["effect"] == row["kind"] and first["joint"] == row["place"])
+    return bool(first["effect"] == row["kind"] and first["joint"] in (None, row["place"]))
 
 
 def stated(row: Row) -> tuple[float, float, float] | None:
@@ -33,6 +32,8 @@ def stated(row: Row) -> tuple[float, float, float] | None:
     if not is_right(row) or row["kind"] not in STATED:
         return None
     name, factor = STATED[row["kind"]]
+    if row["kind"] == "base_compliance":  # the softer axis
+        name = "compliance_2" if row["place"] == 3 else "compliance_1"
     for parameter in row["findings"][0]["parameters"]:
         if parameter["name"] == name:
             low, high = parameter["ci95"]

@@ -145,7 +145,9 @@ def _add(plant: Plant, root: Element, bodies: list[Element], rng: np.random.Gene
         joint.set("springref", repr(plant.rest))
     elif plant.kind in ("backlash", "joint_elasticity"):
         # A second coordinate about the same axis: the rotor turns by the first one, the link by their sum.
-        second = ElementTree.Element("joint", name="second", axis=str(joint.get("axis")), pos=joint.get("pos", "0 0 0"))
+        second = ElementTree.Element(
+            "joint", name="second", axis=joint.get("axis", "0 0 1"), pos=joint.get("pos", "0 0 0")
+        )
         body.insert(list(body).index(joint) + 1, second)
         if plant.kind == "backlash":
             half = plant.amount / 2

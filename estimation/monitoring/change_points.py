@@ -16,6 +16,11 @@ Array = NDArray[np.float64]
 # More points than this are averaged in groups before the search.
 MOST_POINTS = 1500
 FEWEST_POINTS = 12
+# Differences for the noise are taken over so many correlation times, and over a sixth of a history at most: those that
+# lie across two or three changes are then the fewer.
+DISTANCE = 0.5
+# Below this noise a change has no meaning for friction.
+LEAST_NOISE = 1e-6
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -58,14 +63,13 @@ def find_change_points(history: dict[str, Array]) -> ChangePoints | None:
         if count < FEWEST_POINTS:
             continue
         t, y = t[: count * group : group], y[: count * group].reshape(count, group).mean(axis=1)
-        # Half the squared differences of neighbours give the variance without the changes, but without the slow part:
-        # the spread about a running median has both.
-        local = y - _running_median(y)
-        noise = max(float(np.median(np.abs(local))) / 0.6745, 1e-6)
         step = float(np.median(np.diff(t)))
         correlation = float(np.exp(-step / CORRELATION_TIME))
+        noise = max(_noise(y, step), LEAST_NOISE)
         penalty = 2 * np.log(count) * (1 + correlation) / (1 - correlation)
-        ends = ruptures.Pelt(model="l2", min_size=3, jump=1).fit(y / noise).predict(pen=penalty)
+        # The linear kernel's cost is that of the mean; this search is compiled.
+        search = ruptures.KernelCPD(kernel="linear", min_size=3)
+        ends = search.fit((y / noise)[:, None]).predict(pen=penalty)
         edges = [0, *ends]
         means = [float(y[a:b].mean()) for a, b in pairwise(edges)]
         found += [
@@ -75,7 +79,13 @@ def find_change_points(history: dict[str, Array]) -> ChangePoints | None:
     return ChangePoints(points=tuple(sorted(found, key=lambda item: item[1])))
 
 
-def _running_median(y: Array, width: int = 31) -> Array:
-    width = min(width, len(y) - (len(y) + 1) % 2)
-    padded = np.pad(y, width // 2, mode="edge")
-    return np.asarray(np.median(np.lib.stride_tricks.sliding_window_view(padded, width), axis=1)[: len(y)])
+def _noise(y: Array, step: float) -> float:
+    """Standard deviation of noise with the correlation time, whatever changes of the mean lie in it.
+
+    Differences over a distance have twice the variance, less what they have in common by the correlation; the median
+    of their sizes forgets the few that lie across a change.
+    """
+    distance = min(max(1, round(DISTANCE * CORRELATION_TIME / step)), len(y) // 6)
+    differences = y[distance:] - y[:-distance]
+    own = 2 * (1 - np.exp(-distance * step / CORRELATION_TIME))
+    return float(np.median(np.abs(differences)) / 0.6745 / np.sqrt(own))

@@ -168,7 +168,8 @@ class Evaluation:
         values, seen = observed_values(self.heat, self.quantities, window, self._known(window))
         known, heat = seen.known, seen.heat
         baseline = self.baseline.residual
-        misfit = float(np.nanmedian(window.residual_rms / np.where(np.isfinite(baseline), baseline, np.nan)))
+        stated = window.moves & np.isfinite(baseline)
+        misfit = float(np.median(window.residual_rms[stated] / baseline[stated])) if stated.any() else 1.0
         self.history.add(
             window.start,
             window.end,
@@ -177,7 +178,7 @@ class Evaluation:
             np.sqrt(seen.noise),
             np.where(known, heat, np.nan),
             seen.friction - heat,
-            misfit if np.isfinite(misfit) else 1.0,
+            misfit,
         )
         if skip:
             return

@@ -14,7 +14,7 @@ from estimation.monitoring.windows.projection import Window
 
 Array = NDArray[np.float64]
 
-# Relative noise of the log of a residual RMS, beyond what the model error makes.
+# Standard deviation of the log of a residual RMS between windows of other motions, beside that of its noise.
 RESIDUAL_NOISE = 0.1
 
 
@@ -78,7 +78,8 @@ def observed_values(
     place = 2 * n + payloads
     if unknown > 0 and known.any():
         values.append((place, whole, whole_variance, one))
-    for j in range(n):
-        values.append((place + 1 + j, float(np.log(window.residual_rms[j])), RESIDUAL_NOISE**2, one))
+    for j in np.flatnonzero(window.moves).tolist():
+        noise_of_rms = RESIDUAL_NOISE**2 + window.residual_variance(j)
+        values.append((place + 1 + j, float(np.log(window.residual_rms[j])), noise_of_rms, one))
     levels = np.array([q.level.coefficients[-1] for q in quantities[:n]])
     return values, Seen(known=known, friction=y, noise=noise, heat=explained - levels + sensitivity * whole)

@@ -80,7 +80,7 @@ def answer_benchmark(
     by: str,
     out: str | PathLike[str],
     force: bool = False,
-    workers: int | None = 1,
+    workers: int | None = None,
     progress: Progress | None = None,
 ) -> Answered:
     """Answers a benchmark by one of the methods, and writes the file of answers.

@@ -79,7 +79,7 @@ CLASSES = MappingProxyType(
         ),
         "delay": EffectClass(meaning="a logged torque that is late", effects=("time_delay", "current_lag")),
         "payload": EffectClass(meaning="a payload that changes", effects=("payload_change",)),
-        "base": EffectClass(meaning="a base that is tilted", effects=("base_tilt",)),
+        "base": EffectClass(meaning="a base that is tilted or yields", effects=("base_tilt", "base_compliance")),
         "contact": EffectClass(
             meaning="an external force of short duration", effects=("external_contact", "hand_guiding")
         ),

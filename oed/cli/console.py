@@ -30,8 +30,11 @@ class Console:
     quiet: bool = False
 
     @contextmanager
-    def working(self) -> Iterator[Progress]:
+    def working(self, kept: str = "nothing was written") -> Iterator[Progress]:
         """Shows a progress bar on a terminal and nothing in a pipe. Each note is printed once.
+
+        Args:
+            kept: what an interrupted command has written so far, for its message.
 
         Raises:
             SystemExit: with code 130, on Ctrl-C.
@@ -49,7 +52,7 @@ class Console:
                         yield progress
             except KeyboardInterrupt:
                 # Without this, typer would end without a message.
-                print("oed: interrupted; nothing was written", file=sys.stderr)
+                print(f"oed: interrupted; {kept}", file=sys.stderr)
                 raise SystemExit(130) from None
 
     def _note(self, message: Warning | str, *_: object, **__: object) -> None:

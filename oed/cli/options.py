@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -10,6 +12,8 @@ import typer
 from robots.common.errors import InputError
 
 if TYPE_CHECKING:
+    from concurrent.futures import Executor
+
     from robots.robot import Robot
 
 ROBOT = "a catalogue name (er3a, ur10, panda), a URDF or xacro, an MJCF (MuJoCo), or a robot YAML"
@@ -54,6 +58,16 @@ SeedOption = Annotated[int, typer.Option("--seed", min=0, help="Seed of the rand
 WorkersOption = Annotated[
     int | None,
     typer.Option("--workers", min=1, help="Number of parallel processes. Default: one per core.", show_default=False),
+]
+ClusterOption = Annotated[
+    str | None,
+    typer.Option(
+        "--cluster",
+        metavar="ADDRESS",
+        help="Address of a Dask scheduler whose workers do the work, such as tcp://host:8786, instead of processes of "
+        "this machine.",
+        show_default=False,
+    ),
 ]
 OutOption = Annotated[Path, typer.Option("--out", help="Folder for the results.")]
 FrictionOption = Annotated[str, typer.Option("--friction", help="Friction model: polynomial or coulomb-viscous.")]
@@ -114,6 +128,28 @@ def robot_from(
             ) from None
     names = [name.strip() for name in joints.split(",")] if joints else None
     return load_robot(spec, tip=tip, joints=names, locked=locked or None, unlimited=unlimited)
+
+
+@contextmanager
+def executor_from(workers: int | None, cluster: str | None) -> Iterator[Executor | None]:
+    """Connects to the cluster that the options name; None without one, for processes of this machine.
+
+    Raises:
+        InputError: both options, or see `robots.common.clusters.cluster`.
+    """
+    if cluster is None:
+        yield None
+        return
+    if workers is not None:
+        raise InputError(
+            "--workers together with --cluster",
+            allowed="one of them",
+            remedy="the number of a cluster's workers is decided where they are started",
+        )
+    from robots.common.clusters import cluster as connect
+
+    with connect(cluster) as executor:
+        yield executor
 
 
 def numbers(option: str, text: str | None) -> list[float] | None:

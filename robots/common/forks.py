@@ -11,7 +11,7 @@ from itertools import count, repeat
 from typing import Any, TypeVar
 
 from robots.common.memory import give_back
-from robots.common.parallel import available_cores, start_worker, threaded
+from robots.common.parallel import available_cores, is_worker, start_worker, threaded
 
 Item = TypeVar("Item")
 Result = TypeVar("Result")
@@ -47,7 +47,7 @@ def forked(
     work = list(items)
     cores = min(available_cores(), -(-len(work) // chunk))
     # The other cores are busy if this process is one of several workers.
-    if cores > 1 and sys.platform.startswith("linux") and multiprocessing.parent_process() is None:
+    if cores > 1 and sys.platform.startswith("linux") and not is_worker():
         try:
             return _in_forks(function, work, cores, advance, chunk)
         except BrokenProcessPool:

@@ -86,9 +86,9 @@ MORE = (
     Hide(seed=7005, effects=(surroundings.Contact,), periodic=False),
     Hide(seed=7006, effects=(friction.PositionDependent,), joint=4),
     Hide(seed=7007, effects=(surroundings.Tilt,), kind="ur10"),
+    Hide(seed=7073, effects=(whole_strangers.LeaningBase,), size=0.02, kind="ur10"),
 )
 MORE_STRANGE = (
-    Hide(seed=7073, effects=(whole_strangers.LeaningBase,), size=0.02, kind="ur10"),
     Hide(seed=7071, effects=(strangers.Drag,), joint=1, size=0.03),
     Hide(seed=7074, effects=(strangers.DeadZone,), joint=2, size=0.02),
     Hide(seed=7075, effects=(whole_strangers.SlippedBase,), size=0.015, kind="ur10", periodic=False),

@@ -20,7 +20,7 @@ from estimation.monitoring.monitor import Monitor
 from estimation.monitoring.result import LogRow
 from estimation.monitoring.settings import MonitorSettings
 from estimation.monitoring.windows.baseline import Baseline, read_baseline
-from robots.common.errors import OedError
+from robots.common.errors import InputError, OedError
 from robots.common.files import sha256, write_atomic
 from robots.common.parallel import parallel_map
 from robots.common.progress import Progress
@@ -72,22 +72,23 @@ def monitor_fleet(
         settings: of the monitors.
         mapping: of the logs' columns.
         workers: number of processes; one per core by default.
-        executor: does the work instead, such as that of a Dask client.
+        executor: does the work instead, such as that of `robots.common.clusters.cluster`.
         progress: receives the number of finished robots.
 
     Returns:
         The rows, worst first.
 
     Raises:
-        InputError: no logs, or no model.
+        InputError: no logs, no model, or a worker that does not see them.
     """
-    members = find_members(folder)
-    place = Path(model)
+    # A cluster's workers stand in another folder.
+    members = [member.absolute() for member in find_members(folder)]
+    place = Path(model).absolute()
     file = place / "model.json" if place.is_dir() else place
     read_baseline(file)
     if mapping is not None:
         read_mapping(mapping)
-    target = Path(kept)
+    target = Path(kept).absolute()
     target.mkdir(parents=True, exist_ok=True)
     digests = {path: sha256(path) for path in {file, *(m.model for m in members if m.model is not None)}}
     tasks = [
@@ -97,7 +98,7 @@ def monitor_fleet(
             digest=digests[member.model or file],
             settings=settings or MonitorSettings(),
             kept=target,
-            mapping=None if mapping is None else Path(mapping),
+            mapping=None if mapping is None else Path(mapping).absolute(),
         )
         for member in members
     ]
@@ -116,7 +117,7 @@ def robot_row(task: Task) -> tuple[RobotRow, bool]:
     """
     file, state = _kept_files(task)
     files = list(task.member.files)
-    logs = {str(path): [path.stat().st_size, path.stat().st_mtime_ns] for path in files}
+    logs = {str(path): _version(path) for path in files}
     head = {
         "version": KEPT_VERSION,
         "model": task.digest,
@@ -140,6 +141,23 @@ def robot_row(task: Task) -> tuple[RobotRow, bool]:
     content = {**head, "logs": logs, "row": row.to_state()}
     write_atomic(file, json.dumps(content, allow_nan=False), force=True)
     return row, False
+
+
+def _version(path: Path) -> list[int]:
+    """Size and time of a log, which change with it.
+
+    Raises:
+        InputError: it is not there.
+    """
+    try:
+        found = path.stat()
+    except OSError as error:
+        raise InputError(
+            f"the log cannot be read ({error.strerror})",
+            file=path,
+            remedy="leave logs where they are during the work; all machines of a cluster need the same path to them",
+        ) from error
+    return [found.st_size, found.st_mtime_ns]
 
 
 def _kept_files(task: Task) -> tuple[Path, Path]:

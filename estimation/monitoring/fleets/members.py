@@ -28,6 +28,11 @@ class Member:
     files: tuple[Path, ...]
     model: Path | None = None
 
+    def absolute(self) -> Member:
+        """Gives the same robot with absolute paths."""
+        model = None if self.model is None else self.model.absolute()
+        return Member(name=self.name, files=tuple(path.absolute() for path in self.files), model=model)
+
 
 def find_members(folder: str | PathLike[str]) -> list[Member]:
     """Finds the robots of a fleet.

@@ -41,7 +41,7 @@ class Window:
         burst: largest chi-square of the whitened residual in a block.
         burst_at: time of that block [s].
         burst_joints: whitened residual of each joint in it (n,).
-        colour: autocovariances of the residual (n, lags + 1).
+        colour: autocovariances of the residual (n, lags + 1); zero for a joint that rests throughout.
         rows: rows behind them (n,).
     """
 
@@ -61,6 +61,20 @@ class Window:
     burst_joints: Array
     colour: Array
     rows: Array
+
+    @property
+    def moves(self) -> NDArray[np.bool_]:
+        """Joints that move for some time in the window (n,); the others have no residual."""
+        return np.asarray(self.colour[:, 0] > np.finfo(float).tiny)
+
+    def residual_variance(self, joint: int) -> float:
+        """Returns the variance of the log of a joint's residual RMS, for coloured noise (Bartlett 1946).
+
+        Args:
+            joint: counted from 0, one that moves.
+        """
+        correlation = self.colour[joint] / self.colour[joint, 0]
+        return float((2 * correlation @ correlation - 1) / (2 * self.rows[joint]))
 
 
 @dataclass(frozen=True, eq=False)

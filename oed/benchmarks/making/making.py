@@ -75,7 +75,7 @@ def make_benchmark(
     seed: int | None = None,
     sealed: str | PathLike[str] | None = None,
     force: bool = False,
-    workers: int | None = 1,
+    workers: int | None = None,
     progress: Progress | None = None,
 ) -> Benchmark:
     """Writes blind cases to a folder, and what they hide to a file that is sealed by its hash in the folder.

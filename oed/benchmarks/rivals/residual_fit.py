@@ -25,7 +25,7 @@ FALSE_ALARMS = 0.01
 """Probability of any significant group if the base model is right."""
 
 LEAST = 0.02
-"""Share of the torque RMS that an effect explains at least: one in ten cases without an effect has a group above it."""
+"""Share of the torque RMS that an effect explains at least; chosen on a dozen cases without an effect."""
 
 MOST = 3
 """Largest number of effects."""

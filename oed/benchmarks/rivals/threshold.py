@@ -13,7 +13,7 @@ from oed.benchmarks.rivals.logs import read_motion
 from oed.benchmarks.taxonomy import UNKNOWN
 
 FACTOR = 1.6
-"""Residual RMS over noise RMS above which something is wrong: one in ten cases without an effect is above it."""
+"""Residual RMS over noise RMS above which something is wrong; chosen on a dozen cases without an effect."""
 
 NORMAL_MEDIAN = 0.6745  # median absolute value of a standard normal variable
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import time
 from collections.abc import Callable, Sequence
+from concurrent.futures import Executor
 from os import PathLike
 from pathlib import Path
 
@@ -47,6 +48,7 @@ def run_loop(
     stream_options: StreamOptions | None = None,
     speed: float = 1.0,
     workers: int | None = None,
+    executor: Executor | None = None,
     force: bool = False,
     report: Callable[[Diagnosis, ResultFolder], None] | None = None,
     progress: Progress = SILENT,
@@ -67,6 +69,7 @@ def run_loop(
         stream_options: how trajectories are sent.
         speed: how many times faster than real time the controller plays, for controllers to test against.
         workers: processes of the design.
+        executor: runs the design's searches instead.
         force: begin again, and remove what an earlier loop left in the folder.
         report: writes a page into the folder of each diagnosis, such as `oed.reports.save_diagnosis_report`.
         progress: listener.
@@ -98,7 +101,7 @@ def run_loop(
         else:
             state.require_same(robot, settings, place)
         loop = _Loop(robot, endpoint, place, chosen, stream_options or StreamOptions(), state, speed, report, progress)
-        return loop.run(design, workers)
+        return loop.run(design, workers, executor)
 
 
 class _Loop:
@@ -120,11 +123,11 @@ class _Loop:
         self.stream_options, self.state, self.speed = stream_options, state, speed
         self.report, self.progress = report, progress
 
-    def run(self, design: str | PathLike[str] | None, workers: int | None) -> LoopResult:
+    def run(self, design: str | PathLike[str] | None, workers: int | None, executor: Executor | None) -> LoopResult:
         begin, state = time.monotonic(), self.state
         resumed = bool(state.experiments)
         if not resumed:
-            self._design(design, workers)
+            self._design(design, workers, executor)
         if state.ended and not state.success and len(state.experiments) < self.options.experiments:
             # A larger budget than last time: the last diagnosis is made again, for the motions that it proposes.
             state.ended = ""
@@ -158,7 +161,7 @@ class _Loop:
             duration=time.monotonic() - begin,
         )
 
-    def _design(self, given: str | PathLike[str] | None, workers: int | None) -> None:
+    def _design(self, given: str | PathLike[str] | None, workers: int | None, executor: Executor | None) -> None:
         """Makes the first experiment: an excitation, or what a design's folder holds."""
         bodies = collision_model(self.robot) if self.options.collision else None
         made = given or design_experiment(
@@ -166,7 +169,9 @@ class _Loop:
             limits=LimitOptions(
                 velocity_fraction=self.options.velocity_fraction, collision=bodies is not None and bool(bodies.pairs)
             ),
-            search=SearchOptions(effort=self.options.effort, seed=self.options.seed, workers=workers),
+            search=SearchOptions(
+                effort=self.options.effort, seed=self.options.seed, workers=workers, executor=executor
+            ),
             progress=self.progress,
         )
         stage, notes = excitation_stage(self.robot, made)

@@ -10,7 +10,7 @@ import typer
 
 from oed.cli.console import Console
 from oed.cli.links import is_given
-from oed.cli.options import ForceOption, JsonOption, QuietOption
+from oed.cli.options import ForceOption, JsonOption, QuietOption, WorkersOption
 
 BELONGS = {
     "cases": "make",
@@ -75,7 +75,7 @@ def benchmark(
     markdown: Annotated[
         Path | None, typer.Option(help="Of score: also write the table as Markdown to this file.", show_default=False)
     ] = None,
-    workers: Annotated[int, typer.Option(min=1, help="Of make and answer: number of parallel processes.")] = 1,
+    workers: WorkersOption = None,
     force: ForceOption = False,
     json: JsonOption = False,
     quiet: QuietOption = False,
@@ -97,6 +97,8 @@ def benchmark(
         for name, owner in BELONGS.items():
             if owner != action and is_given(context, name):
                 raise InputError(f"--{name} beside `oed benchmark {action}`", remedy=f"it belongs to {owner}")
+        if action == "score" and workers is not None:
+            raise InputError("--workers beside `oed benchmark score`", remedy="it belongs to make and answer")
         if files and action != "score":
             raise InputError(f"{files[0]} beside `oed benchmark {action}`", remedy="files of answers belong to score")
         if action == "answer" and answers is not None:

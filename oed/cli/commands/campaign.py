@@ -30,6 +30,7 @@ from oed.cli.links import (
     refuse_without_host,
 )
 from oed.cli.options import (
+    ClusterOption,
     ForceOption,
     JointsOption,
     JsonOption,
@@ -44,6 +45,7 @@ from oed.cli.options import (
     UnlimitedOption,
     VelocityFractionOption,
     WorkersOption,
+    executor_from,
     robot_from,
 )
 
@@ -90,6 +92,7 @@ def campaign(
     ] = 1.0,
     seed: SeedOption = 0,
     workers: WorkersOption = None,
+    cluster: ClusterOption = None,
     run: Annotated[
         str | None,
         typer.Option(
@@ -178,7 +181,7 @@ def campaign(
             )
         else:
             names = ["campaign.json", "report.html", *(f"{name}.csv" for name in programme.stage_names)]
-            with ResultFolder(out, force, names=names) as folder:
+            with executor_from(workers, cluster) as executor, ResultFolder(out, force, names=names) as folder:
                 result = plan(
                     described,
                     programme=programme,
@@ -190,6 +193,7 @@ def campaign(
                     cold_friction=cold_friction,
                     seed=seed,
                     workers=workers,
+                    executor=executor,
                     progress=progress,
                 )
                 result.save(folder.path("campaign.json").parent)

@@ -12,6 +12,7 @@ from oed.cli.configuration.defaults import is_from_file
 from oed.cli.console import Console
 from oed.cli.options import (
     BaseFrequencyOption,
+    ClusterOption,
     CollisionOption,
     FamilyOption,
     ForceOption,
@@ -30,6 +31,7 @@ from oed.cli.options import (
     UnlimitedOption,
     VelocityFractionOption,
     WorkersOption,
+    executor_from,
     numbers,
     robot_from,
 )
@@ -140,6 +142,7 @@ def design(
     ] = None,
     seed: SeedOption = 0,
     workers: WorkersOption = None,
+    cluster: ClusterOption = None,
     out: OutOption = Path(),
     tip: TipOption = None,
     joints: JointsOption = None,
@@ -192,7 +195,10 @@ def design(
             }
             criterion = criterion if "criterion" in given else "d"
             strokes = strokes if "strokes" in given else False
-        with ResultFolder(out, force, names=["trajectory.csv", "design.json", "report.html"]) as folder:
+        with (
+            executor_from(workers, cluster) as executor,
+            ResultFolder(out, force, names=["trajectory.csv", "design.json", "report.html"]) as folder,
+        ):
             described = robot_from(robot, tip, joints, lock, unlimited=unlimited)
             prior, effects = prior_from(after, described.n) if after else (None, ())
             result = run(
@@ -227,6 +233,7 @@ def design(
                     time_limit=float("inf") if time_limit is None else time_limit,
                     keep_on_interrupt=True,
                     workers=workers,
+                    executor=executor,
                 ),
                 progress=progress,
             )

@@ -8,7 +8,17 @@ from typing import Annotated
 import typer
 
 from oed.cli.console import Console
-from oed.cli.options import ForceOption, JsonOption, MappingOption, OutOption, PngOption, QuietOption, WorkersOption
+from oed.cli.options import (
+    ClusterOption,
+    ForceOption,
+    JsonOption,
+    MappingOption,
+    OutOption,
+    PngOption,
+    QuietOption,
+    WorkersOption,
+    executor_from,
+)
 
 
 def fleet(
@@ -35,6 +45,7 @@ def fleet(
     ] = 1000.0,
     window: Annotated[float, typer.Option(help="Length of a window [s].")] = 10.0,
     workers: WorkersOption = None,
+    cluster: ClusterOption = None,
     out: OutOption = Path("fleet"),
     png: PngOption = False,
     force: ForceOption = False,
@@ -47,14 +58,17 @@ def fleet(
     goes on from there, and a later run takes in new logs only.
     """
     console = Console(json=json, quiet=quiet)
-    with console.working() as progress:
+    with console.working(f"finished robots are kept in {out / 'robots'}, and the same command goes on") as progress:
         from estimation.monitoring import MonitorSettings
         from estimation.monitoring.fleets import monitor_fleet
         from oed.reports.pages.monitoring.fleet_report import save_fleet_report
         from robots.common.files import ResultFolder
 
         settings = MonitorSettings(window=window, false_alarm_hours=false_alarm_hours, heat=heat)  # type: ignore[arg-type]
-        with ResultFolder(out, force, names=["fleet.json", "fleet.csv", "report.html"]) as results:
+        with (
+            executor_from(workers, cluster) as executor,
+            ResultFolder(out, force, names=["fleet.json", "fleet.csv", "report.html"]) as results,
+        ):
             result = monitor_fleet(
                 folder,
                 model,
@@ -62,6 +76,7 @@ def fleet(
                 settings=settings,
                 mapping=mapping,
                 workers=workers,
+                executor=executor,
                 progress=progress,
             )
             result.save(results.path("fleet.json").parent)

@@ -83,6 +83,7 @@ def force(
         from estimation.external_forces.online.c_export import observer_code
         from estimation.predictions.prediction import Prediction, clock_shift
         from oed.reports import save_force_report
+        from oed.reports.rendering.provenance import recordings_from
         from robots.common.errors import InputError
         from robots.common.files import ResultFolder, open_atomic
         from robots.signals import Log
@@ -123,7 +124,7 @@ def force(
             progress=progress,
         )
         result.save(folder.path("forces.json").parent)
-        save_force_report(result, folder, kinds=robot.chain.kinds, png=png)
+        save_force_report(result, folder, kinds=robot.chain.kinds, logs=recordings_from([recorded]), png=png)
         if code is not None:
             text = observer_code(
                 identified, result.calibration, tool=point, gravity=recorded.gravity, payload=recorded.payload

@@ -27,6 +27,7 @@ from oed.cli.links import (
     endpoint,
 )
 from oed.cli.options import (
+    ClusterOption,
     FittedFrictionOption,
     ForceOption,
     JointsOption,
@@ -41,6 +42,7 @@ from oed.cli.options import (
     UnlimitedOption,
     VelocityFractionOption,
     WorkersOption,
+    executor_from,
     robot_from,
 )
 
@@ -77,6 +79,7 @@ def loop(
     collision: Annotated[bool, typer.Option(help="Avoid self-collisions and the obstacles in the robot file.")] = True,
     seed: SeedOption = 0,
     workers: WorkersOption = None,
+    cluster: ClusterOption = None,
     transport: TransportOption = "udp",
     motion_port: MotionPortOption = 11000,
     state_port: StatePortOption = 11002,
@@ -117,7 +120,7 @@ def loop(
         described = robot_from(robot, tip, joints, lock, unlimited=unlimited)
         place = endpoint(host, transport, motion_port, state_port, byte_order, real_bytes, handshake)
         try:
-            with terminate_as_interrupt():
+            with executor_from(workers, cluster) as executor, terminate_as_interrupt():
                 result = run_loop(
                     described,
                     place,
@@ -143,6 +146,7 @@ def loop(
                     ),
                     speed=speed,
                     workers=workers,
+                    executor=executor,
                     force=force,
                     report=save_diagnosis_report,
                     progress=progress,

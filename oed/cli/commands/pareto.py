@@ -10,6 +10,7 @@ import typer
 from oed.cli.console import Console
 from oed.cli.options import (
     BaseFrequencyOption,
+    ClusterOption,
     CollisionOption,
     FamilyOption,
     ForceOption,
@@ -23,6 +24,7 @@ from oed.cli.options import (
     SeedOption,
     UnlimitedOption,
     WorkersOption,
+    executor_from,
     robot_from,
 )
 
@@ -42,6 +44,7 @@ def pareto(
     effort: Annotated[str, typer.Option(help="Search effort for each design: quick, standard or thorough.")] = "quick",
     seed: SeedOption = 0,
     workers: WorkersOption = None,
+    cluster: ClusterOption = None,
     out: OutOption = Path("pareto"),
     png: PngOption = False,
     unlimited: UnlimitedOption = False,
@@ -61,7 +64,10 @@ def pareto(
         from oed.trajectories import family as choose_family
         from robots.common.files import ResultFolder
 
-        with ResultFolder(out, force, names=["pareto.json", "report.html"]) as folder:
+        with (
+            executor_from(workers, cluster) as executor,
+            ResultFolder(out, force, names=["pareto.json", "report.html"]) as folder,
+        ):
             front = run(
                 robot_from(robot, unlimited=unlimited),
                 criteria=[name.strip() for name in criteria.split(",")],
@@ -72,7 +78,7 @@ def pareto(
                 ),
                 limits=LimitOptions(collision=collision),
                 weights=WeightOptions(scaling=scaling),
-                search=SearchOptions(effort=effort, seed=seed, workers=workers),
+                search=SearchOptions(effort=effort, seed=seed, workers=workers, executor=executor),
                 progress=progress,
             )
             front.save(folder.path("pareto.json").parent)

@@ -44,6 +44,7 @@ def predict(
         from estimation import predict as run
         from estimation.predictions.prediction import clock_shift
         from oed.reports import prediction_page, render
+        from oed.reports.rendering.provenance import recordings_from
         from robots.common.files import open_atomic
 
         with ExitStack() as files:
@@ -61,7 +62,9 @@ def predict(
             result = run(identified, recorded, later=later, **heat.options)
             result.save(out, force=force)
             if page_file is not None:
-                page = prediction_page(result, robot.name, robot.chain.kinds)
+                page = prediction_page(
+                    result, robot.title or robot.name, robot.chain.kinds, recordings_from([recorded])
+                )
                 page_file.write(render(page).encode())
     found = [result.gate.summary()] if result.gate is not None and result.gate.findings else []
     summary = "\n".join(

@@ -19,15 +19,13 @@ def left_out(context: Any) -> set[str]:
     Args:
         context: of the command, its words parsed.
     """
-    rule = _RULES.get(str(context.command.name))
-    if rule is None:
-        return set()
 
     def typed(parameter: str) -> bool:
         source = context.get_parameter_source(parameter)
         return source is not None and source.name == "COMMANDLINE"
 
-    unused = rule(context.params, typed)
+    rule = _RULES.get(str(context.command.name))
+    unused = _one_of(typed, "workers", "cluster") | (rule(context.params, typed) if rule else set())
     return {name for name in unused if name in context.params and is_from_file(context, name)}
 
 

@@ -15,6 +15,7 @@ EXTRAS = {
     "mat": "MATLAB files of version 7.3",
     "ros": "ROS bags",
     "mujoco": "MuJoCo models (MJCF)",
+    "cluster": "work on a Dask cluster (`--cluster`)",
     "monitor": "change points of monitored logs",
     "xacro": "robot descriptions in xacro",
     "collision": "collision checks on meshes",

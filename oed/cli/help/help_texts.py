@@ -116,7 +116,10 @@ EXAMPLES = {
         "oed monitor --model thermal --log day1.csv day2.csv day3.csv --out monitored",
         "oed monitor --model model --log-dir logs --state robot7.state --out monitored --force",
     ),
-    "fleet": ("oed fleet logs_of_all_robots --model model --workers 4 --out fleet",),
+    "fleet": (
+        "oed fleet logs_of_all_robots --model model --workers 4 --out fleet",
+        "oed fleet logs_of_all_robots --model model --cluster tcp://192.168.1.10:8786 --out fleet",
+    ),
     "payload": (
         "oed payload --robot ur10 --log with.csv --without without.csv --to urscript --out payload",
         "oed payload --model model --log with.csv --to franka kuka --out payload",

@@ -1,4 +1,4 @@
-"""Progress of searches in other processes: one small file each, in a temporary folder."""
+"""Progress of searches in other processes: one small file each, in a temporary folder; of a cluster by messages."""
 
 from __future__ import annotations
 
@@ -9,11 +9,13 @@ import signal
 import tempfile
 import threading
 from collections.abc import Callable, Iterator
+from concurrent.futures import Executor
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from types import FrameType
 
+from robots.common.clusters import ClusterExecutor, Link
 from robots.common.progress import Progress
 
 # Often enough for a bar that looks alive.
@@ -23,26 +25,35 @@ STOP = "stop"
 
 @dataclass(frozen=True)
 class Board:
-    """A folder that every process of this machine can reach, whatever executor runs it.
+    """A folder that every process of this machine can reach, and the way to it from a cluster's workers.
 
     Attributes:
         folder: holds one file a search: steps done, and the best value so far.
+        link: from a cluster's workers, which may be other machines; None without a cluster.
     """
 
     folder: Path
+    link: Link | None = None
 
     def reporter(self, number: int) -> Callable[[int, float], None]:
         """Gives the function by which one search reports its steps and best value."""
 
         def tell(done: int, best: float) -> None:
-            fresh = self.folder / f"{number}.new"
-            try:
-                fresh.write_text(f"{done} {best!r}", encoding="ascii")
-                os.replace(fresh, self.folder / str(number))
-            except OSError:
-                pass  # on another machine of a cluster: progress is then coarse, the result the same
+            if self.link is None:
+                self.write(number, done, best)
+            else:
+                self.link.tell([number, done, float(best)])
 
         return tell
+
+    def write(self, number: int, done: int, best: float) -> None:
+        """Writes the steps and the best value of one search."""
+        fresh = self.folder / f"{number}.new"
+        try:
+            fresh.write_text(f"{done} {best!r}", encoding="ascii")
+            os.replace(fresh, self.folder / str(number))
+        except OSError:
+            pass  # the search is over, and the folder gone
 
     def stop(self) -> None:
         """Asks all searches to end with what they have."""
@@ -51,7 +62,7 @@ class Board:
     @property
     def stopped(self) -> bool:
         """Whether they are to end."""
-        return os.path.exists(self.folder / STOP)
+        return os.path.exists(self.folder / STOP) or (self.link is not None and self.link.stopped)
 
     def read(self) -> tuple[int, float]:
         """Sums the steps, and finds the best value."""
@@ -64,7 +75,14 @@ class Board:
 
     @staticmethod
     @contextmanager
-    def watched(searches: int, steps: int, progress: Progress, task: str, sign: float = 1.0) -> Iterator[Board]:
+    def watched(
+        searches: int,
+        steps: int,
+        progress: Progress,
+        task: str,
+        sign: float = 1.0,
+        executor: Executor | None = None,
+    ) -> Iterator[Board]:
         """Opens a board and reports its progress until the work is over.
 
         Args:
@@ -73,13 +91,20 @@ class Board:
             progress: receives the sum of the steps, and the best value.
             task: what the work is called.
             sign: -1 where the smaller value, which is the better, stands for a criterion that is to be large.
+            executor: what runs the searches; None for processes of this machine.
         """
         with tempfile.TemporaryDirectory(prefix="oed-") as folder:
-            board, over = Board(Path(folder)), threading.Event()
+            cluster = executor if isinstance(executor, ClusterExecutor) else None
+            local, over = Board(Path(folder)), threading.Event()
+            board = Board(local.folder, None if cluster is None else cluster.link(lambda told: local.write(*told)))
             progress.start(task, float(searches * steps))
 
             def watch() -> None:
+                asked = False
                 while not over.wait(INTERVAL):
+                    if cluster is not None and board.link is not None and board.stopped and not asked:
+                        cluster.stop(board.link)
+                        asked = True
                     done, best = board.read()
                     progress.update(float(done), f"best {sign * best:.4g}" if done else "compiling and screening")
 

@@ -1,4 +1,4 @@
-"""Runs the searches of a design in parallel processes, and ends them all at a deadline or on Ctrl-C."""
+"""Runs the searches of a design in parallel, and ends them all at a deadline or on Ctrl-C."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ def search_islands(
     sign = -1.0 if problem.criterion.larger_is_better else 1.0
     work_name = f"designing for {problem.base.model.robot.name}"
     with (
-        Board.watched(effort.islands, effort.steps, progress, work_name, sign) as board,
+        Board.watched(effort.islands, effort.steps, progress, work_name, sign, executor) as board,
         stopped_by_interrupt(board, wanted=keep_on_interrupt),
     ):
         deadline = time.time() + time_limit

@@ -3,13 +3,17 @@
 from __future__ import annotations
 
 from itertools import groupby
+from warnings import catch_warnings, simplefilter
 
 import numpy as np
 
 from oed.campaigns import Campaign, Slot, Stage
+from oed.campaigns.checking import closest_bodies
 from oed.reports.pictures.campaign_pictures import temperature_picture, velocity_picture
-from oed.reports.rendering.page import Cell, Fact, Page, Section, Table
-from oed.reports.rendering.saving import footer, save_page
+from oed.reports.rendering.page import Cell, Fact, Finding, Page, Section, Table, findings_of
+from oed.reports.rendering.provenance import footer
+from oed.reports.rendering.saving import save_page
+from robots.common.errors import AssumedValueWarning
 from robots.common.files import ResultFolder
 
 
@@ -21,18 +25,14 @@ def save_campaign_report(campaign: Campaign, folder: ResultFolder, *, png: bool 
 def campaign_page(campaign: Campaign) -> Page:
     """Builds the page: what runs when, how each stage moves, and how hot the robot is expected to get."""
     robot = campaign.robot
-    verdict = (
-        f"{campaign.cycles} cycles in {campaign.duration / 60:.1f} min, {len(campaign.stages)} files to play. Every "
-        f"stage respects all limits and starts and ends at rest in the home pose."
-    )
+    findings = _findings(campaign)
     temperature = _temperature_sections(campaign)
     return Page(
         title="Campaign",
-        subtitle=robot.title or robot.name,
-        verdict=verdict if campaign.success else "At least one stage exceeds a limit; see the table of margins.",
-        status="good" if campaign.success else "bad",
+        robot=robot.title or robot.name,
+        verdict=_verdict(campaign, findings),
+        findings=findings,
         facts=_facts(campaign),
-        warnings=(*campaign.notes, *_assumed(campaign)),
         sections=(
             Section(
                 title="Schedule",
@@ -74,10 +74,51 @@ def _facts(campaign: Campaign) -> tuple[Fact, ...]:
     return tuple(facts)
 
 
-def _assumed(campaign: Campaign) -> tuple[str, ...]:
-    if not campaign.robot.assumed:
-        return ()
-    return (f"Assumed values without a source: {', '.join(campaign.robot.assumed)}.",)
+def _verdict(campaign: Campaign, findings: tuple[Finding, ...]) -> str:
+    codes = {finding.code for finding in findings}
+    if "limit.exceeded" in codes:
+        return "Do not play this campaign: at least one stage exceeds a limit."
+    if "collision.found" in codes:
+        return "Do not play this campaign before its collisions are checked."
+    return (
+        f"Play {len(campaign.stages)} files in {campaign.cycles} cycles by the timetable below, "
+        f"{campaign.duration / 60:.1f} min in all."
+    )
+
+
+def _findings(campaign: Campaign) -> tuple[Finding, ...]:
+    found = [
+        Finding(
+            code="limit.exceeded",
+            subject=f"{stage.name}, joint {margin.joint}:",
+            text=f"the limit of {margin.quantity} is exceeded at {margin.time:.3f} s.",
+            action="Do not play it.",
+        )
+        for stage in campaign.stages
+        for margin in stage.margins
+        if margin.violated
+    ]
+    colliding = []
+    for stage in campaign.stages:
+        with catch_warnings():
+            # The first screen has assumed values as a finding.
+            simplefilter("ignore", AssumedValueWarning)
+            closest = closest_bodies(campaign.robot, stage.motion)
+        if closest is not None and closest[1] < 0.0:
+            pair, clearance, time = closest
+            text = f"in the collision model {pair} overlap by {-1e3 * clearance:.0f} mm at {time:.1f} s."
+            action = "Design it again with oed design --collision." if stage.kind == "excitation" else "Check it first."
+            found.append(Finding(code="collision.found", subject=f"{stage.name}:", text=text, action=action))
+            colliding.append(stage.name)
+    if campaign.success:
+        text = "Every stage respects all limits, and starts and ends at rest in the home pose."
+        found += findings_of("done", [text])
+    # The notes say the same of collisions.
+    own = tuple(f"COLLISION in the {name} stage" for name in colliding)
+    notes = [note for note in campaign.notes if not (own and note.startswith(own))]
+    assumed = campaign.robot.assumed
+    texts = [f"Assumed values without a source: {', '.join(assumed)}."] if assumed else []
+    return (*found, *findings_of("experiment.note", notes), *findings_of("value.assumed", texts))
 
 
 def _phases(campaign: Campaign) -> Table:
@@ -227,7 +268,14 @@ def _temperature_sections(campaign: Campaign) -> tuple[Section, ...]:
             )
         )
     table = Table(
-        headings=("joint", "W [W]", "slow [min]", "fast [min]", "highest [°C]", "parameters"),
+        headings=(
+            "joint",
+            "friction power [W]",
+            "slow time constant [min]",
+            "fast time constant [min]",
+            "highest temperature [°C]",
+            "parameters",
+        ),
         rows=tuple(rows),
         caption="Mean power of the hottest cycle at ambient temperature, and the time constants at that power.",
     )

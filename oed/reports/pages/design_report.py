@@ -9,13 +9,17 @@ from oed.experiments import Design
 from oed.experiments.quality import Quality
 from oed.experiments.safety_checks.margins import missing_limits
 from oed.reports.pictures.trajectory_pictures import margins_picture, spectrum_picture, trajectory_picture
-from oed.reports.rendering.page import Cell, Fact, Page, Section, Table
-from oed.reports.rendering.saving import footer, save_page
+from oed.reports.rendering.page import Cell, Fact, Finding, Page, Section, Table, findings_of
+from oed.reports.rendering.provenance import footer
+from oed.reports.rendering.saving import save_page
 from oed.reports.rendering.significant import significant
 from robots.common.files import ResultFolder
 from robots.limits import Margin
 
 Array = NDArray[np.float64]
+
+NOISE = 0.02
+"""Torque noise over the torque: what models of robots commonly leave."""
 
 
 def save_design_report(design: Design, folder: ResultFolder, *, png: bool = False) -> None:
@@ -26,20 +30,13 @@ def save_design_report(design: Design, folder: ResultFolder, *, png: bool = Fals
 def design_page(design: Design) -> Page:
     """Builds the page: what the experiment is worth, how it moves, how far it stays from the limits."""
     robot, motion = design.robot, design.motion
-    label, value = design.criterion.label, design.optimised.value(design.criterion)
-    verdict = (
-        f"The optimised motion reaches {label} = {significant(value)} over {design.base.size} parameters. The whole "
-        f"experiment takes {motion.duration:.0f} s."
-    )
-    if design.violated:
-        verdict += f" It exceeds a limit: {_name(design.violated[0])}."
+    findings = _findings(design)
     return Page(
         title="Excitation experiment",
-        subtitle=robot.title or robot.name,
-        verdict=verdict,
-        status="good" if design.success else "bad",
+        robot=robot.title or robot.name,
+        verdict=_verdict(design, findings),
+        findings=findings,
         facts=_facts(design),
-        warnings=_warnings(design),
         sections=(
             Section(
                 title="Motion",
@@ -69,7 +66,7 @@ def design_page(design: Design) -> Page:
             Section(title="Search", paragraphs=(_search_text(design),), tables=(_islands(design),)),
             parameters_section(design.base.names, design.base.formulas()),
         ),
-        footer=footer(),
+        footer=footer(design.settings["seed"]),
     )
 
 
@@ -143,8 +140,10 @@ def parameters_section(names: tuple[str, ...], formulas: tuple[str, ...]) -> Sec
 
 def _facts(design: Design) -> tuple[Fact, ...]:
     fourier, whole = design.optimised.to_dict(), design.whole.to_dict()
+    value = design.optimised.value(design.criterion)
     tightest = min((m for m in design.margins if np.isfinite(m.limit)), key=lambda m: m.slack_fraction, default=None)
     facts = [
+        Fact(label=f"Criterion {design.criterion.label}", value=value, note="of the optimised motion"),
         Fact(label="cond(Y), optimised motion", value=fourier["cond_Y"]),
         Fact(label="cond(Y), whole experiment", value=whole["cond_Y"]),
         Fact(label="Parameters", value=design.base.size),
@@ -156,34 +155,85 @@ def _facts(design: Design) -> tuple[Fact, ...]:
                 label="Tightest limit",
                 value=f"{100 * tightest.slack_fraction:.2f} % left",
                 note=_name(tightest),
-                status="bad" if tightest.violated else "good",
+                status="act" if tightest.violated else "good",
             )
         )
     return tuple(facts)
 
 
-def _warnings(design: Design) -> tuple[str, ...]:
-    warnings = [f"The motion exceeds the limit of {_name(margin)}." for margin in design.violated]
-    if design.robot.assumed:
-        warnings.append(f"Assumed values without a source: {', '.join(design.robot.assumed)}.")
+def _verdict(design: Design, findings: tuple[Finding, ...]) -> str:
+    codes = {finding.code for finding in findings}
+    if "limit.exceeded" in codes:
+        return f"Do not play this motion: it exceeds the limit of {_name(design.violated[0])}."
+    if codes & {"excitation.incomplete", "excitation.weak"}:
+        return "Design the experiment again: this motion does not determine all parameters."
+    return (
+        f"Play trajectory.csv on the robot: in {design.motion.duration:.0f} s it determines all {design.base.size} "
+        "base parameters within all limits."
+    )
+
+
+def _findings(design: Design) -> tuple[Finding, ...]:
+    robot = design.robot
+    found = [
+        Finding(
+            code="limit.exceeded",
+            subject=f"Joint {margin.joint}:",
+            text=f"the motion exceeds the limit of {_name(margin)}.",
+            action="Do not play it.",
+        )
+        for margin in design.violated
+    ]
+    found += excitation_findings(design.whole)
+    if robot.assumed:
+        found += findings_of("value.assumed", [f"Assumed values without a source: {', '.join(robot.assumed)}."])
     substitutes = {"acceleration": "4/s times the velocity limit", "jerk": "20/s times the acceleration limit"}
-    for name, joints in missing_limits(design.robot.limits).items():
-        warnings.append(
+    found += findings_of(
+        "limit.assumed",
+        [
             f"The robot's description states no {name} limit for joint {', '.join(map(str, joints))}; assumed: "
             f"{substitutes[name]}."
-        )
+            for name, joints in missing_limits(robot.limits).items()
+        ],
+    )
     if not any(margin.quantity == "torque" for margin in design.margins):
-        warnings.append(
-            "Torque limits were not checked: the robot's description lacks nominal dynamics or torque limits."
-        )
+        text = "Torque limits were not checked: the robot's description lacks nominal dynamics or torque limits."
+        found += findings_of("torque.unchecked", [text])
     if design.freedom is None:
-        warnings.append("Collisions were not checked. Use --collision with a robot that has collision bodies.")
+        text = "Collisions were not checked. Use --collision with a robot that has collision bodies."
+        found += findings_of("collision.unchecked", [text])
     elif not design.freedom["certified"]:
-        warnings.append("Absence of collisions was checked at the samples only; between samples it is not proved.")
+        text = "Absence of collisions was checked at the samples only; between samples it is not proved."
+        found += findings_of("collision.sampled", [text])
     if design.strokes_left_out:
-        left_out = ", ".join(str(joint) for joint in design.strokes_left_out)
-        warnings.append(f"No velocity stroke for joints {left_out}: the arm would collide.")
-    return tuple(warnings)
+        joints = ", ".join(str(joint) for joint in design.strokes_left_out)
+        found += findings_of("stroke.left_out", [f"No velocity stroke for joints {joints}: the arm would collide."])
+    return tuple(found)
+
+
+def excitation_findings(quality: Quality) -> tuple[Finding, ...]:
+    """Says whether a motion determines all parameters, and whether noise leaves one of them open.
+
+    With torque noise of `NOISE` of the torque, the standard error of the worst-determined direction is about
+    NOISE cond(Y) / sqrt(N) of the parameters' size. Above 1 that direction is not determined.
+
+    Args:
+        quality: of the whole motion.
+    """
+    cond = quality.to_dict()["cond_Y"]
+    action = "Give the motion more room or time: --velocity-fraction, --periods or --effort thorough."
+    if cond is None:
+        text = "The motion does not excite all parameters: the regressor lacks rank."
+        return (Finding(code="excitation.incomplete", text=text, action=action),)
+    error = NOISE * cond / np.sqrt(quality.samples)
+    if error <= 1.0:
+        return ()
+    text = (
+        f"At least one combination of parameters is not determined: cond(Y) is {significant(cond, digits=2)}. With "
+        f"torque noise of {100 * NOISE:g} %, its standard error is about {significant(error, digits=2)} times the "
+        "parameters' size."
+    )
+    return (Finding(code="excitation.weak", text=text, action=action),)
 
 
 def _name(margin: Margin) -> str:

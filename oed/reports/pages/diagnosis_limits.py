@@ -7,13 +7,15 @@ from collections.abc import Sequence
 import numpy as np
 
 from estimation.diagnosis.experiment_plans.detection_limits import Limit
-from oed.reports.rendering.page import Cell, Fact, Page, Section, Table
-from oed.reports.rendering.saving import footer, save_page
+from oed.reports.pages.design_report import NOISE
+from oed.reports.rendering.page import Cell, Fact, Page, Section, Table, findings_of
+from oed.reports.rendering.provenance import footer
+from oed.reports.rendering.saving import save_page
 from robots.common.files import ResultFolder
 from robots.terms.effects import EFFECTS
 
-CLEAR = 0.02
-"""Share of the torque below which a limit counts as small: what robot models commonly leave."""
+CLEAR = NOISE
+"""Share of the torque below which a limit counts as small."""
 ALL = 1.0
 """Fraction of the torque from which an effect size counts as impossible."""
 MUCH = 2.0
@@ -32,18 +34,19 @@ def limits_page(limits: Sequence[Limit], robot: str) -> Page:
     hidden = sorted({EFFECTS[limit.effect].title for limit in limits if not np.isfinite(limit.detectable)})
     return Page(
         title="Detectable effects of this experiment",
-        subtitle=robot,
+        robot=robot,
         verdict=(
-            f"Of {len(limits)} pairs of effect and joint, {len(clear)} would be found and named at {100 * CLEAR:g} % "
-            f"of the "
-            f"joint's torque RMS. {len(testable)} would be found at some size."
+            f"This experiment finds and names {len(clear)} of {len(limits)} pairs of effect and joint at "
+            f"{100 * CLEAR:g} % of the joint's torque RMS, and finds {len(testable)} at some size."
         ),
-        status="good" if len(clear) > len(limits) / 2 else "warning",
+        findings=findings_of(
+            "detection.limited",
+            (f"Not detectable on at least one joint, at any size: {'; '.join(hidden)}.",) if hidden else (),
+        ),
         facts=(
             Fact(label="Found and named at 2 % of torque RMS", value=f"{len(clear)} of {len(limits)}"),
             Fact(label="Not detectable with this motion", value=len(limits) - len(testable)),
         ),
-        warnings=(f"Not detectable on at least one joint, at any size: {'; '.join(hidden)}.",) if hidden else (),
         sections=(limits_section(limits),),
         footer=footer(),
     )

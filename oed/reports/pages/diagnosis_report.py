@@ -8,17 +8,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from estimation.diagnosis.calibration import CLOSE_RIVAL_BIC
-from estimation.diagnosis.experiment_plans.detection_limits import summarise_limits
 from estimation.diagnosis.results.diagnosis import Diagnosis
+from oed.reports.pages.diagnosis_actions import findings_in, verdict_of
 from oed.reports.pages.diagnosis_limits import limits_section
 from oed.reports.pages.diagnosis_simulation import simulation_section
 from oed.reports.pages.diagnosis_view import DiagnosisView, view_of
 from oed.reports.pictures.diagnosis_pictures import cause_picture, gain_picture
 from oed.reports.pictures.torque_pictures import torque_picture
 from oed.reports.rendering.joint_units import joint_titles, joint_units
-from oed.reports.rendering.page import Cell, Fact, Page, Section, Status, Table
+from oed.reports.rendering.page import Cell, Fact, Page, Section, Table
 from oed.reports.rendering.picture import Picture
-from oed.reports.rendering.saving import footer, save_page
+from oed.reports.rendering.provenance import footer
+from oed.reports.rendering.saving import save_page
 from oed.reports.rendering.significant import NORMAL_95, significant
 from robots.common.files import ResultFolder
 
@@ -43,39 +44,16 @@ def diagnosis_page(view: DiagnosisView) -> Page:
         sections.append(Section(title="Unexplained residual", paragraphs=view.unexplained))
     sections.append(_next(view))
     sections.append(limits_section(view.limits, folded=bool(view.findings)))
-    status: dict[str, Status] = {"none": "good", "named": "good"}
     return Page(
         title="Diagnosis",
-        subtitle=view.robot,
-        verdict=_verdict(view),
-        status=status.get(view.verdict, "warning"),
+        robot=view.robot,
+        verdict=verdict_of(view),
+        logs=view.logs,
+        findings=findings_in(view),
         facts=_facts(view),
-        warnings=view.warnings,
         sections=tuple(sections),
-        footer=footer(),
+        footer=footer(view.seed),
     )
-
-
-def _verdict(view: DiagnosisView) -> str:
-    if view.verdict == "none":
-        seen = summarise_limits(view.limits)
-        return f"No missing effect was found.{f' {seen}.' if seen else ''}"
-    if not view.findings:
-        return "The residual is not noise, but no effect of the catalogue explains it."
-    first = view.findings[0].sentence
-    others = len(view.findings) - 1
-    more = f" {others} more below." if others else ""
-    if view.verdict == "ambiguous":
-        return f"An effect is found, but several causes fit. The most likely: {first}{more}"
-    if view.verdict == "unexplained":
-        # A free function does not name a cause, whatever its gain.
-        helps = any(finding.interval[0] > 0 and finding.named for finding in view.findings)
-        part = "The error is explained in part." if helps else _NO_KNOWN_CAUSE
-        return f"{part} {first}{more}"
-    return f"{first}{more}"
-
-
-_NO_KNOWN_CAUSE = "The residual is not noise, but no effect of the catalogue explains it."
 
 
 def _facts(view: DiagnosisView) -> tuple[Fact, ...]:
@@ -126,7 +104,14 @@ def _torque(view: DiagnosisView) -> Section:
     if known:
         pictures.append(gain_picture(view.nrmse_before, view.nrmse_after, joint_names=view.joint_names))
     pictures.append(
-        torque_picture(view.t, view.measured, view.extended, joint_names=view.joint_names, kinds=view.kinds)
+        torque_picture(
+            view.t,
+            view.measured,
+            view.extended,
+            joint_names=view.joint_names,
+            kinds=view.kinds,
+            why_gaps="in rows that do not count for a joint: it rests or reverses there, and its friction is not known",
+        )
     )
     titles = joint_titles(view.joint_names, len(view.joint_names))
     rows: list[tuple[Cell, ...]] = []

@@ -86,11 +86,11 @@ def simulation_picture(
         title=f"{title}, forward simulation with a position controller",
         name=name,
         panels=(
-            Panel(title="Torque", x_label="time [s]", y_label=f"[{unit.torque}]", series=tuple(torque)),
+            Panel(title="Torque", x_label="time [s]", y_label=f"{unit.effort} [{unit.torque}]", series=tuple(torque)),
             Panel(
                 title="Simulated minus measured position",
                 x_label="time [s]",
-                y_label=f"[m{unit.position}]",
+                y_label=f"error [m{unit.position}]",
                 series=tuple(motion),
                 lines=(Line(value=0.0, role="neutral", dash="solid"),),
             ),

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from estimation.diagnosis.experiment_plans.detection_limits import Limit
 from estimation.diagnosis.results.diagnosis import Diagnosis, Finding, Trace
 from estimation.diagnosis.simulations.simulation_result import Simulation
+from oed.reports.rendering.provenance import Recording, recordings_of
 from robots.terms.base import length_unit
 from robots.terms.effects import EFFECTS, EXPERIMENTS
 
@@ -22,6 +23,7 @@ class FindingView:
     """One finding as the report shows it.
 
     Attributes:
+        effect: its name in the catalogue; a name that is not there is a pattern without a known cause.
         title: what it is, in words.
         sentence: what its values mean.
         joint: counted from 1; None for the whole robot.
@@ -40,10 +42,10 @@ class FindingView:
         of: what before and after are the error of.
         unit: of the residuals if they are not torques.
         elsewhere: joints on which before and after are, where those are not its own; begins with a space, or is empty.
-        named: whether it is an effect of the catalogue.
         rough: names of the parameters that are not well determined.
     """
 
+    effect: str
     title: str
     sentence: str
     joint: int | None
@@ -62,8 +64,12 @@ class FindingView:
     of: str = "torque"
     unit: str = ""
     elsewhere: str = ""
-    named: bool = True
     rough: tuple[str, ...] = ()
+
+    @property
+    def named(self) -> bool:
+        """Whether it is an effect of the catalogue."""
+        return self.effect in EFFECTS
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -94,6 +100,8 @@ class DiagnosisView:
         unexplained: what is left, in words.
         warnings: what a reader must know.
         simulation: the motion simulated without and with what was found; None where nothing was.
+        logs: recordings of the fit.
+        seed: of the random numbers.
     """
 
     robot: str
@@ -119,6 +127,8 @@ class DiagnosisView:
     unexplained: tuple[str, ...] = ()
     warnings: tuple[str, ...] = ()
     simulation: Simulation | None = None
+    logs: tuple[Recording, ...] = ()
+    seed: int | None = None
 
 
 def view_of(diagnosis: Diagnosis) -> DiagnosisView:
@@ -157,6 +167,8 @@ def view_of(diagnosis: Diagnosis) -> DiagnosisView:
         unexplained=tuple(f"{f.sentence}" for f in left),
         warnings=diagnosis.notes,
         simulation=diagnosis.simulation,
+        logs=recordings_of(diagnosis.model.provenance.get("logs", ())),
+        seed=diagnosis.model.provenance.get("seed"),
     )
 
 
@@ -197,6 +209,7 @@ def _finding(finding: Finding, trace: Trace, coordinate: Array) -> FindingView:
         joint = max(finding.gain.joints, key=lambda k: _fall(trace)[k - 1])
     known = bool(np.isfinite(coordinate).any())
     return FindingView(
+        effect=finding.effect,
         title=title,
         sentence=finding.sentence,
         joint=finding.joint,
@@ -213,7 +226,6 @@ def _finding(finding: Finding, trace: Trace, coordinate: Array) -> FindingView:
         residual_before=trace.before[:, joint - 1],
         residual_after=trace.after[:, joint - 1],
         elsewhere=finding.elsewhere,
-        named=finding.effect != "unexplained",
         rough=tuple(p.name for p in finding.parameters if not p.determined),
     )
 

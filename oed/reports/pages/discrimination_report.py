@@ -5,8 +5,9 @@ from __future__ import annotations
 from oed.campaigns.discriminations.discrimination import Discrimination
 from oed.reports.pages.design_report import margins_section
 from oed.reports.pictures.trajectory_pictures import trajectory_picture
-from oed.reports.rendering.page import Fact, Page, Section, Table
-from oed.reports.rendering.saving import footer, save_page
+from oed.reports.rendering.page import Fact, Page, Section, Table, findings_of
+from oed.reports.rendering.provenance import footer
+from oed.reports.rendering.saving import save_page
 from robots.common.files import ResultFolder
 from robots.terms.effects import EFFECTS, EXPERIMENTS
 
@@ -45,16 +46,18 @@ def discrimination_page(result: Discrimination) -> Page:
     )
     return Page(
         title="Experiment to distinguish two causes",
-        subtitle=robot.title or robot.name,
+        robot=robot.title or robot.name,
         verdict=f"{result.why}.",
-        status="good" if result.resolves >= SURE else "warning",
+        findings=(
+            *findings_of("experiment.note", result.warnings),
+            *findings_of("experiment.unsure", _unsure(result)),
+        ),
         facts=(
             Fact(label="Probability of the right decision", value=f"{100 * result.resolves:.0f} %"),
             Fact(label="With the reference motion alone", value=f"{100 * result.alone:.0f} %"),
             Fact(label="Kind", value=result.kind.replace("_", " "), note=result.what),
             Fact(label="Duration", value=f"{sum(run.motion.duration for run in result.runs):.0f} s"),
         ),
-        warnings=result.warnings,
         sections=(
             Section(
                 title="Motions to play",
@@ -110,3 +113,9 @@ def discrimination_page(result: Discrimination) -> Page:
         ),
         footer=footer(),
     )
+
+
+def _unsure(result: Discrimination) -> tuple[str, ...]:
+    if result.resolves >= SURE:
+        return ()
+    return (f"The experiment gives the right decision with {100 * result.resolves:.0f} % probability only.",)

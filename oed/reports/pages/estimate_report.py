@@ -7,11 +7,13 @@ from numpy.typing import NDArray
 
 from estimation.identifications.estimate import Estimate
 from estimation.predictions.method_table import MethodTable
+from oed.reports.pages.estimates.estimate_findings import findings_in, verdict_of
 from oed.reports.pictures.parameter_pictures import error_bars_picture, friction_picture, parameter_picture
 from oed.reports.pictures.torque_pictures import residual_picture, torque_picture
 from oed.reports.rendering.page import Cell, Fact, Page, Section, Table
 from oed.reports.rendering.picture import Picture
-from oed.reports.rendering.saving import footer, save_page
+from oed.reports.rendering.provenance import footer, recordings_of
+from oed.reports.rendering.saving import save_page
 from oed.reports.rendering.significant import significant, significant_error
 from robots.common.files import ResultFolder
 
@@ -38,13 +40,6 @@ def estimate_page(estimate: Estimate, methods: MethodTable | None = None) -> Pag
     model, joints = estimate.model, estimate.joints
     robot = model.robot
     known = int(model.determined.sum())
-    lost = [joint for joint in joints if not joint.identified]
-    verdict = (
-        f"{known} of {len(model.names)} parameters are determined. The prediction error on held-out data is "
-        f"{100 * np.median([joint.nrmse for joint in joints]):.1f} % of the torque RMS (median joint)."
-    )
-    if lost:
-        verdict += f" Not identified: joint {', '.join(str(joint.joint) for joint in lost)}."
     period = float(np.median(np.diff(estimate.t))) if len(estimate.t) > 1 else 1.0
     kinds, names = robot.chain.kinds, robot.joint_names
     residual = estimate.measured - estimate.predicted
@@ -98,12 +93,13 @@ def estimate_page(estimate: Estimate, methods: MethodTable | None = None) -> Pag
     if methods is not None:
         sections.insert(1, Section(title="Estimators", tables=(_methods(methods),)))
     if any(gate.findings for gate in estimate.gates):
-        sections.insert(len(sections) - 1, Section(title="The logs", tables=(_findings(estimate),)))
+        sections.insert(len(sections) - 1, Section(title="The logs", tables=(_gates(estimate),)))
     return Page(
         title="Identified dynamics",
-        subtitle=robot.title or robot.name,
-        verdict=verdict,
-        status="good" if estimate.success else "warning",
+        robot=robot.title or robot.name,
+        verdict=verdict_of(estimate),
+        logs=recordings_of(model.provenance["logs"]),
+        findings=findings_in(estimate),
         facts=(
             Fact(label="Parameters determined", value=f"{known} of {len(model.names)}"),
             Fact(label="Worst joint, held-out data", value=f"{100 * max(joint.nrmse for joint in joints):.1f} %"),
@@ -114,9 +110,8 @@ def estimate_page(estimate: Estimate, methods: MethodTable | None = None) -> Pag
                 note="the standard errors are this many times those of white noise",
             ),
         ),
-        warnings=estimate.warnings,
         sections=tuple(sections),
-        footer=footer(),
+        footer=footer(model.provenance.get("seed")),
     )
 
 
@@ -125,12 +120,13 @@ def _errors(estimate: Estimate) -> Picture:
         pairs = [(getattr(joint, name), joint.torque_rms) for joint in estimate.joints]
         return np.array([error / scale if scale else np.nan for error, scale in pairs])
 
-    errors = {"fitted": shares("residual_rms"), "held out": shares("held_out_rms"), "constant": shares("torque_spread")}
+    errors = {"fitted": shares("residual_rms"), "held out": shares("held_out_rms")}
     errors["noise floor"] = shares("noise_floor")
+    rivals = {"a constant instead of the model": shares("torque_spread")}
     nominal = shares("nominal_rms")
     if np.isfinite(nominal).any():
-        errors["robot's description"] = nominal
-    return error_bars_picture(errors, joint_names=estimate.model.robot.joint_names)
+        rivals["robot's description"] = nominal
+    return error_bars_picture(errors, rivals=rivals, joint_names=estimate.model.robot.joint_names)
 
 
 def _joints(estimate: Estimate) -> Table:
@@ -157,7 +153,7 @@ def _joints(estimate: Estimate) -> Table:
     headings = (
         "joint",
         "name",
-        "torque RMS",
+        "torque RMS [N m or N]",
         "fitted [%]",
         "held out [%]",
         "constant [%]",
@@ -233,7 +229,7 @@ def _methods(methods: MethodTable) -> Table:
     )
 
 
-def _findings(estimate: Estimate) -> Table:
+def _gates(estimate: Estimate) -> Table:
     rows = tuple((gate.log, finding.severity, str(finding)) for gate in estimate.gates for finding in gate.findings)
     caption = "Result of the data checks before the fit, and the action taken."
     return Table(headings=("log", "severity", "finding"), rows=rows, caption=caption)

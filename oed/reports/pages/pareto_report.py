@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from itertools import combinations
 
 import numpy as np
 from numpy.typing import NDArray
 
 from oed.experiments import ParetoFront
-from oed.reports.rendering.page import Fact, Page, Section, Table
+from oed.reports.pages.design_report import excitation_findings
+from oed.reports.rendering.page import Fact, Finding, Page, Section, Table
 from oed.reports.rendering.picture import Panel, Picture, Series
-from oed.reports.rendering.saving import footer, save_page
+from oed.reports.rendering.provenance import footer
+from oed.reports.rendering.saving import save_page
 from robots.common.files import ResultFolder
 
 WIDE = 5.0
@@ -36,12 +39,12 @@ def pareto_page(front: ParetoFront) -> Page:
     headings = ("point", *(f"weight of {name}" for name in names), *names, "Pareto-optimal")
     return Page(
         title="Designs for several criteria",
-        subtitle=robot.title or robot.name,
+        robot=robot.title or robot.name,
         verdict=(
-            f"{efficient} of {len(front.designs)} designs are Pareto-optimal: no other design is better in every "
-            f"criterion. {_cost(front)}"
+            f"Choose one of {efficient} Pareto-optimal designs, of {len(front.designs)}: no other design is better in "
+            "every criterion."
         ),
-        status="good" if front.success else "bad",
+        findings=_findings(front),
         facts=tuple(Fact(label=f"Best {c.label}", value=_best(front, k)) for k, c in enumerate(front.criteria)),
         sections=(
             Section(
@@ -51,6 +54,7 @@ def pareto_page(front: ParetoFront) -> Page:
                         "Each point is a design that respects all limits; its trajectory is in the folder with its "
                         "number. The axes name criteria for which larger is better."
                     ),
+                    _cost(front),
                 ),
                 pictures=(_picture(front),),
                 tables=(Table(headings=headings, rows=rows, caption="Criteria of the optimised motion."),),
@@ -58,6 +62,25 @@ def pareto_page(front: ParetoFront) -> Page:
         ),
         footer=footer(),
     )
+
+
+def _findings(front: ParetoFront) -> tuple[Finding, ...]:
+    found = [
+        replace(finding, subject=f"Point {point}:")
+        for point, design in enumerate(front.designs, start=1)
+        for finding in excitation_findings(design.whole)
+    ]
+    found += [
+        Finding(
+            code="limit.exceeded",
+            subject=f"Point {point}:",
+            text=f"the motion exceeds {len(design.violated)} limits.",
+            action="Do not play it.",
+        )
+        for point, design in enumerate(front.designs, start=1)
+        if design.violated
+    ]
+    return tuple(found)
 
 
 def _best(front: ParetoFront, k: int) -> float:

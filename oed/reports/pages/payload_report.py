@@ -7,8 +7,9 @@ import numpy as np
 from estimation.payloads import PayloadEstimate, Quantity
 from estimation.payloads.result import METHODS
 from oed.reports.pictures.parameter_pictures import error_bars_picture
-from oed.reports.rendering.page import Cell, Fact, Page, Section, Table
-from oed.reports.rendering.saving import footer, save_page
+from oed.reports.rendering.page import Cell, Fact, Page, Section, Table, findings_of
+from oed.reports.rendering.provenance import footer, recordings_of
+from oed.reports.rendering.saving import save_page
 from oed.reports.rendering.significant import NORMAL_95, significant
 from robots.common.files import ResultFolder
 
@@ -32,18 +33,19 @@ def payload_page(payload: PayloadEstimate) -> Page:
     }
     widest = max(centre, key=lambda item: item.half_width)
     return Page(
-        title=f"Payload of {payload.robot}",
+        title="Payload",
+        robot=payload.robot,
         verdict=(
-            f"The payload has {_value(mass)} kg ({_interval(mass)}), by {METHODS[payload.method]}. Its centre of mass "
-            f"is known to {1000 * widest.half_width:.2g} mm or better."
+            f"Set the payload to {_value(mass)} kg ({_interval(mass)}); its centre of mass is known to "
+            f"{1000 * widest.half_width:.2g} mm or better."
         ),
-        status="good" if payload.success else "warning",
+        logs=recordings_of(payload.provenance.get("logs", ())),
+        findings=findings_of("payload.uncertain", payload.warnings),
         facts=(
             Fact(label="Mass", value=f"{_value(mass)} kg"),
             Fact(label="Centre of mass", value=f"{', '.join(_value(item) for item in centre)} m"),
-            Fact(label="Rows", value=payload.rows),
+            Fact(label="Rows", value=payload.rows, note=f"by {METHODS[payload.method]}"),
         ),
-        warnings=payload.warnings,
         sections=(
             Section(
                 title="Mass, centre and inertia",

@@ -3,41 +3,47 @@
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 
 from estimation.predictions.prediction import Prediction
 from oed.reports.pictures.torque_pictures import torque_picture
-from oed.reports.rendering.page import Cell, Fact, Page, Section, Table
-from oed.reports.rendering.saving import footer
+from oed.reports.rendering.page import Cell, Fact, Finding, Page, Section, Table, findings_of
+from oed.reports.rendering.provenance import Recording, footer
 from robots.common.plain import finite
 
 
-def prediction_page(prediction: Prediction, robot_name: str, kinds: tuple[str, ...]) -> Page:
+def prediction_page(
+    prediction: Prediction, robot_name: str, kinds: tuple[str, ...], logs: tuple[Recording, ...] = ()
+) -> Page:
     """Builds the page: torque with its band, errors where torque was logged, and what the fit has not seen.
 
     Args:
         prediction: the torques.
         robot_name: name of the robot.
         kinds: "revolute" or "prismatic" of each joint (n,).
+        logs: the recording that was predicted.
     """
     measured = prediction.measured
     nothing = np.full_like(prediction.predicted, np.nan)
     if measured is None:
-        verdict = "The log has no torque to compare with."
+        verdict = "The torques are predicted; the log has none to compare with."
     else:
-        verdict = f"The median joint's error is {100 * np.median(prediction.nrmse):.1f} % of the torque RMS."
+        verdict = (
+            f"The model predicts this motion to {100 * np.median(prediction.nrmse):.1f} % of the torque RMS (median)."
+        )
     extrapolates = prediction.extrapolates
     share = None if extrapolates is None else 100 * extrapolates.mean(axis=0)
-    if share is not None:
-        verdict += f" {share.mean():.2g} % of the torques extrapolate."
     return Page(
-        title=f"Prediction of {robot_name}",
+        title="Prediction",
+        robot=robot_name,
         verdict=verdict,
+        logs=logs,
+        findings=_findings(prediction, share),
         facts=(
-            Fact(label="samples", value=len(prediction.motion)),
-            Fact(label="duration", value=f"{prediction.motion.duration:.4g} s"),
-            Fact(label="motion known below", value=f"{prediction.cutoff:.3g} Hz"),
+            Fact(label="Samples", value=len(prediction.motion)),
+            Fact(label="Duration", value=f"{prediction.motion.duration:.4g} s"),
+            Fact(label="Motion known below", value=f"{prediction.cutoff:.3g} Hz"),
         ),
-        warnings=prediction.beyond,
         sections=(
             Section(
                 title="Torque",
@@ -62,6 +68,17 @@ def prediction_page(prediction: Prediction, robot_name: str, kinds: tuple[str, .
     )
 
 
+def _findings(prediction: Prediction, share: NDArray[np.float64] | None) -> tuple[Finding, ...]:
+    texts = []
+    if share is not None and share.any():
+        texts = [f"{share.mean():.2g} % of the torques extrapolate: the fit has seen no such motion."]
+    gate = () if prediction.gate is None else prediction.gate.findings
+    return (
+        *findings_of("prediction.extrapolates", (*texts, *prediction.beyond)),
+        *(Finding(code=f"log.{finding.severity}", text=f"{finding}.") for finding in gate),
+    )
+
+
 def _joints(prediction: Prediction) -> Table:
     """Errors, coverage of the band and share of extrapolation, joint by joint."""
     n = prediction.predicted.shape[1]
@@ -75,7 +92,7 @@ def _joints(prediction: Prediction) -> Table:
         headings=(
             "joint",
             "name",
-            "error RMS",
+            "error RMS [N m or N]",
             "of torque RMS [%]",
             "standard deviation, of torque's [%]",
             "in the 95 % band [%]",

@@ -6,10 +6,11 @@ import numpy as np
 
 from oed.criteria import CRITERIA
 from oed.experiments import RetimedExperiment
-from oed.reports.pages.design_report import margins_section, parameters_section, quality_section
+from oed.reports.pages.design_report import excitation_findings, margins_section, parameters_section, quality_section
 from oed.reports.pictures.trajectory_pictures import trajectory_picture
-from oed.reports.rendering.page import Cell, Fact, Page, Section, Table
-from oed.reports.rendering.saving import footer, save_page
+from oed.reports.rendering.page import Cell, Fact, Finding, Page, Section, Table, findings_of
+from oed.reports.rendering.provenance import footer
+from oed.reports.rendering.saving import save_page
 from robots.common.files import ResultFolder
 from robots.common.plain import finite
 from robots.signals import Motion
@@ -38,20 +39,23 @@ def retime_page(result: RetimedExperiment, given: Motion) -> Page:
         )
         for stem, motion in (("after", result.motion), ("before", given))
     )
-    warnings = [] if result.success else ["The new timing exceeds a limit."]
+    findings: list[Finding] = [*excitation_findings(result.after)]
+    if not result.success:
+        findings.append(
+            Finding(code="limit.exceeded", text="The new timing exceeds a limit.", action="Do not play it.")
+        )
     if retimed.slower:
-        warnings.append(retimed.verdict())
+        findings += findings_of("timing.slower", [retimed.verdict()])
     if robot.assumed:
-        warnings.append(f"Assumed values without a source: {', '.join(robot.assumed)}.")
+        findings += findings_of("value.assumed", [f"Assumed values without a source: {', '.join(robot.assumed)}."])
     return Page(
         title="Retimed path",
-        subtitle=robot.title or robot.name,
+        robot=robot.title or robot.name,
         verdict=(
             f"{retimed.method} runs the path in {retimed.duration_after:.1f} s instead of "
-            f"{retimed.duration_before:.1f} s, using {100 * share:.1f} % of the {name} limit of joint {joint}. "
-            f"{retimed.verdict()}"
+            f"{retimed.duration_before:.1f} s, using {100 * share:.1f} % of the {name} limit of joint {joint}."
         ),
-        status="good" if result.success else "bad",
+        findings=tuple(findings),
         facts=(
             Fact(label=f"{CRITERIA['cond']().label} before", value=before if before is not None else "not all excited"),
             Fact(label="cond(Y) after", value=after if after is not None else "not all excited"),
@@ -59,7 +63,7 @@ def retime_page(result: RetimedExperiment, given: Motion) -> Page:
             Fact(
                 label="Duration after",
                 value=f"{retimed.duration_after:.3f} s",
-                status="bad" if retimed.slower and retimed.given_keeps_limits else "neutral",
+                status="note" if retimed.slower and retimed.given_keeps_limits else "neutral",
             ),
             Fact(label="Intermediate stops", value=retimed.stops),
             Fact(
@@ -68,7 +72,6 @@ def retime_page(result: RetimedExperiment, given: Motion) -> Page:
                 note=f"{retimed.unit}, largest of all joints",
             ),
         ),
-        warnings=tuple(warnings),
         sections=(
             Section(title="New motion", pictures=pictures[:1]),
             *_torque_sections(result),

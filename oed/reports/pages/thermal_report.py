@@ -15,9 +15,10 @@ from oed.reports.pictures.thermal_pictures import (
     friction_time_picture,
     time_constant_picture,
 )
-from oed.reports.rendering.page import Cell, Fact, Page, Section, Table
+from oed.reports.rendering.page import Cell, Fact, Finding, Page, Section, Table, findings_of
 from oed.reports.rendering.picture import Picture
-from oed.reports.rendering.saving import footer, save_page
+from oed.reports.rendering.provenance import footer, recordings_from
+from oed.reports.rendering.saving import save_page
 from oed.reports.rendering.significant import significant, significant_error
 from robots.common.files import ResultFolder
 from robots.signals import Log
@@ -54,9 +55,12 @@ def thermal_page(
     gain = 1.0 - estimate.residual_rms / np.maximum(estimate.residual_without, 1e-300)
     moving = [fit for fit in fits if fit is not None]
     open_ = sorted({q.name for fit in moving for q in fit.parameters if not q.determined})
+    share = round(100 * float(np.median(gain)))
     verdict = (
-        f"The thermal model reduces the torque error of the median joint by {100 * np.median(gain):.0f} %, compared "
-        f"with temperature-independent friction. {_open_text(open_)}"
+        f"Use this thermal model: it reduces the torque error of the median joint by {share} %, compared with "
+        "temperature-independent friction."
+        if share > 0
+        else "These logs show no effect of temperature: record from cold to warm, or use the model without heat."
     )
     coefficients = _coefficients(estimate)
     fit = fits[joint - 1]
@@ -93,25 +97,28 @@ def thermal_page(
     worst = int(np.argmin(np.where([item is not None for item in fits], gain, np.inf)))
     return Page(
         title="Friction and temperature",
-        subtitle=robot.title or robot.name,
+        robot=robot.title or robot.name,
         verdict=verdict,
-        status="good" if estimate.success else "warning",
+        logs=recordings_from(logs),
+        findings=_findings(estimate, open_),
         facts=(
             Fact(label="Model", value=moving[0].model.name if moving else "–"),
             Fact(label="Largest gain", value=f"{100 * gain.max():.0f} %", note=f"joint {int(gain.argmax()) + 1}"),
             Fact(label="Smallest gain", value=f"{100 * gain[worst]:.0f} %", note=f"joint {worst + 1}"),
             Fact(label="Iterations (dynamics, thermal model)", value=estimate.rounds),
         ),
-        warnings=(*estimate.joint_notes, *_still(fits)),
         sections=tuple(sections),
         footer=footer(),
     )
 
 
-def _open_text(names: Sequence[str]) -> str:
-    if not names:
-        return "All thermal parameters are determined."
-    return f"These logs determine time constants and friction ratios, but not {', '.join(names)}."
+def _findings(estimate: CampaignEstimate, names: Sequence[str]) -> tuple[Finding, ...]:
+    text = f"These logs determine time constants and friction ratios, but not {', '.join(names)}."
+    return (
+        *findings_of("thermal.undetermined", [text] if names else []),
+        *findings_of("model.warning", estimate.joint_notes),
+        *findings_of("joint.still", _still(estimate.thermal)),
+    )
 
 
 def _still(fits: Sequence[ThermalEstimate | None]) -> tuple[str, ...]:
@@ -145,11 +152,11 @@ def _joints(estimate: CampaignEstimate) -> Table:
     headings = (
         "joint",
         "name",
-        "error without thermal model",
-        "with thermal model",
-        "slow [min]",
-        "fast [min]",
-        "cold / warm friction",
+        "error without thermal model [N m or N]",
+        "with thermal model [N m or N]",
+        "slow time constant [min]",
+        "fast time constant [min]",
+        "cold / warm friction [1]",
         "bounds (95 %)",
     )
     caption = (

@@ -51,7 +51,7 @@ def velocity_picture(campaign: Campaign, *, name: str = "velocities") -> Picture
             Panel(
                 title=titles[joint],
                 x_label="time in the cycle [s]",
-                y_label=f"[{units[joint].velocity}]",
+                y_label=f"velocity [{units[joint].velocity}]",
                 series=(Series(x=times, y=speeds[:, joint], role=joint_role(joint + 1)),),
                 lines=tuple(Line(value=v, label=significant(v, digits=3)) for v in (-bound, bound) if np.isfinite(v)),
                 spans=tuple(spans),

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -12,6 +12,9 @@ from oed.reports.rendering.palette import joint_role, sequence_role
 from oed.reports.rendering.picture import Line, Panel, Picture, Series
 from oed.reports.rendering.significant import NORMAL_95
 from robots.signals import FloatArray
+
+SMALLEST_P = 1e-12
+"""Smallest p-value that is drawn: the tail of the noise distribution is unknown beyond it."""
 
 
 def course_picture(
@@ -46,7 +49,7 @@ def course_picture(
         Panel(
             title=names[i],
             x_label=x_label,
-            y_label=f"[{units[i]}]",
+            y_label=f"value [{units[i]}]",
             series=(
                 Series(
                     x=np.asarray(x, dtype=float),
@@ -60,6 +63,43 @@ def course_picture(
         for i in range(len(names))
     )
     return Picture(title=title, name=name, panels=panels, columns=3, panel_height=180, caption=caption)
+
+
+def significance_picture(
+    p_values: Mapping[str, Mapping[int, float]], alpha: float, *, joint_names: Sequence[str], name: str = "tests"
+) -> Picture:
+    """Shows how significant the differences of all parts are, in one chart.
+
+    Args:
+        p_values: adjusted p-values by part and joint, counted from 1.
+        alpha: below which a difference is significant.
+        joint_names: names (n,).
+        name: the stem of the file name.
+    """
+    count = len(joint_names)
+    titles = joint_titles(joint_names, count)
+    series = []
+    for index, (part, row) in enumerate(p_values.items()):
+        p = np.array([row.get(joint, np.nan) for joint in range(1, count + 1)])
+        texts = tuple(f"{title}, {part}: p = {value:.2g}" for title, value in zip(titles, p, strict=True))
+        height = -np.log10(np.maximum(p, SMALLEST_P))
+        places = np.arange(count, dtype=float)
+        series.append(Series(x=places, y=height, name=part, kind="bars", role=sequence_role(index), texts=texts))
+    top = max(float(np.nanmax(item.y, initial=0.0)) for item in series) if series else 0.0
+    panel = Panel(
+        y_label="-log10 of adjusted p-value [1]",
+        series=tuple(series),
+        lines=(Line(value=float(-np.log10(alpha)), label="significant above"),),
+        categories=titles,
+        y_range=(0.0, 1.15 * max(top, float(-np.log10(alpha)))),
+    )
+    return Picture(
+        title="Differences of the parts of each joint",
+        name=name,
+        panels=(panel,),
+        panel_height=260,
+        caption=f"The smallest adjusted p-value over the runs. 2 is p = 0.01. Bars end at p = {SMALLEST_P:g}.",
+    )
 
 
 def friction_runs_picture(
@@ -92,7 +132,7 @@ def friction_runs_picture(
             Panel(
                 title=titles[joint - 1],
                 x_label=f"velocity [{units[joint - 1].velocity}]",
-                y_label=f"[{units[joint - 1].torque}]",
+                y_label=f"friction [{units[joint - 1].torque}]",
                 series=tuple(
                     Series(x=speed, y=torque[k], error=NORMAL_95 * error[k], name=label, role=sequence_role(k))
                     for k, label in enumerate(labels)

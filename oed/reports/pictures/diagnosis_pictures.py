@@ -18,6 +18,8 @@ BINS = 60
 """Stretches of the coordinate, each of as many samples, whose mean is drawn."""
 CLOUD = 900
 """Samples drawn behind the means."""
+PANEL_HEIGHT = 300
+"""Height of a panel on a screen [px]."""
 MARGIN = 1.25
 """Height of a panel over what all means need."""
 
@@ -58,6 +60,10 @@ def cause_picture(
     spread = float(np.quantile(np.abs(old), 0.98)) if len(old) else 1.0
     top = MARGIN * max(height, spread, 1e-12)
     some = np.linspace(0, len(x) - 1, min(CLOUD, len(x))).astype(int) if len(x) else np.zeros(0, dtype=int)
+    # A difference of less than a pixel cannot be seen.
+    pixel = 2.0 * top / PANEL_HEIGHT
+    shift = float(np.quantile(np.abs(old - new), 0.98)) if len(old) else 0.0
+    same = len(old) > 0 and max(shift, *(np.abs(curves[0][1] - curves[1][1]))) < pixel
     panels = []
     for heading, values, (middle, mean, error), role in zip(
         ("without this effect", "with this effect"), (old, new), curves, ("residual", "good"), strict=True
@@ -79,12 +85,15 @@ def cause_picture(
     return Picture(
         title=title,
         name=name,
-        panels=tuple(panels),
-        columns=2,
-        panel_height=300,
-        caption=(
-            "Each dot is a sample of the logs. For a correct cause, the mean is curved on the left and flat on the "
-            "right."
+        panels=tuple(panels[:1] if same else panels),
+        columns=1 if same else 2,
+        panel_height=PANEL_HEIGHT,
+        caption="Each dot is a sample of the logs. "
+        + (
+            f"The residual with this effect differs by less than {pixel:.1g} {unit} and is not drawn again: other "
+            "evidence supports this finding."
+            if same
+            else "For a correct cause, the mean is curved without it and flat with it."
         ),
     )
 

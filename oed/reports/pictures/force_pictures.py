@@ -7,6 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import ArrayLike
 
+from oed.reports.rendering.gaps import break_at_pauses
 from oed.reports.rendering.joint_units import joint_titles, joint_units
 from oed.reports.rendering.palette import sequence_role
 from oed.reports.rendering.picture import Line, Panel, Picture, Series, Span
@@ -25,11 +26,11 @@ def statistic_picture(t: ArrayLike, statistic: ArrayLike, windows: Windows, *, n
         windows: first and last time of each contact [s].
         name: the stem of the file name.
     """
+    times, values = break_at_pauses(t, statistic)
     panel = Panel(
-        title="Contact statistic",
         x_label="time [s]",
-        y_label="over the threshold",
-        series=(Series(x=np.asarray(t, dtype=float), y=np.asarray(statistic, dtype=float), role="measured"),),
+        y_label="over the threshold [1]",
+        series=(Series(x=times, y=values, role="measured"),),
         lines=(Line(value=1.0, label="threshold"),),
         spans=_spans(windows),
     )
@@ -55,13 +56,13 @@ def load_picture(
         windows: first and last time of each contact [s].
         name: the stem of the file name.
     """
-    values, spread = np.asarray(force, dtype=float), np.asarray(deviation, dtype=float)
+    times, values, spread = break_at_pauses(t, force, deviation)
     panels = tuple(
         Panel(
             title=f"Force along {axis}",
             x_label="time [s]",
-            y_label="[N]",
-            series=(_banded(t, values[:, k], spread[:, k], sequence_role(k)),),
+            y_label="force [N]",
+            series=(_banded(times, values[:, k], spread[:, k], sequence_role(k)),),
             lines=(Line(value=0.0, role="neutral", dash="solid"),),
             spans=_spans(windows),
         )
@@ -101,14 +102,13 @@ def external_torque_picture(
         kinds: "revolute" or "prismatic" of each joint, (n,).
         name: the stem of the file name.
     """
-    residual, other, spread = (np.asarray(x, dtype=float) for x in (torque, direct, deviation))
+    times, residual, other, spread = break_at_pauses(t, torque, direct, deviation)
     titles, units = joint_titles(joint_names, residual.shape[1]), joint_units(kinds, residual.shape[1])
-    times = np.asarray(t, dtype=float)
     panels = tuple(
         Panel(
             title=titles[j],
             x_label="time [s]",
-            y_label=f"[{units[j].torque}]",
+            y_label=f"{units[j].effort} [{units[j].torque}]",
             series=(
                 Series(x=times, y=other[:, j], name="inverse dynamics", role="neutral", opacity=0.7),
                 Series(x=times, y=residual[:, j], name="momentum observer", role="measured"),
@@ -132,9 +132,9 @@ def external_torque_picture(
     )
 
 
-def _banded(t: ArrayLike, values: FloatArray, deviation: FloatArray, role: str) -> Series:
-    width = None if not np.isfinite(deviation).all() else NORMAL_95 * deviation
-    return Series(x=np.asarray(t, dtype=float), y=values, error=width, role=role)
+def _banded(t: FloatArray, values: FloatArray, deviation: FloatArray, role: str) -> Series:
+    width = NORMAL_95 * np.where(np.isfinite(deviation), deviation, np.nan)
+    return Series(x=t, y=values, error=width if np.isfinite(width).any() else None, role=role)
 
 
 def _spans(windows: Windows) -> tuple[Span, ...]:

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from oed.reports.rendering.gaps import break_at_pauses
 from oed.reports.rendering.joint_units import joint_titles
 from oed.reports.rendering.picture import Line, Panel, Picture, Series, Span
 from oed.reports.rendering.significant import NORMAL_95
@@ -58,12 +59,12 @@ def trend_picture(
             Panel(
                 title=title,
                 x_label="time [h]",
-                y_label="friction [%]",
+                y_label="change of friction [%]",
                 lines=(Line(value=0.0, role="neutral", dash="dot"),),
                 spans=spans,
                 series=(
                     Series(x=t, y=_percent(total[:, j]), name="measured", kind="markers", role="neutral", texts=texts),
-                    Series(x=t, y=_percent(by_heat[:, j]), name="explained by temperature", role="second", texts=texts),
+                    _by_heat(t, by_heat[:, j]),
                     Series(
                         x=t,
                         y=_percent(own[:, j]),
@@ -86,6 +87,11 @@ def trend_picture(
         caption="Changes against the model. Each point is a window of a log; hovering shows the log. Stripes are the "
         "95 % intervals of the dates of changes.",
     )
+
+
+def _by_heat(t: NDArray[np.float64], log_ratio: NDArray[np.float64]) -> Series:
+    times, values = break_at_pauses(t, log_ratio)
+    return Series(x=times, y=_percent(values), name="explained by temperature", role="second")
 
 
 def _percent(log_ratio: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -10,9 +10,12 @@ from numpy.typing import ArrayLike
 from oed.reports.rendering.joint_units import joint_titles, joint_units
 from oed.reports.rendering.palette import joint_role, sequence_role
 from oed.reports.rendering.picture import Line, Panel, Picture, Series
-from oed.reports.rendering.significant import NORMAL_95, with_error
+from oed.reports.rendering.significant import NORMAL_95, significant, with_error
 from robots.common.errors import InputError
 from robots.signals import FloatArray
+
+FLAT = 5.0
+"""Bars higher than others by this factor flatten them."""
 
 LABEL_LENGTH = 14
 """Longer names of base parameters are cut on the axis; the whole stands in the hover text."""
@@ -63,7 +66,7 @@ def parameter_picture(
             series.append(Series(x=place, y=known[chosen], name="reference", kind="markers", role="second"))
         panels.append(
             Panel(
-                y_label=f"[{unit}]" if unit else "[1]",
+                y_label=f"value [{unit}]" if unit else "value [1]",
                 series=tuple(series),
                 lines=(Line(value=0.0, role="neutral", dash="solid"),),
                 categories=tuple(_short(names[index]) for index in chosen),
@@ -130,7 +133,7 @@ def friction_picture(
             Panel(
                 title=titles[joint],
                 x_label=f"velocity [{units[joint].velocity}]",
-                y_label=f"[{units[joint].torque}]",
+                y_label=f"friction [{units[joint].torque}]",
                 series=tuple(series),
                 lines=(Line(value=0.0, role="neutral", dash="solid"),),
             )
@@ -148,6 +151,7 @@ def friction_picture(
 def error_bars_picture(
     errors: Mapping[str, ArrayLike],
     *,
+    rivals: Mapping[str, ArrayLike] | None = None,
     references: Mapping[str, float] | None = None,
     joint_names: Sequence[str] | None = None,
     name: str = "errors",
@@ -156,6 +160,7 @@ def error_bars_picture(
 
     Args:
         errors: NRMSE per joint as a fraction, (n,), by what it is of, such as "before" and "after".
+        rivals: errors of what the model is compared with, alike; the caption states those that would flatten the rest.
         references: levels to compare with, as fractions, drawn as lines.
         joint_names: names, (n,).
         name: the stem of the file name.
@@ -164,6 +169,10 @@ def error_bars_picture(
         InputError: no errors, or lengths that differ.
     """
     rows: dict[str, FloatArray] = {label: np.asarray(row, dtype=np.float64) for label, row in errors.items()}
+    others = {label: np.asarray(row, dtype=np.float64) for label, row in (rivals or {}).items()}
+    top = max((float(np.nanmax(row, initial=0.0)) for row in rows.values()), default=0.0)
+    far = {label: row for label, row in others.items() if np.nanmax(row, initial=0.0) > FLAT * top}
+    rows |= {label: row for label, row in others.items() if label not in far}
     lengths = {len(row) for row in rows.values()}
     if len(lengths) != 1:
         raise InputError(f"errors of {sorted(lengths)} joints", allowed="one number of joints")
@@ -184,8 +193,18 @@ def error_bars_picture(
         name=name,
         panels=(panel,),
         panel_height=280,
-        caption="RMS error divided by torque RMS, for each joint.",
+        caption="RMS error divided by torque RMS, for each joint." + _stated(far),
     )
+
+
+def _stated(far: Mapping[str, FloatArray]) -> str:
+    if not far:
+        return ""
+    texts = []
+    for label, row in far.items():
+        low, high = (significant(100.0 * float(value), digits=2) for value in (np.nanmin(row), np.nanmax(row)))
+        texts.append(f"{label} ({low} to {high} %)")
+    return f" Not drawn, because the bars would flatten all others: {' and '.join(texts)}."
 
 
 def _short(name: str) -> str:

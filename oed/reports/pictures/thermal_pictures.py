@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from estimation.thermal import RunFit, ThermalEstimate
+from oed.reports.rendering.gaps import break_at_pauses
 from oed.reports.rendering.joint_units import joint_titles, joint_units
 from oed.reports.rendering.palette import sequence_role
 from oed.reports.rendering.picture import Line, Panel, Picture, Series
@@ -59,12 +60,13 @@ def friction_time_picture(fits: Fits, *, joint_names: Sequence[str] | None = Non
     for title, fit in zip(titles, fits, strict=True):
         series: list[Series] = []
         for run in _friction_runs(fit):
-            series += _pair(run.t / 60.0, run.measured, run.predicted, "measured", "predicted")
+            t, dots, line = break_at_pauses(run.t / 60.0, run.measured, run.predicted)
+            series += _pair(t, dots, line, "measured", "predicted")
         panels.append(
             Panel(
                 title=title,
                 x_label="time [min]",
-                y_label="over cold",
+                y_label="friction over cold [1]",
                 series=tuple(series),
                 note="" if series else "does not move",
             )
@@ -76,8 +78,8 @@ def friction_time_picture(fits: Fits, *, joint_names: Sequence[str] | None = Non
         shared_x=True,
         panel_height=150,
         caption=(
-            "Points are averages over ten seconds. 1 is the friction at the initial temperature T0. Lines connect "
-            "points across rests."
+            "Points are averages over ten seconds. 1 is the friction at the initial temperature T0. Lines end at rests "
+            "and pauses."
         ),
     )
 
@@ -90,14 +92,16 @@ def duty_picture(fit: ThermalEstimate, runs: Sequence[DutyRun], *, title: str) -
         for run in _friction_runs(fit):
             inside = (run.t >= duty.start) & (run.t <= duty.end)
             if inside.any():
-                t = (run.t[inside] - duty.start) / 60.0
-                role, dots = sequence_role(shown), run.measured[inside]
+                t, dots, line = break_at_pauses(
+                    (run.t[inside] - duty.start) / 60.0, run.measured[inside], run.predicted[inside]
+                )
+                role = sequence_role(shown)
                 series.append(Series(x=t, y=dots, kind="markers", role=role, opacity=0.5))
-                series.append(Series(x=t, y=run.predicted[inside], name=duty.label, role=role))
+                series.append(Series(x=t, y=line, name=duty.label, role=role))
                 shown += 1
     if shown < 2:
         return None
-    panel = Panel(x_label="time since the run began [min]", y_label="over cold", series=tuple(series))
+    panel = Panel(x_label="time since the run began [min]", y_label="friction over cold [1]", series=tuple(series))
     return Picture(
         title=f"Friction of {title} by duty cycle",
         name="friction_duty",
@@ -126,7 +130,9 @@ def time_constant_picture(fits: Fits, *, joint_names: Sequence[str] | None = Non
                 series.append(
                     Series(x=x, y=y / 60.0, error=NORMAL_95 * error / 60.0, kind="markers", role=sequence_role(k))
                 )
-        panels.append(Panel(title=title, x_label="W [W]", y_label="[min]", series=tuple(series)))
+        panels.append(
+            Panel(title=title, x_label="friction power [W]", y_label="time constant [min]", series=tuple(series))
+        )
     return Picture(
         title="Time constants against friction power",
         name="time_constants",
@@ -134,8 +140,8 @@ def time_constant_picture(fits: Fits, *, joint_names: Sequence[str] | None = Non
         columns=min(3, len(panels)),
         panel_height=220,
         caption=(
-            "W is the mean friction power at the initial temperature T0. Points mark the powers in the data, with 95 "
-            "% intervals."
+            "Friction power is the mean at the initial temperature T0. Points mark the powers in the data, with 95 % "
+            "intervals."
         ),
     )
 
@@ -182,7 +188,7 @@ def friction_curves_picture(
             Panel(
                 title=titles[j],
                 x_label=f"velocity [{units[j].velocity}]",
-                y_label=f"[{units[j].torque}]",
+                y_label=f"friction [{units[j].torque}]",
                 series=tuple(series),
                 lines=(Line(value=0.0, role="neutral", dash="solid"),),
                 note=f"{100 * (most / least - 1.0):.0f} % more when cold" if least > 0.0 else "",

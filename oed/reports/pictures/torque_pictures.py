@@ -7,6 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import ArrayLike
 
+from oed.reports.rendering.gaps import break_at_pauses
 from oed.reports.rendering.joint_units import joint_titles, joint_units
 from oed.reports.rendering.palette import joint_role
 from oed.reports.rendering.picture import Band, Line, Panel, Picture, Series
@@ -27,6 +28,7 @@ def torque_picture(
     band: ArrayLike | None = None,
     joint_names: Sequence[str] | None = None,
     kinds: Sequence[str] | None = None,
+    why_gaps: str = "",
     name: str = "torque",
 ) -> Picture:
     """Shows measured against predicted torque of each joint, and the residual beside it.
@@ -39,6 +41,7 @@ def torque_picture(
             none is known.
         joint_names: names, (n,).
         kinds: "revolute" or "prismatic" of each joint, (n,); None where all are revolute.
+        why_gaps: where and why rows have no prediction, to complete "The predicted line has gaps".
         name: the stem of the file name.
 
     Raises:
@@ -50,10 +53,13 @@ def torque_picture(
         raise InputError(f"shapes {times.shape}, {truth.shape} and {model.shape}", allowed="(N,), (N, n) and (N, n)")
     count = truth.shape[1]
     widths = _widths(band, truth.shape)
+    gaps = np.isfinite(truth) & ~np.isfinite(model)
+    times, truth, model, *broken = break_at_pauses(times, truth, model, *([] if widths is None else [widths]))
+    widths = broken[0] if broken else None
     titles, units = joint_titles(joint_names, count), joint_units(kinds, count)
     panels = []
     for joint in range(count):
-        width = None if widths is None or not np.isfinite(widths[:, joint]).all() else widths[:, joint]
+        width = None if widths is None or not np.isfinite(widths[:, joint]).any() else widths[:, joint]
         residual = truth[:, joint] - model[:, joint]
         level, size = _rms(residual), _rms(truth[:, joint][np.isfinite(residual)])
         unit = units[joint].torque
@@ -62,9 +68,10 @@ def torque_picture(
             Panel(
                 title=titles[joint],
                 x_label="time [s]",
-                y_label=f"[{unit}]",
+                y_label=f"{units[joint].effort} [{unit}]",
+                note=f"{percent(left, 2)} not predicted" if (left := float(gaps[:, joint].mean())) else "",
                 series=(
-                    Series(x=times, y=truth[:, joint], name="measured", role="measured"),
+                    *measured_line(times, truth[:, joint]),
                     Series(
                         x=times,
                         y=model[:, joint],
@@ -78,12 +85,10 @@ def torque_picture(
             Panel(
                 title=f"{titles[joint]} residual: {significant(level, digits=3)} {unit} RMS{share}",
                 x_label="time [s]",
-                y_label=f"[{unit}]",
-                series=(Series(x=times, y=residual, name="residual", role="residual"),),
+                y_label=f"residual [{unit}]",
+                series=(*_band_of(times, width), Series(x=times, y=residual, name="residual", role="residual")),
                 lines=(Line(value=0.0, role="neutral", dash="solid"),),
-                bands=()
-                if width is None
-                else (Band(low=-float(width.mean()), high=float(width.mean()), label="95 % band", role="predicted"),),
+                note="" if np.isfinite(residual).any() else "no measured torque to compare with",
             ),
         ]
     return Picture(
@@ -93,9 +98,31 @@ def torque_picture(
         columns=2,
         shared_x=True,
         panel_height=150,
-        caption="Left: measured and predicted torque. Right: measured minus predicted, on its own scale."
-        + ("" if widths is None else " The band is to contain 95 % of the errors."),
+        caption="Measured and predicted torque, and measured minus predicted on its own scale. Lines end at pauses."
+        + ("" if widths is None else " The band is to contain 95 % of the errors.")
+        + (f" The predicted line has gaps {why_gaps}." if gaps.any() and why_gaps else ""),
     )
+
+
+def measured_line(t: FloatArray, values: FloatArray) -> tuple[Series, ...]:
+    """Draws a measured signal, if there is one.
+
+    Args:
+        t: times [s], (N,).
+        values: (N,); all NaN where nothing was measured.
+    """
+    return (Series(x=t, y=values, name="measured", role="measured"),) if np.isfinite(values).any() else ()
+
+
+def _band_of(t: FloatArray, width: FloatArray | None) -> tuple[Series, ...]:
+    if width is None:
+        return ()
+    # Where it keeps its width, its corners are enough.
+    same = np.concatenate([[False], (np.diff(width) == 0.0) | (np.isnan(width[1:]) & np.isnan(width[:-1]))])
+    corners = ~(same & np.concatenate([same[1:], [False]]))
+    t, width = t[corners], width[corners]
+    middle = np.where(np.isfinite(width), 0.0, np.nan)
+    return (Series(x=t, y=middle, error=width, name="95 % band", role="predicted", opacity=0.0),)
 
 
 def residual_picture(
@@ -189,7 +216,9 @@ def _histogram(errors: FloatArray, title: str, unit: str, role: str) -> Panel:
     if deviation > 0.0:
         bell = np.exp(-0.5 * ((middle - known.mean()) / deviation) ** 2) / (deviation * np.sqrt(2.0 * np.pi))
         series.append(Series(x=middle, y=bell, name="normal distribution", role="neutral"))
-    return Panel(title=f"{title} spread", x_label=f"residual [{unit}]", y_label="density", series=tuple(series))
+    return Panel(
+        title=f"{title} spread", x_label=f"residual [{unit}]", y_label=f"density [1/({unit})]", series=tuple(series)
+    )
 
 
 def _memory(errors: FloatArray, title: str, period: float, role: str) -> Panel:
@@ -200,7 +229,7 @@ def _memory(errors: FloatArray, title: str, period: float, role: str) -> Panel:
     return Panel(
         title=f"{title} memory",
         x_label="lag [s]",
-        y_label="autocorrelation",
+        y_label="autocorrelation [1]",
         series=(Series(x=times, y=correlation, role=role),),
         bands=(Band(low=-bound, high=bound, label="white noise, 95 %"),),
         y_range=(min(-0.3, 1.1 * float(np.nanmin(correlation))) if np.isfinite(correlation).any() else -0.3, 1.05),

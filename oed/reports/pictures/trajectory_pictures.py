@@ -80,7 +80,7 @@ def trajectory_picture(
                 Panel(
                     title=f"{titles[joint]} {quantity}",
                     x_label="time [s]",
-                    y_label=f"[{getattr(units[joint], quantity)}]",
+                    y_label=f"{quantity} [{getattr(units[joint], quantity)}]",
                     series=(Series(x=times, y=values, role=joint_role(joint + 1)),),
                     lines=visible,
                     spans=spans,
@@ -141,7 +141,7 @@ def spectrum_picture(parts: Mapping[str, ArrayLike], *, name: str = "spectrum") 
     dots = [Series(x=item.x, y=item.y, name=item.name, kind="markers", role=item.role) for item in series]
     panel = Panel(
         x_label="direction, strongest first",
-        y_label="singular value of the regressor",
+        y_label="singular value of the regressor [SI]",
         series=(*series, *dots),
         y_log=True,
     )

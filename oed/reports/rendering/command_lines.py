@@ -28,10 +28,17 @@ def completed_by(words: Sequence[str]) -> Iterator[None]:
         _ADDED.reset(token)
 
 
-def command_line() -> str:
-    """Writes the command line that was typed, completed by the options of the configuration file."""
-    words, added = [Path(sys.argv[0]).name, *sys.argv[1:]], _ADDED.get()
-    return shlex.join([*_without_config(words), *added, "--config", "none"] if added else words)
+def command_words() -> list[str]:
+    """Gives the words of the command line that was typed, completed by the options of the configuration file."""
+    program = Path(sys.argv[0]).name
+    # ``python -m oed`` runs a file of this name.
+    words, added = ["oed" if program == "__main__.py" else program, *sys.argv[1:]], _ADDED.get()
+    return [*_without_config(words), *added, "--config", "none"] if added else words
+
+
+def written(words: Sequence[str]) -> str:
+    """Writes a command line so that a shell reads these words."""
+    return shlex.join(words)
 
 
 def _without_config(words: Sequence[str]) -> Iterator[str]:

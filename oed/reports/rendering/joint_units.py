@@ -27,6 +27,11 @@ class JointUnits:
     torque: str
 
     @property
+    def effort(self) -> str:
+        """What a drive exerts: torque, or force."""
+        return "force" if self.torque == "N" else "torque"
+
+    @property
     def velocity(self) -> str:
         """Unit of the velocity."""
         return f"{self.position}/s"

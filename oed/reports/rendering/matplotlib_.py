@@ -142,7 +142,11 @@ def _curve(axes: Axes, series: Series) -> None:
         return
     if series.error is not None:
         low, high = series.y - series.error, series.y + series.error
-        axes.fill_between(series.x, low, high, color=colour(series.role), alpha=0.2, linewidth=0)
+        # A ribbon without a line of its own has the name.
+        ribbon = None if series.opacity else series.name or None
+        axes.fill_between(series.x, low, high, color=colour(series.role), alpha=0.2, linewidth=0, label=ribbon)
+        if not series.opacity:
+            return
     drawstyle = "steps-post" if series.kind == "steps" else "default"
     axes.plot(series.x, series.y, linestyle=STROKES[series.dash], linewidth=1.0, drawstyle=drawstyle, **style)
 

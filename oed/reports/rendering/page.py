@@ -1,39 +1,32 @@
-"""A report as one HTML file that needs nothing but a browser: no network, no other file."""
+"""What a report says, free of its form: verdict, findings, key figures, sections and origin."""
 
 from __future__ import annotations
 
-import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable
 from dataclasses import dataclass, field
-from functools import lru_cache
-from pathlib import Path
-from typing import Any, Literal
+from typing import Literal
 
-from markupsafe import Markup
-
-from oed.reports.rendering.palette import INK
 from oed.reports.rendering.picture import Picture
-from oed.reports.rendering.plotly_ import to_plotly
-from oed.reports.rendering.significant import significant
+from oed.reports.rendering.provenance import Footer, Recording
+from oed.reports.rendering.severity import LEVELS, Level, severity
 from robots.common.errors import InputError
 
-Status = Literal["good", "warning", "bad", "neutral"]
+Status = Literal["good", "note", "act", "neutral"]
 Cell = str | int | float | bool | None
 
-STATUSES = ("good", "warning", "bad", "neutral")
+STATUSES = ("good", "note", "act", "neutral")
 ALIGNMENTS = ("left", "right", "center")
-TEMPLATES = Path(__file__).parent / "templates"
 
 
 @dataclass(frozen=True, kw_only=True)
 class Fact:
-    """A number that an engineer looks for first.
+    """A key figure.
 
     Args:
         label: what it is.
         value: the number with its unit, as text or as a number that is rounded to four digits.
         note: what to compare it with, or where it comes from.
-        status: good, neutral, warning or bad.
+        status: good, note, act or neutral.
     """
 
     label: str
@@ -43,6 +36,34 @@ class Fact:
 
     def __post_init__(self) -> None:
         _check("status", self.status, STATUSES)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Finding:
+    """One row of the first screen.
+
+    Args:
+        code: a key of `severity.LEVELS`, which decides how urgent it is.
+        text: what was found, in a sentence.
+        subject: joint, log or part that it is about; empty for the whole.
+        action: what to do; empty where there is nothing to do.
+
+    Raises:
+        InputError: an unknown code.
+    """
+
+    code: str
+    text: str
+    subject: str = ""
+    action: str = ""
+
+    def __post_init__(self) -> None:
+        severity([self.code])
+
+    @property
+    def level(self) -> Level:
+        """How urgent it is."""
+        return LEVELS[self.code]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -79,7 +100,7 @@ class Table:
 
     def _natural_alignment(self, index: int) -> str:
         cells = [row[index] for row in self.rows if row[index] is not None]
-        return "right" if cells and all(_is_number(cell) for cell in cells) else "left"
+        return "right" if cells and all(is_number(cell) for cell in cells) else "left"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -102,31 +123,16 @@ class Section:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Footer:
-    """Where a page comes from.
-
-    Args:
-        tool: name and version of the tool.
-        date: when the result was computed.
-        command: the command that gives it again.
-    """
-
-    tool: str = ""
-    date: str = ""
-    command: str = ""
-
-
-@dataclass(frozen=True, kw_only=True)
 class Page:
     """A report.
 
     Args:
         title: what it is about.
-        verdict: the answer, in one sentence.
-        subtitle: robot, file or experiment.
-        status: whether the verdict is good news.
-        facts: the numbers that support it, for the first screen.
-        warnings: limitations of the result.
+        verdict: the answer in one sentence that a person can act on.
+        robot: its name; empty for several robots.
+        logs: recordings that the result rests on.
+        findings: everything that a reader must know, each as one row; the most urgent is shown first.
+        facts: the experts' key figures.
         sections: the rest.
         footer: where the page comes from.
 
@@ -136,102 +142,51 @@ class Page:
 
     title: str
     verdict: str
-    subtitle: str = ""
-    status: Status = "neutral"
+    robot: str = ""
+    logs: tuple[Recording, ...] = ()
+    findings: tuple[Finding, ...] = ()
     facts: tuple[Fact, ...] = ()
-    warnings: tuple[str, ...] = ()
     sections: tuple[Section, ...] = ()
     footer: Footer = field(default_factory=Footer)
 
     def __post_init__(self) -> None:
-        _check("status", self.status, STATUSES)
+        order = {"act": 0, "note": 1, "good": 2}
+        object.__setattr__(self, "findings", tuple(sorted(self.findings, key=lambda item: order[item.level])))
         names = [picture.name for picture in self.pictures]
         for name in names:
             if names.count(name) > 1:
                 raise InputError(f"two pictures named {name!r} in one page", allowed="names that differ")
 
     @property
+    def level(self) -> Level:
+        """How urgent the page is: as its most urgent finding."""
+        return severity(finding.code for finding in self.findings)
+
+    @property
     def pictures(self) -> tuple[Picture, ...]:
         """All pictures, in order."""
         return tuple(picture for section in self.sections for picture in section.pictures)
 
-
-def render(page: Page, *, template: str = "page.html.j2", context: Mapping[str, Any] | None = None) -> str:
-    """Writes a page as one HTML file; texts are escaped, and plotly is inside if there are pictures.
-
-    Args:
-        page: the content.
-        template: a template of this package that extends ``base.html.j2``.
-        context: more names for that template.
-
-    Returns:
-        The text of the file.
-    """
-    from jinja2 import Environment, FileSystemLoader, StrictUndefined
-
-    environment = Environment(
-        loader=FileSystemLoader(TEMPLATES),
-        autoescape=True,
-        undefined=StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
-    )
-    environment.filters |= {"cell": format_cell, "is_number": _is_number}
-    return environment.get_template(template).render(
-        page=page,
-        anchors=_anchors([section.title for section in page.sections]),
-        figures={picture.name: _figure_json(picture) for picture in page.pictures},
-        ink=INK,
-        plotly=_plotly_script() if page.pictures else Markup(""),
-        **(context or {}),
-    )
+    @property
+    def dates(self) -> tuple[str, ...]:
+        """When the logs were recorded, each date once; empty where no clock has a date."""
+        return tuple(dict.fromkeys(log.date for log in self.logs if log.date))
 
 
-def format_cell(value: Cell) -> str:
-    """Writes a cell: numbers with four digits, booleans as yes and no, None as a dash.
+def findings_of(code: str, texts: Iterable[str]) -> tuple[Finding, ...]:
+    """Makes one finding of each text.
 
     Args:
-        value: what the cell holds.
+        code: a key of `severity.LEVELS`, of all of them.
+        texts: what was found, each in a sentence or two.
     """
-    if value is None:
-        return "–"
-    if isinstance(value, bool):
-        return "yes" if value else "no"
-    if isinstance(value, str) or hasattr(value, "__index__"):
-        return str(value)
-    return significant(float(value))
+    return tuple(Finding(code=code, text=text) for text in texts)
 
 
-def _is_number(value: object) -> bool:
+def is_number(value: object) -> bool:
+    """Says whether a cell holds a number, of Python or of numpy."""
     # Numbers of numpy are numbers too; numpy.float64 is a float, numpy.int64 no int.
     return hasattr(value, "__float__") and not isinstance(value, bool | str)
-
-
-def _anchors(titles: Sequence[str]) -> list[str]:
-    """Gives each section an identifier that is free of spaces and used once."""
-    anchors: list[str] = []
-    for title in titles:
-        stem = "section-" + (re.sub(r"[^a-z0-9]+", "-", title.lower()).strip("-") or "untitled")
-        anchor, number = stem, 2
-        while anchor in anchors:
-            anchor, number = f"{stem}-{number}", number + 1
-        anchors.append(anchor)
-    return anchors
-
-
-def _figure_json(picture: Picture) -> Markup:
-    # "<" cannot end the script element once it is written as an escape of JSON.
-    return Markup(to_plotly(picture).to_json().replace("<", "\\u003c"))
-
-
-@lru_cache(maxsize=1)
-def _plotly_script() -> Markup:
-    """The whole of plotly.js, without an address that a reader or a scanner could take for a link."""
-    from plotly.offline import get_plotlyjs
-
-    # An escaped slash is a slash to JavaScript, in strings of every kind.
-    text = get_plotlyjs().replace("http://", "http:\\/\\/").replace("https://", "https:\\/\\/")
-    return Markup(text.replace("</script", "<\\/script").replace("<!--", "<\\!--"))
 
 
 def _check(name: str, value: str, allowed: tuple[str, ...]) -> None:

@@ -8,7 +8,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import ArrayLike
 
-from oed.reports.rendering.palette import colour
+from oed.reports.rendering.palette import colour, translucent
 from robots.common.errors import InputError
 from robots.signals import FloatArray
 
@@ -31,7 +31,7 @@ class Series:
         error: half widths, (N,), or None: error bars of markers and bars, a ribbon around lines.
         role: the role that gives its colour.
         dash: the stroke of a line.
-        opacity: from 0 to 1.
+        opacity: from 0 to 1; 0 draws only the ribbon of a line with errors.
         texts: a text per point for hovering, (N,) or empty.
 
     Raises:
@@ -224,6 +224,47 @@ class Picture:
             index: the panel, counted from 0.
         """
         return index + self.columns >= len(self.panels)
+
+
+@dataclass(frozen=True, kw_only=True)
+class LegendEntry:
+    """One name of a picture's legend.
+
+    Attributes:
+        name: what is drawn so.
+        colour: as ``#RRGGBB`` or ``rgba()``.
+        shape: lines, steps, markers, bars, or area.
+        dash: of a line.
+    """
+
+    name: str
+    colour: str
+    shape: str
+    dash: str = "solid"
+
+
+def legend_entries(picture: Picture) -> tuple[LegendEntry, ...]:
+    """Lists each name of a picture once, as it is drawn first.
+
+    Args:
+        picture: with named series, stripes or bands.
+    """
+    entries: dict[str, LegendEntry] = {}
+    for panel in picture.panels:
+        for series in panel.series:
+            entry = LegendEntry(
+                name=series.name,
+                colour=colour(series.role) if series.opacity else translucent(series.role, 0.4),
+                shape=series.kind if series.opacity else "area",
+                dash=series.dash,
+            )
+            entries.setdefault(series.name, entry)
+        stripes: list[Span | Band] = [*panel.spans, *panel.bands]
+        for stripe in stripes:
+            entry = LegendEntry(name=stripe.label, colour=translucent(stripe.role, 0.4), shape="area")
+            entries.setdefault(stripe.label, entry)
+    entries.pop("", None)
+    return tuple(entries.values())
 
 
 def _vector(name: str, value: ArrayLike) -> FloatArray:

@@ -1,4 +1,4 @@
-"""Pictures as plotly figures, for pages."""
+"""Pictures as plotly figures, for notebooks and pages."""
 
 from __future__ import annotations
 
@@ -40,17 +40,19 @@ def to_plotly(picture: Picture, *, points: int = POINTS) -> Figure:
     from plotly.graph_objects import Figure
     from plotly.subplots import make_subplots
 
-    height, gap = _height(picture)
+    height, gap = height_of(picture)
     figure: Any = make_subplots(
         rows=picture.rows,
         cols=picture.columns,
         subplot_titles=[_escape(panel.title) for panel in picture.panels],
+        specs=_cells(picture),
         vertical_spacing=min(gap / height, 0.9 / max(picture.rows - 1, 1)) if picture.rows > 1 else 0.0,
         horizontal_spacing=0.2 / picture.columns if picture.columns > 1 else 0.0,
         figure=Figure(layout={"template": "none"}),
     )
-    for annotation in figure.layout.annotations:
-        annotation.update(font={"size": 13, "color": INK}, x=annotation.x, yshift=2)
+    titled = [index for index, panel in enumerate(picture.panels) if panel.title]
+    for index, annotation in zip(titled, figure.layout.annotations, strict=True):
+        annotation.update(font={"size": 13, "color": INK}, x=annotation.x, yshift=2, name=f"title-{index}")
     named: set[str] = set()
     # Handed over all at once: plotly copies and checks everything that is there with each single one.
     shapes: list[dict[str, Any]] = []
@@ -81,7 +83,21 @@ def to_plotly(picture: Picture, *, points: int = POINTS) -> Figure:
     return figure
 
 
-def _height(picture: Picture) -> tuple[int, int]:
+def _cells(picture: Picture) -> list[list[dict[str, Any] | None]]:
+    """Panels as cells of a grid; those after the last panel have no axes."""
+    count = len(picture.panels)
+    return [
+        [{} if row * picture.columns + column < count else None for column in range(picture.columns)]
+        for row in range(picture.rows)
+    ]
+
+
+def height_of(picture: Picture) -> tuple[int, int]:
+    """Gives the height of a picture and the gap between its rows [px].
+
+    Args:
+        picture: with its rows and the length of its names.
+    """
     gap = ROW_GAP + (0 if picture.shared_x else AXIS_GAP)
     longest = max((len(name) for panel in picture.panels for name in panel.categories), default=0)
     gap += min(5 * max(longest - 6, 0), 80)
@@ -98,7 +114,9 @@ def _traces(series: Series, panel: Panel, points: int, named: set[str]) -> list[
         texts = [_escape(panel.categories[round(value)]) for value in series.x[chosen]]
     if texts is not None:
         trace |= {"hovertext": texts, "hovertemplate": "%{hovertext}<br>%{y:.4g}"}
-    if series.name:
+    if not series.opacity:
+        trace["hoverinfo"] = "skip"
+    elif series.name:
         hover = trace.get("hovertemplate", "%{x:.5g}, %{y:.5g}")
         trace["hovertemplate"] = f"{hover}<extra>{_escape(series.name)}</extra>"
     ink = colour(series.role)
@@ -114,7 +132,10 @@ def _traces(series: Series, panel: Panel, points: int, named: set[str]) -> list[
         return [trace | ({} if error is None else {"error_y": bars})]
     stroke = {"color": ink, "width": 1.4, "dash": series.dash, "shape": "hv" if series.kind == "steps" else "linear"}
     trace |= {"mode": "lines", "line": stroke}
-    return [trace] if error is None else [_ribbon(x, y, error, series), trace]
+    if error is None:
+        return [trace]
+    # The half widths are drawn by the ribbon; the line keeps them for the table of data.
+    return [_ribbon(x, y, error, series), trace | {"error_y": {"type": "data", "array": error, "visible": False}}]
 
 
 def _slot(series: Series, panel: Panel) -> tuple[float, float]:
@@ -126,11 +147,20 @@ def _slot(series: Series, panel: Panel) -> tuple[float, float]:
 
 def _ribbon(x: FloatArray, y: FloatArray, error: FloatArray, series: Series) -> dict[str, Any]:
     known = np.isfinite(y) & np.isfinite(error)
-    x, y, error = x[known], y[known], error[known]
+    starts = np.flatnonzero(known & ~np.concatenate([[False], known[:-1]]))
+    ends = np.flatnonzero(known & ~np.concatenate([known[1:], [False]])) + 1
+    edge_x: list[FloatArray] = []
+    edge_y: list[FloatArray] = []
+    gap = np.array([np.nan])
+    # One closed outline for each stretch without a gap.
+    for start, end in zip(starts, ends, strict=True):
+        part = slice(start, end)
+        edge_x += [x[part], x[part][::-1], gap]
+        edge_y += [(y - error)[part], (y + error)[part][::-1], gap]
     return {
         "type": "scatter",
-        "x": np.concatenate([x, x[::-1]]),
-        "y": np.concatenate([y - error, (y + error)[::-1]]),
+        "x": np.concatenate(edge_x, dtype=np.float32) if edge_x else [],
+        "y": np.concatenate(edge_y, dtype=np.float32) if edge_y else [],
         "fill": "toself",
         "fillcolor": translucent(series.role, 0.2),
         "line": {"width": 0},
@@ -183,7 +213,7 @@ def _decorate(
                     "x": 1.0,
                     "y": np.log10(line.value) if panel.y_log else line.value,
                     "text": _escape(line.label),
-                    "font": {"size": LABEL_SIZE, "color": colour(line.role)},
+                    "font": {"size": LABEL_SIZE, "color": INK},
                     "showarrow": False,
                     "xanchor": "right",
                     "yanchor": "bottom" if _labels_above(line.value, panel) else "top",

@@ -2,13 +2,10 @@
 
 from __future__ import annotations
 
-from datetime import UTC, datetime
-
-from oed.reports.rendering.command_lines import command_line
+from oed.reports.rendering.html import render
 from oed.reports.rendering.matplotlib_ import save_png
-from oed.reports.rendering.page import Footer, Page, render
+from oed.reports.rendering.page import Page
 from robots.common.files import ResultFolder, write_atomic
-from robots.version import VERSION
 
 REPORT = "report.html"
 
@@ -19,8 +16,3 @@ def save_page(page: Page, folder: ResultFolder, *, png: bool = False) -> None:
     if png:
         for picture in page.pictures:
             save_png(picture, folder.path(f"{picture.name}.png"))
-
-
-def footer() -> Footer:
-    """Says which tool made the page, when, and by which command."""
-    return Footer(tool=f"robot-oed {VERSION}", date=f"{datetime.now(UTC):%Y-%m-%d %H:%M} UTC", command=command_line())

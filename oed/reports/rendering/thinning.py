@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-POINTS = 1600
+POINTS = 1200
 """Points per series in a page: more than a panel has pixels across."""
 
 

@@ -8,7 +8,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from robots.robot import Robot
-from robots.terms.discrepancies.base_compliance import BaseCompliance
 from robots.terms.discrepancies.clock_drift import ClockDrift
 from robots.terms.discrepancies.end_stop import EndStop
 from robots.terms.discrepancies.families import FAMILIES
@@ -40,7 +39,6 @@ SWAYING = ("vibration", "sway")
 WHOLE: tuple[Effect, ...] = (
     FlangeOscillator(),
     FlangeSpring(),
-    BaseCompliance(),
     GainDrift(),
     PayloadDrift(),
     ClockDrift(),

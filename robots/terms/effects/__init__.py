@@ -11,6 +11,7 @@ from robots.terms.effect_bases.experiments import EXPERIMENTS
 from robots.terms.effect_bases.static import StaticEffect, StaticJointEffect
 from robots.terms.effects.asymmetric_friction import AsymmetricFriction
 from robots.terms.effects.backlash import Backlash
+from robots.terms.effects.base_compliance import BaseCompliance
 from robots.terms.effects.base_tilt import BaseTilt
 from robots.terms.effects.current_clipping import CurrentClipping
 from robots.terms.effects.current_lag import CurrentLag
@@ -52,6 +53,7 @@ _ALL: tuple[Effect, ...] = (
     TorqueRipple(),
     Backlash(),
     JointElasticity(),
+    BaseCompliance(),
     JointCoupling(),
     Spring(),
     TorqueConstantError(),

@@ -54,7 +54,7 @@ class JointElasticity(Effect):
         ROTOR,
         Shape("damping_ratio", "", 1e-3, 0.5, "log", (DAMPING,), default=DAMPING, beside=True),
     )
-    rivals: ClassVar[tuple[str, ...]] = ("backlash", "time_delay", "current_lag", "encoder_offset")
+    rivals: ClassVar[tuple[str, ...]] = ("backlash", "base_compliance", "time_delay", "current_lag", "encoder_offset")
     experiments: ClassVar[tuple[str, ...]] = ("multisine", "payload")
 
     def parameters(self, robot: Robot, joint: Place) -> tuple[Coefficient, ...]:

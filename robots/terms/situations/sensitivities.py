@@ -62,7 +62,25 @@ def _evaluator(chain: Chain, kind: str) -> BatchFunction:
 def rigid_torque(
     chain: Chain, q: casadi.SX, dq: casadi.SX, ddq: casadi.SX, bodies: list[casadi.SX], gravity: casadi.SX
 ) -> casadi.SX:
-    """Builds the Newton-Euler torque (n, k) of bodies with k sets of inertial parameters.
+    """Builds the Newton-Euler torque (n, k) of bodies with k sets of inertial parameters, on a base at rest.
+
+    The arguments are those of `_rigid_torque_and_moment`.
+    """
+    still = casadi.SX(3, 1)
+    return _rigid_torque_and_moment(chain, q, dq, ddq, bodies, gravity, still, still)[0]
+
+
+def _rigid_torque_and_moment(
+    chain: Chain,
+    q: casadi.SX,
+    dq: casadi.SX,
+    ddq: casadi.SX,
+    bodies: list[casadi.SX],
+    gravity: casadi.SX,
+    omega: casadi.SX,
+    alpha: casadi.SX,
+) -> tuple[casadi.SX, casadi.SX]:
+    """Builds the Newton-Euler torque (n, k) and the base's moment on the robot (3, k), on a base that rotates.
 
     Args:
         chain: the chain of n joints.
@@ -71,12 +89,14 @@ def rigid_torque(
         ddq: accelerations (n,).
         bodies: per link, inertial parameters (10, k) about its frame; an empty matrix for none.
         gravity: gravity in the base frame (3,) [m/s2].
+        omega: angular velocity of the base about its origin (3,) [rad/s].
+        alpha: its angular acceleration (3,) [rad/s2].
     """
     from robots.terms.rigid_body import _parameter_map
 
     axes = [casadi.SX(cleaned(joint.axis)) for joint in chain.joints]
     placements = [symbolic_placement(joint, q[i]) for i, joint in enumerate(chain.joints)]
-    omega, alpha, acceleration = casadi.SX(3, 1), casadi.SX(3, 1), -gravity
+    acceleration = -gravity
     wrenches = []
     for i, joint in enumerate(chain.joints):
         rotation, offset = placements[i]
@@ -99,7 +119,7 @@ def rigid_torque(
         rotation, offset = placements[i]
         force = rotation @ total[:3, :]
         total = casadi.vertcat(force, rotation @ total[3:, :] + casadi.skew(offset) @ force)
-    return torque
+    return torque, total[3:, :]
 
 
 def _torque(chain: Chain, q: casadi.SX, dq: casadi.SX, ddq: casadi.SX, pi: casadi.SX, gravity: casadi.SX) -> casadi.SX:
@@ -178,6 +198,40 @@ def _moment(chain: Chain, q: casadi.SX, dq: casadi.SX, ddq: casadi.SX, pi: casad
     return total
 
 
+def _on_base(
+    chain: Chain, q: casadi.SX, dq: casadi.SX, ddq: casadi.SX, pi: casadi.SX, omega: casadi.SX, alpha: casadi.SX
+) -> tuple[casadi.SX, casadi.SX]:
+    bodies = [pi[10 * i : 10 * i + 10] for i in range(chain.n)]
+    return _rigid_torque_and_moment(chain, q, dq, ddq, bodies, casadi.SX(chain.gravity), omega, alpha)
+
+
+def _base_rate(chain: Chain, q: casadi.SX, dq: casadi.SX, ddq: casadi.SX, pi: casadi.SX) -> casadi.SX:
+    omega, still = casadi.SX.sym("omega", 3), casadi.SX.zeros(3)
+    torque, _ = _on_base(chain, q, dq, ddq, pi, omega, still)
+    return casadi.substitute(casadi.jacobian(torque, omega), omega, still)
+
+
+def _base_acceleration(chain: Chain, q: casadi.SX, dq: casadi.SX, ddq: casadi.SX, pi: casadi.SX) -> casadi.SX:
+    alpha = casadi.SX.sym("alpha", 3)
+    return casadi.jacobian(_on_base(chain, q, dq, ddq, pi, casadi.SX(3, 1), alpha)[0], alpha)
+
+
+def _base_moment(chain: Chain, q: casadi.SX, dq: casadi.SX, ddq: casadi.SX, pi: casadi.SX) -> casadi.SX:
+    still = casadi.SX(3, 1)
+    return _on_base(chain, q, dq, ddq, pi, still, still)[1]
+
+
+def _base_inertia(chain: Chain, q: casadi.SX, dq: casadi.SX, ddq: casadi.SX, pi: casadi.SX) -> casadi.SX:
+    alpha = casadi.SX.sym("alpha", 3)
+    return casadi.jacobian(_on_base(chain, q, dq, ddq, pi, casadi.SX(3, 1), alpha)[1], alpha)
+
+
+def _base_damping(chain: Chain, q: casadi.SX, dq: casadi.SX, ddq: casadi.SX, pi: casadi.SX) -> casadi.SX:
+    omega, still = casadi.SX.sym("omega", 3), casadi.SX.zeros(3)
+    _, moment = _on_base(chain, q, dq, ddq, pi, omega, still)
+    return casadi.substitute(casadi.jacobian(moment, omega), omega, still)
+
+
 def moved_body(tip: Array) -> Array:
     """Builds the map (10, 10) from inertial parameters in the flange's frame to those in the last link's frame."""
     columns = []
@@ -206,4 +260,9 @@ KINDS: dict[str, Callable[..., casadi.SX]] = {
     "flange": _flange,
     "moment": _moment,
     "links": _links,
+    "base_rate": _base_rate,
+    "base_acceleration": _base_acceleration,
+    "base_moment": _base_moment,
+    "base_inertia": _base_inertia,
+    "base_damping": _base_damping,
 }

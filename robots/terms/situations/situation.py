@@ -14,6 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 from robots.common.errors import InputError
 from robots.robot import Robot
 from robots.terms.base import Column
+from robots.terms.situations.derivatives import differentiate
 from robots.terms.situations.of_model import rotor_inertias, sign_of, velocity_scale
 from robots.terms.situations.sensitivities import evaluate
 
@@ -21,10 +22,6 @@ if TYPE_CHECKING:
     from robots.regressor import TorqueModel
 
 Array = NDArray[np.float64]
-
-ENDS = 6
-"""Rows at an end from which derivatives of second order in its first three rows follow."""
-
 Kept = TypeVar("Kept")
 
 
@@ -165,23 +162,7 @@ class Situation:
 
         It uses central differences of sixth order; near a log's ends and for uneven samples, of second order.
         """
-        first, second = np.zeros_like(values), np.zeros_like(values)
-        for run in self.runs:
-            t, x = self.t[run], values[run]
-            if len(t) < 3:
-                continue
-            steps = np.diff(t)
-            h = float(steps.mean())
-            even = len(t) > 2 * ENDS and np.abs(steps - h).max() < 1e-3 * h
-            for part in (slice(0, ENDS), slice(-ENDS, None)) if even else (slice(None),):
-                slope = np.gradient(x[part], t[part], axis=0)
-                first[run][part], second[run][part] = slope, np.gradient(slope, t[part], axis=0)
-            if even:
-                a, b, c = x[4:-2] - x[2:-4], x[5:-1] - x[1:-5], x[6:] - x[:-6]
-                first[run.start + 3 : run.stop - 3] = (45 * a - 9 * b + c) / (60 * h)
-                a, b, c = x[4:-2] + x[2:-4], x[5:-1] + x[1:-5], x[6:] + x[:-6]
-                second[run.start + 3 : run.stop - 3] = (270 * a - 27 * b + 2 * c - 490 * x[3:-3]) / (180 * h**2)
-        return first, second
+        return differentiate(self.t, values, self.runs)
 
     def sensitivity(self, kind: str) -> Array:
         """Evaluates a sensitivity of the base model's rigid-body torque, or a kinematic quantity; results are cached.
@@ -198,6 +179,11 @@ class Situation:
                 - ``flange``: position of the flange in the base frame [m] (N, 3, 1)
                 - ``moment``: first moment of the links' masses in the base frame [kg m] (N, 3, 1)
                 - ``links``: per link, rotation matrix (row by row) and origin [m] in the base frame (N, 12, n)
+                - ``base_rate``: d rigid/d(angular velocity of the base) (N, n, 3)
+                - ``base_acceleration``: d rigid/d(angular acceleration of the base) (N, n, 3)
+                - ``base_moment``: moment of the base on the robot about the base's origin (N, 3, 1)
+                - ``base_inertia``: d base_moment/d(angular acceleration of the base) (N, 3, 3)
+                - ``base_damping``: d base_moment/d(angular velocity of the base) (N, 3, 3)
         """
         if kind not in self._cache:
             parts = [part.sensitivity(kind) for part in self.parts]

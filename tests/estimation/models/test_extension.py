@@ -9,7 +9,6 @@ from estimation.models.extension import Extension, extension_torque, find_effect
 from robots.common.errors import InputError
 from robots.regressor import default_model
 from robots.robot import Robot
-from robots.terms.discrepancies.base_compliance import BaseCompliance
 from robots.terms.discrepancies.clock_drift import ClockDrift
 from robots.terms.discrepancies.flange_oscillator import FlangeOscillator
 from robots.terms.discrepancies.flange_spring import FlangeSpring
@@ -32,7 +31,7 @@ def state(arm: Robot) -> Situation:
 
 def test_every_pattern_is_read_from_its_name_and_has_as_many_columns_as_it_says(arm: Robot, state: Situation) -> None:
     """A pattern in a model file is the pattern that was found; all its values are finite."""
-    *own, swinging, pulling, leaning, fading, draining, parting, _, _, _ = all_patterns(arm)
+    *own, swinging, pulling, fading, draining, parting, _, _, _ = all_patterns(arm)
     for pattern in own:
         if isinstance(pattern, ZeroStep):
             # It acts on several joints.
@@ -53,14 +52,13 @@ def test_every_pattern_is_read_from_its_name_and_has_as_many_columns_as_it_says(
         # The flange is on the elbow's axis: it moves, but no force on it turns the elbow.
         assert X[:, 0].any(axis=0).all()
         assert not X[:, 1].any()
-    for effect, kind in ((pulling, FlangeSpring), (leaning, BaseCompliance)):
-        assert type(build_pattern(effect.name)) is type(effect) is kind
-        assert effect.joints(arm) == (None,)
-        assert effect.columns(state, None).shape == (300, 2, len(effect.parameters(arm, None)))
+    assert type(build_pattern(pulling.name)) is type(pulling) is FlangeSpring
+    assert pulling.joints(arm) == (None,)
+    assert pulling.columns(state, None).shape == (300, 2, len(pulling.parameters(arm, None)))
     assert type(build_pattern(fading.name)) is type(fading) is GainDrift
     assert type(build_pattern(draining.name)) is type(draining) is PayloadDrift
     assert type(build_pattern(parting.name)) is type(parting) is ClockDrift
-    for whole in (swinging, pulling, leaning):
+    for whole in (swinging, pulling):
         text = whole.describe(None, np.zeros(12), whole.grid(state, None)[0])
         assert text.startswith("The residual torque of all joints")
 

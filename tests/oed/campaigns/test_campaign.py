@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 import json
 import shutil
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -13,6 +14,7 @@ import pytest
 import oed
 from oed.campaigns import Campaign, Programme, friction_power
 from oed.experiments import Design
+from oed.reports import Page, campaign_page
 from robots.common.errors import InfeasibleError, InputError
 from robots.common.files import sha256
 from robots.robot import Robot
@@ -244,3 +246,9 @@ def test_bad_options_are_refused(two: Robot) -> None:
     with pytest.raises(InfeasibleError) as told:
         oed.campaign(stuck, programme=cooling)
     assert told.value.joint == 2
+
+
+@pytest.mark.slow
+def test_page_works_in_a_browser(small_campaign: Campaign, in_browser: Callable[[Page], None]) -> None:
+    """The page passes all checks of `browser_checks`."""
+    in_browser(campaign_page(small_campaign))

@@ -36,11 +36,19 @@ def test_prismatic_joints_are_in_metres(case: Any) -> None:
     """A prismatic joint is shown in m, m/s, m/s² and N, a revolute one in rad or, on request, in degrees."""
     m = case.motion
     picture = trajectory_picture(m.t, m.q, m.dq, m.ddq, kinds=["prismatic"] * case.n)
-    assert [panel.y_label for panel in picture.panels[:3]] == ["[m]", "[m/s]", "[m/s²]"]
+    assert [panel.y_label for panel in picture.panels[:3]] == [
+        "position [m]",
+        "velocity [m/s]",
+        "acceleration [m/s²]",
+    ]
     torque = torque_picture(m.t, case.measured, case.predicted, kinds=["prismatic"] * case.n)
-    assert torque.panels[0].y_label == "[N]"
+    assert torque.panels[0].y_label == "force [N]"
     turned = trajectory_picture(m.t, m.q, m.dq, m.ddq, degrees=True)
-    assert [panel.y_label for panel in turned.panels[:3]] == ["[°]", "[°/s]", "[°/s²]"]
+    assert [panel.y_label for panel in turned.panels[:3]] == [
+        "position [°]",
+        "velocity [°/s]",
+        "acceleration [°/s²]",
+    ]
     np.testing.assert_allclose(turned.panels[1].series[0].y, np.rad2deg(m.dq[:, 0]))
 
 
@@ -119,11 +127,40 @@ def test_torque_band_is_drawn_about_the_prediction() -> None:
     torque = np.zeros((3, 2))
     panels = torque_picture([0.0, 1.0, 2.0], torque, torque, band=[0.5, np.nan]).panels
     assert list(panels[0].series[1].error) == [0.5, 0.5, 0.5]
-    assert [(band.low, band.high) for band in panels[1].bands] == [(-0.5, 0.5)]
+    band = panels[1].series[0]
+    assert set(band.y) == {0.0}
+    assert set(band.error) == {0.5}
+    assert (band.x[0], band.x[-1]) == (0.0, 2.0)
     assert panels[2].series[1].error is None
-    assert panels[3].bands == ()
+    assert [series.name for series in panels[3].series] == ["residual"]
     with pytest.raises(InputError, match="band"):
         torque_picture([0.0, 1.0, 2.0], torque, torque, band=[0.5])
+
+
+def test_lines_and_bands_end_at_pauses() -> None:
+    """Between two logs, and where a clock goes back, neither line nor band is drawn."""
+    t = np.concatenate([0.01 * np.arange(100), 50.0 + 0.01 * np.arange(100), 0.01 * np.arange(100)])
+    torque = np.ones((300, 1))
+    measured, predicted = torque_picture(t, torque, torque, band=[0.5]).panels[0].series
+    for series in (measured, predicted):
+        assert list(np.flatnonzero(np.isnan(series.y))) == [100, 201]
+    ribbon = next(trace for trace in to_plotly(torque_picture(t, torque, torque, band=[0.5])).data if trace.fill)
+    assert np.count_nonzero(np.isnan(ribbon.y)) == 3  # each stretch is an outline of its own
+
+
+def test_rows_without_a_prediction_are_said() -> None:
+    """A predicted line that ends has its share in the panel and its reason in the caption."""
+    predicted = np.array([[1.0], [1.0], [np.nan], [np.nan]])
+    picture = torque_picture([0.0, 1.0, 2.0, 3.0], np.ones((4, 1)), predicted, why_gaps="in rows at rest")
+    assert picture.panels[0].note == "50 % not predicted"
+    assert "has gaps in rows at rest." in picture.caption
+
+
+def test_bars_that_would_flatten_the_others_are_stated() -> None:
+    """A rival with errors five times as large as all others stands in the caption; a near one is drawn."""
+    picture = error_bars_picture({"fit": [0.02]}, rivals={"constant": [0.9], "description": [0.06]})
+    assert [series.name for series in picture.panels[0].series] == ["fit", "description"]
+    assert "constant (90 to 90 %)" in picture.caption
 
 
 @pytest.mark.parametrize("gaps", [False, True])
@@ -151,7 +188,7 @@ def test_parameters_are_grouped_by_unit() -> None:
     """Each unit has a panel, bars carry 1.96 standard errors, and the hover text has the whole name."""
     name = "Ixx_2 - Iyy_2 + 0.432 mPx_3"
     picture = parameter_picture([name, "m_1", "Izz_1"], [1.0, 2.0, 3.0], [0.1, 0.2, np.nan], ["kg m²", "kg", "kg m²"])
-    assert [panel.y_label for panel in picture.panels] == ["[kg m²]", "[kg]"]
+    assert [panel.y_label for panel in picture.panels] == ["value [kg m²]", "value [kg]"]
     bars = picture.panels[0].series[0]
     np.testing.assert_allclose(bars.error, [0.196, 0.0])
     assert bars.texts[0] == f"{name}: 1.00 ± 0.10 kg m²"

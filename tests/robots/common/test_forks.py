@@ -10,7 +10,7 @@ import sys
 import numpy as np
 import pytest
 
-from robots.common import forks
+from robots.common import forks, parallel
 from robots.common.errors import InputError
 from robots.common.forks import forked
 
@@ -72,3 +72,10 @@ def test_threads_do_the_work_of_a_process_that_was_killed() -> None:
 def test_a_worker_process_does_not_fork(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(multiprocessing, "parent_process", lambda: object())
     assert set(forked(lambda k: os.getpid(), range(8))) == {os.getpid()}
+
+
+def test_workers_of_a_cluster_do_not_fork(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A process that is marked as one of several workers does the work itself, in threads."""
+    monkeypatch.setattr(parallel._marks, "worker", False)
+    parallel.mark_as_worker()
+    assert set(forked(lambda _: os.getpid(), range(4))) == {os.getpid()}

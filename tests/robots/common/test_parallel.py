@@ -12,7 +12,15 @@ import pytest
 
 from robots.common import parallel
 from robots.common.errors import InputError, OedError
-from robots.common.parallel import BLAS_VARIABLES, available_cores, parallel_map, single_blas_thread, threaded
+from robots.common.parallel import (
+    BLAS_VARIABLES,
+    as_finished,
+    available_cores,
+    parallel_map,
+    single_blas_thread,
+    threaded,
+)
+from tests.robots.common import cluster_jobs
 
 ROOT = Path(__file__).parents[3]
 
@@ -102,10 +110,41 @@ def test_exception_crosses_processes_as_itself(jobs):
 
 
 @pytest.mark.slow
-def test_death_of_a_worker_is_explained(jobs):
-    """A worker that ends abruptly is an error of ours that says what to do."""
-    with pytest.raises(OedError, match="__main__"):
+def test_death_of_workers_again_and_again_is_explained(jobs, monkeypatch):
+    """Workers that end abruptly whenever they begin an item are an error of ours that says what to do."""
+    monkeypatch.setattr(parallel, "MOST_LOSSES", 1)
+    with pytest.raises(OedError, match="2 times in a row; memory may have run out"):
         parallel_map(jobs.die, range(2), workers=2)
+
+
+@pytest.mark.slow
+def test_lost_items_are_done_again(tmp_path):
+    """A worker that ends abruptly once costs time only: all results are there, in order."""
+    tasks = [(tmp_path, number) for number in range(5)]
+    assert parallel_map(cluster_jobs.dies_once, tasks, workers=2) == [0, 1, 4, 9, 16]
+    assert (tmp_path / "died").exists()
+
+
+@pytest.mark.slow
+def test_script_without_a_main_guard(tmp_path):
+    """A script that starts its work when it is imported ends with one error that names the guard, without retries."""
+    script = tmp_path / "script.py"
+    script.write_text("from robots.common.parallel import parallel_map\nparallel_map(abs, [1, 2], workers=2)\n")
+    environment = {**os.environ, "PYTHONPATH": str(ROOT)}
+    done = subprocess.run([sys.executable, script], env=environment, capture_output=True, text=True, timeout=60)
+    assert done.returncode == 1
+    assert done.stderr.rstrip().splitlines()[-1].startswith("robots.common.errors.OedError: the worker processes ended")
+    assert "__main__" in done.stderr.splitlines()[-1]
+
+
+def test_results_come_as_they_are_finished():
+    """A finished item can be kept, with its number, while an earlier one runs."""
+    gate = threading.Event()
+    with ThreadPoolExecutor(2) as pool:
+        results = as_finished(lambda x: gate.wait(10) if x == 0 else x, [0, 1], executor=pool)
+        assert next(results) == (1, 1)
+        gate.set()
+        assert list(results) == [(0, True)]
 
 
 @pytest.mark.parametrize(("items", "workers"), [([3], None), ([3], 4), ([1, 2, 3], 1), ([], None)])

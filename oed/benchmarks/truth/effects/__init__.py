@@ -51,6 +51,7 @@ KNOWN: tuple[type[Effect], ...] = (
     Payload,
     Tilt,
     Contact,
+    LeaningBase,
 )
 STRANGERS: tuple[type[Effect], ...] = (
     CrossWave,
@@ -63,7 +64,6 @@ STRANGERS: tuple[type[Effect], ...] = (
     BorrowedFriction,
     DraggingBrake,
     BeltFriction,
-    LeaningBase,
     DeadZone,
     SlippedBase,
     SlippedZero,

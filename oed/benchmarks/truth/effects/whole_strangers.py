@@ -122,7 +122,7 @@ class LeaningBase(Effect):
 
     ratio: float = 1.0
 
-    name = "unexplained"
+    name = "base_compliance"
     largest = 1e-2
 
     @classmethod

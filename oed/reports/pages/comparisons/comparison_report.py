@@ -18,10 +18,12 @@ from oed.reports.pictures.comparison_pictures import (
     course_picture,
     friction_difference_picture,
     friction_runs_picture,
+    significance_picture,
 )
-from oed.reports.rendering.page import Cell, Fact, Page, Section, Status, Table
+from oed.reports.rendering.page import Cell, Fact, Finding, Page, Section, Table, findings_of
 from oed.reports.rendering.picture import Picture
-from oed.reports.rendering.saving import footer, save_page
+from oed.reports.rendering.provenance import Recording, footer
+from oed.reports.rendering.saving import save_page
 from oed.reports.rendering.significant import NORMAL_95
 from robots.common.files import ResultFolder
 
@@ -41,24 +43,23 @@ def comparison_page(comparison: ModelComparison) -> Page:
         comparison: the comparison.
     """
     damaged, last = comparison.damaged, len(comparison.runs) - 1
-    status: Status = "bad" if damaged else "warning" if comparison.significant else "good"
     parts = {item.name for item in comparison.significant if item.level == "part"}
     return Page(
         title="Comparison of models",
-        subtitle=comparison.robot_name,
+        robot=comparison.robot_name,
         verdict=comparison.verdict(),
-        status=status,
+        logs=tuple(Recording(name=run.label, start=run.date) for run in comparison.runs),
+        findings=_findings(comparison),
         facts=(
             Fact(label="Runs", value=len(comparison.runs), note=f"order: {comparison.order}"),
             Fact(label="Parts that differ", value=len(parts)),
             Fact(
                 label="Joints with a change of their own",
                 value=len({item.joint for item in damaged}),
-                status="bad" if damaged else "neutral",
+                status="act" if damaged else "neutral",
             ),
             Fact(label="Family-wise false-alarm rate", value=f"{100 * comparison.alpha:g} %", note="Holm"),
         ),
-        warnings=comparison.warnings,
         sections=(
             Section(title="Runs", tables=(runs_table(comparison),)),
             Section(
@@ -69,7 +70,13 @@ def comparison_page(comparison: ModelComparison) -> Page:
                     "family, p-values are adjusted by Holm's method, which needs no independence of the tests. The "
                     "prior that the models share makes differences rather too small: tests are conservative.",
                 ),
-                tables=(whole_table(comparison), parts_table(comparison), parameters_table(comparison)),
+                pictures=(parts_picture(comparison),),
+                tables=(whole_table(comparison),),
+            ),
+            Section(
+                title="Tests of each part and parameter",
+                tables=(parts_table(comparison), parameters_table(comparison)),
+                folded=True,
             ),
             *_friction(comparison, last),
             *_courses(comparison),
@@ -86,6 +93,42 @@ def comparison_page(comparison: ModelComparison) -> Page:
         ),
         footer=footer(),
     )
+
+
+def parts_picture(comparison: ModelComparison) -> Picture:
+    """Shows the smallest adjusted p-value over the runs of each part of each joint.
+
+    Args:
+        comparison: the comparison.
+    """
+    smallest: dict[str, dict[int, float]] = {}
+    for item in comparison.differences:
+        if item.level == "part" and item.joint is not None:
+            row = smallest.setdefault(item.name.partition(" of joint ")[0], {})
+            row[item.joint] = min(row.get(item.joint, 1.0), item.adjusted)
+    return significance_picture(smallest, comparison.alpha, joint_names=comparison.runs[0].model.robot.joint_names)
+
+
+def _findings(comparison: ModelComparison) -> tuple[Finding, ...]:
+    found = [
+        Finding(
+            code="difference.joint",
+            subject=f"{comparison.labels[item.run]}:",
+            text=item.sentence(),
+        )
+        for item in comparison.damaged
+    ]
+    runs: dict[str, list[str]] = {}
+    for part in comparison.significant:
+        if part.level == "part" and part.run is not None:
+            runs.setdefault(part.name, []).append(comparison.labels[part.run])
+    found += [
+        Finding(
+            code="difference", subject=f"{name}:", text=f"differs from {comparison.labels[0]} in {', '.join(those)}."
+        )
+        for name, those in runs.items()
+    ]
+    return (*found, *findings_of("comparison.note", comparison.warnings))
 
 
 def _friction(comparison: ModelComparison, last: int) -> tuple[Section, ...]:
@@ -144,7 +187,11 @@ def _friction(comparison: ModelComparison, last: int) -> tuple[Section, ...]:
                     joint_names=robot.joint_names,
                 ),
             ),
-            tables=(Table(headings=headings, rows=tuple(rows), caption="Change of friction, run by run."),),
+        ),
+        Section(
+            title="Change of friction, run by run",
+            tables=(Table(headings=headings, rows=tuple(rows)),),
+            folded=True,
         ),
     )
 

@@ -6,14 +6,20 @@ import numpy as np
 
 from estimation.external_forces import ForceEstimate
 from oed.reports.pictures.force_pictures import external_torque_picture, load_picture, statistic_picture
-from oed.reports.rendering.page import Cell, Fact, Page, Section, Table
-from oed.reports.rendering.saving import footer, save_page
+from oed.reports.rendering.page import Cell, Fact, Finding, Page, Section, Table, findings_of
+from oed.reports.rendering.provenance import Recording, footer
+from oed.reports.rendering.saving import save_page
 from robots.common.files import ResultFolder
 from robots.common.plain import finite
 
 
 def save_force_report(
-    forces: ForceEstimate, folder: ResultFolder, *, kinds: tuple[str, ...], png: bool = False
+    forces: ForceEstimate,
+    folder: ResultFolder,
+    *,
+    kinds: tuple[str, ...],
+    logs: tuple[Recording, ...] = (),
+    png: bool = False,
 ) -> None:
     """Writes the page of external forces, and its pictures as PNG on request.
 
@@ -21,39 +27,43 @@ def save_force_report(
         forces: the result.
         folder: for the files.
         kinds: "revolute" or "prismatic" of each joint (n,).
+        logs: the recording.
         png: whether to write the pictures as PNG too.
     """
-    save_page(force_page(forces, kinds), folder, png=png)
+    save_page(force_page(forces, kinds, logs), folder, png=png)
 
 
-def force_page(forces: ForceEstimate, kinds: tuple[str, ...]) -> Page:
+def force_page(forces: ForceEstimate, kinds: tuple[str, ...], logs: tuple[Recording, ...] = ()) -> Page:
     """Builds the page: contacts, statistic, force at the tool, and joint torques.
 
     Args:
         forces: the result.
         kinds: "revolute" or "prismatic" of each joint (n,).
+        logs: the recording.
     """
     threshold, count = forces.calibration.threshold, len(forces.contacts)
     windows = [(contact.start, contact.end) for contact in forces.contacts]
     largest = max(forces.contacts, key=lambda contact: contact.magnitude, default=None)
-    verdict = "No contact." if largest is None else "One contact" if count == 1 else f"{count} contacts"
+    verdict = "No contact was found in this log."
     if largest is not None:
+        verdict = f"Check the robot's surroundings: {'one contact' if count == 1 else f'{count} contacts'}"
         verdict += f", at {largest.start:.4g} s" if count == 1 else f", the largest at {largest.start:.4g} s"
         verdict += f" with {largest.magnitude:.3g} N at the tool."
     deviation = forces.force_deviation
     known = deviation[np.isfinite(deviation).all(axis=1)]
     level = f"{np.median(np.linalg.norm(known, axis=1)):.2g} N" if len(known) else "unknown"
     return Page(
-        title=f"External forces on {forces.robot}",
+        title="External forces",
+        robot=forces.robot,
         verdict=verdict,
-        status="warning" if count else "good",
+        logs=logs,
+        findings=_findings(forces),
         facts=(
-            Fact(label="contacts", value=count),
-            Fact(label="duration", value=f"{forces.duration:.4g} s"),
-            Fact(label="false alarms per hour", value=f"{threshold.rate:g}"),
-            Fact(label="standard deviation of the force", value=level, note="median"),
+            Fact(label="Contacts", value=count),
+            Fact(label="Duration", value=f"{forces.duration:.4g} s"),
+            Fact(label="False alarms per hour", value=f"{threshold.rate:g}"),
+            Fact(label="Standard deviation of the force", value=level, note="median"),
         ),
-        warnings=forces.warnings,
         sections=(
             Section(
                 title="Contacts",
@@ -85,6 +95,22 @@ def force_page(forces: ForceEstimate, kinds: tuple[str, ...]) -> Page:
             ),
         ),
         footer=footer(),
+    )
+
+
+def _findings(forces: ForceEstimate) -> tuple[Finding, ...]:
+    return (
+        *(
+            Finding(
+                code="contact",
+                subject=f"{contact.start:.4g} s:",
+                text=f"contact at {contact.place.text(forces.joint_names)}, {contact.magnitude:.3g} N, for "
+                f"{contact.end - contact.start:.2g} s.",
+                action="Check what the robot touched.",
+            )
+            for contact in forces.contacts
+        ),
+        *findings_of("force.note", forces.warnings),
     )
 
 

@@ -9,12 +9,15 @@ import numpy as np
 from oed.campaigns.loops.result import LoopResult
 from oed.campaigns.loops.state import Experiment, Verdict, name_of
 from oed.exports import read_trajectory
+from oed.reports.pages.diagnosis_actions import action_for
 from oed.reports.pictures.trajectory_pictures import trajectory_picture
-from oed.reports.rendering.page import Cell, Fact, Page, Section, Table
+from oed.reports.rendering.page import Cell, Fact, Finding, Page, Section, Table, findings_of
 from oed.reports.rendering.palette import joint_role
 from oed.reports.rendering.picture import Panel, Picture, Series
-from oed.reports.rendering.saving import footer, save_page
+from oed.reports.rendering.provenance import Recording, footer
+from oed.reports.rendering.saving import save_page
 from robots.common.files import ResultFolder
+from robots.terms.effects import EFFECTS
 
 CHANCE = 1e-3
 """Smallest p-value that is written as a number."""
@@ -30,9 +33,15 @@ def loop_page(result: LoopResult) -> Page:
     last, rows = result.diagnosis, sum(_rows(experiment) for experiment in result.experiments)
     return Page(
         title="Loop of experiments",
-        subtitle=result.robot.title or result.robot.name,
+        robot=result.robot.title or result.robot.name,
         verdict=f"{result.ended[:1].upper()}{result.ended[1:]}.",
-        status="good" if result.success else "warning",
+        logs=tuple(
+            Recording(name=run.recorded.log)
+            for experiment in result.experiments
+            for run in experiment.runs
+            if run.recorded is not None
+        ),
+        findings=_findings(result),
         facts=(
             Fact(label="Experiments", value=len(result.experiments), note=f"{rows} rows of feedback"),
             Fact(label="Effects found", value=len(last.findings), note=", ".join(last.causes)),
@@ -44,6 +53,22 @@ def loop_page(result: LoopResult) -> Page:
         ),
         sections=(_course(result), *(_section(result, k) for k in range(len(result.experiments)))),
         footer=footer(),
+    )
+
+
+def _findings(result: LoopResult) -> tuple[Finding, ...]:
+    found = [
+        Finding(
+            code=f"effect.{item['effect']}" if item["effect"] in EFFECTS else "diagnosis.unexplained",
+            subject=f"{name_of(item)}:",
+            text=str(item.get("sentence", "")),
+            action=action_for(item["effect"], [item["joint"]]) if item["effect"] in EFFECTS else "",
+        )
+        for item in result.diagnosis.findings
+    ]
+    return (
+        *found,
+        *findings_of("loop.unfinished", [] if result.success else [f"The loop ended early: {result.ended}."]),
     )
 
 
@@ -82,7 +107,7 @@ def _course(result: LoopResult) -> Section:
     picture = Picture(
         title="Held-out error over the experiments",
         name="errors",
-        panels=(Panel(title="", x_label="experiment", y_label="[% of torque RMS]", series=tuple(series)),),
+        panels=(Panel(title="", x_label="experiment", y_label="error over torque RMS [%]", series=tuple(series)),),
         columns=1,
         panel_height=260,
         caption="Residual of torque on data that the fit has not seen, over the RMS of the torque.",

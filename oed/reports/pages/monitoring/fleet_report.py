@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 
 from estimation.monitoring.fleets import FleetResult, RobotRow
-from oed.reports.pages.monitoring.monitor_report import STATUS
-from oed.reports.rendering.page import Cell, Fact, Page, Section, Table
+from oed.reports.rendering.page import Cell, Fact, Finding, Page, Section, Status, Table
 from oed.reports.rendering.palette import joint_role
 from oed.reports.rendering.picture import Line, Panel, Picture, Series
-from oed.reports.rendering.saving import footer, save_page
+from oed.reports.rendering.provenance import footer
+from oed.reports.rendering.saving import save_page
 from robots.common.files import ResultFolder
 
 # Robots whose trends are drawn; the table lists all.
@@ -27,13 +27,16 @@ def fleet_page(result: FleetResult) -> Page:
     drawn = [row for row in result.rows if row.trend.hours][:DRAWN]
     return Page(
         title="Fleet",
-        verdict=result.verdict(),
-        status=STATUS.get(result.light, "warning"),
+        verdict=_verdict(result),
+        findings=tuple(
+            Finding(code=f"fleet.{row.light}", subject=f"{row.name}:", text=row.text, action=row.advice)
+            for row in result.rows
+        ),
         facts=(
-            Fact(label="Red", value=result.count("red"), note="need action", status="bad"),
-            Fact(label="Amber", value=result.count("amber"), note="to be watched", status="warning"),
-            Fact(label="Green", value=result.count("green"), note="no finding", status="good"),
-            Fact(label="Grey", value=result.count("grey"), note="no usable log"),
+            _count(result, "red", "need action", "act"),
+            _count(result, "amber", "to be watched", "note"),
+            _count(result, "green", "no finding"),
+            _count(result, "grey", "no usable log"),
             Fact(label="Logs", value=sum(len(row.logs) for row in result.rows), note=f"{len(left_out)} left out"),
         ),
         sections=(
@@ -69,6 +72,16 @@ def fleet_page(result: FleetResult) -> Page:
     )
 
 
+def _verdict(result: FleetResult) -> str:
+    worst = result.rows[0]
+    return f"{result.verdict()} Begin with {worst.name}. {worst.advice}".strip() if worst.advice else result.verdict()
+
+
+def _count(result: FleetResult, light: str, note: str, status: Status = "neutral") -> Fact:
+    count = result.count(light)
+    return Fact(label=light.capitalize(), value=count, note=note, status=status if count else "neutral")
+
+
 def _robots(result: FleetResult) -> Table:
     rows: list[tuple[Cell, ...]] = []
     for row in result.rows:
@@ -99,7 +112,7 @@ def trends_picture(rows: list[RobotRow]) -> Picture:
                 Panel(
                     title=f"{row.name} ({row.light}): {title}",
                     x_label="time [days]",
-                    y_label="friction [%]",
+                    y_label="change of friction [%]",
                     lines=(Line(value=0.0, role="neutral", dash="dot"),),
                     series=tuple(
                         Series(

@@ -8,12 +8,14 @@ from estimation.monitoring import MonitorResult
 from estimation.monitoring.findings import LIGHTS
 from estimation.monitoring.result import HEAT_WORDS
 from oed.reports.pictures.monitor_pictures import trend_picture
-from oed.reports.rendering.page import Cell, Fact, Page, Section, Status, Table
+from oed.reports.rendering.page import Cell, Fact, Finding, Page, Section, Status, Table, findings_of
 from oed.reports.rendering.picture import Picture
-from oed.reports.rendering.saving import footer, save_page
+from oed.reports.rendering.provenance import Recording, footer
+from oed.reports.rendering.saving import save_page
 from robots.common.files import ResultFolder
 
-STATUS: dict[str, Status] = {"green": "good", "amber": "warning", "red": "bad"}
+STATUS: dict[str, Status] = {"green": "good", "amber": "note", "red": "act"}
+ROLES = {"green": "good", "amber": "warning", "red": "bad"}
 
 
 def save_monitor_report(result: MonitorResult, folder: ResultFolder, *, png: bool = False) -> None:
@@ -26,9 +28,13 @@ def monitor_page(result: MonitorResult) -> Page:
     low, high = result.heat_range
     left_out = [row for row in result.logs if not row.used]
     return Page(
-        title=f"Monitoring of {result.robot}",
-        verdict=result.verdict(),
-        status=STATUS[result.light],
+        title="Monitoring",
+        robot=result.robot,
+        verdict=_verdict(result),
+        logs=tuple(
+            Recording(name=row.name, start=row.start, duration=row.end - row.start) for row in result.logs if row.used
+        ),
+        findings=_findings(result),
         facts=(
             Fact(label="Light", value=result.light, status=STATUS[result.light]),
             Fact(label="Findings", value=len(result.findings)),
@@ -41,7 +47,6 @@ def monitor_page(result: MonitorResult) -> Page:
             ),
             Fact(label="False alarms", value=f"one in {result.false_alarm_hours:g} h of motion"),
         ),
-        warnings=(*(f"{row.name}: left out: {row.note}" for row in left_out), *result.notes),
         sections=(
             Section(
                 title="Findings",
@@ -58,6 +63,28 @@ def monitor_page(result: MonitorResult) -> Page:
             *_change_points(result),
         ),
         footer=footer(),
+    )
+
+
+def _verdict(result: MonitorResult) -> str:
+    urgent = [finding for finding in result.findings if LIGHTS[finding.severity] == result.light]
+    if not urgent or result.light == "green":
+        return "No change beyond what temperature explains."
+    return " ".join(dict.fromkeys(finding.advice() for finding in urgent))
+
+
+def _findings(result: MonitorResult) -> tuple[Finding, ...]:
+    return (
+        *(
+            Finding(code=f"change.{item.kind}", text=item.sentence(result.origin), action=item.advice())
+            for item in result.findings
+        ),
+        *(
+            Finding(code="log.left_out", subject=f"{row.name}:", text=f"left out: {row.note}")
+            for row in result.logs
+            if not row.used
+        ),
+        *findings_of("monitor.note", result.notes),
     )
 
 
@@ -80,7 +107,7 @@ def trends(result: MonitorResult, name: str = "trends") -> Picture:
             (f.earliest - result.origin) / 3600,
             (f.latest - result.origin) / 3600,
             f.kind.replace("_", " "),
-            STATUS[LIGHTS[f.severity]],
+            ROLES[LIGHTS[f.severity]],
         )
         for f in result.findings
     )

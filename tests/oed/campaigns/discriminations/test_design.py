@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
@@ -17,6 +18,8 @@ from oed.campaigns.discriminations.motions import ExperimentBuilder
 from oed.campaigns.discriminations.probabilities import require_separable
 from oed.campaigns.discriminations.rivals import parse_rivals
 from oed.exports import read_trajectory
+from oed.reports import Page
+from oed.reports.pages.discrimination_report import discrimination_page
 from robots.base_parameters import find_base_parameters
 from robots.common.errors import InfeasibleError, InputError, NotIdentifiableError
 from robots.geometry.chain import Chain, Joint
@@ -196,3 +199,9 @@ def test_a_robot_too_weak_to_hold_itself_is_refused() -> None:
 
     with pytest.raises(InfeasibleError, match="torque"):
         discriminate(arm(torque=np.full(2, 0.5)), PAIR)
+
+
+@pytest.mark.slow
+def test_page_works_in_a_browser(found: Discrimination, in_browser: Callable[[Page], None]) -> None:
+    """The page passes all checks of `browser_checks`."""
+    in_browser(discrimination_page(found))

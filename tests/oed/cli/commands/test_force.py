@@ -19,7 +19,7 @@ def test_files_are_written_and_a_calibration_is_taken(run, experiment: Path, tmp
     assert {file.name for file in out.iterdir()} == {"forces.csv", "forces.json", "report.html"}
     assert done.data["contacts"] == []
     assert json.loads((out / "forces.json").read_text())["calibration"] == done.data["calibration"]
-    assert "No contact." in (out / "report.html").read_text()
+    assert "No contact was found" in (out / "report.html").read_text()
     assert run(*command, out).code == 2
     again = run(*command, tmp_path / "again", "--calibration", out)
     assert again.code == 0, again.err

@@ -76,3 +76,16 @@ def test_fleet_has_a_page(run, place, tmp_path):
     assert "Robots, worst first" in (tmp_path / "out" / "report.html").read_text()
     assert run(*words).code == 2
     assert run(*words, "--force", "--json").data["resumed"] == 3
+
+
+def test_an_interrupted_fleet_says_what_is_kept(run, place, tmp_path, monkeypatch):
+    """Ctrl-C ends a fleet with one line that says where the finished robots are."""
+
+    def stop(*_, **__):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("estimation.monitoring.fleets.monitor_fleet", stop)
+    done = run("fleet", place / "logs", "--model", place, "--out", tmp_path / "out")
+    assert done.code == 130
+    assert f"finished robots are kept in {tmp_path / 'out' / 'robots'}" in done.err
+    assert "nothing was written" not in done.err

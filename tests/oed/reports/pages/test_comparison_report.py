@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -9,7 +10,8 @@ import pytest
 
 from estimation.comparisons import compare
 from estimation.models.model import Model
-from oed.reports import comparison_page, render
+from oed.reports import Page, comparison_page, render
+from oed.reports.pages.comparisons.comparison_report import parts_picture
 from robots import load_robot
 from robots.base_parameters import find_base_parameters
 from robots.regressor import default_model
@@ -48,8 +50,9 @@ def runs_of(model: Model, count: int, damage: float) -> list[Model]:
 def test_agreeing_runs_are_good_news(model):
     """Without a difference the page is green, and shows the runs over their number."""
     page = comparison_page(compare(runs_of(model, 5, 1.0)))
-    assert page.status == "good"
+    assert page.level == "good"
     assert [picture.name for picture in page.pictures] == [
+        "tests",
         "friction_runs",
         "friction_difference",
         "friction_course",
@@ -60,10 +63,26 @@ def test_agreeing_runs_are_good_news(model):
     assert "settled from" in text
 
 
+def test_all_tests_are_one_chart(model):
+    """Each part of each joint has one bar; that of the changed friction is above the line."""
+    comparison = compare(runs_of(model, 2, 1.3))
+    picture = parts_picture(comparison)
+    bars = {series.name: series.y for series in picture.panels[0].series}
+    assert int(np.nanargmax(bars["friction"])) == 1
+    assert bars["friction"][1] > picture.panels[0].lines[0].value
+    parts = {item.name for item in comparison.differences if item.level == "part"}
+    assert sum(np.isfinite(values).sum() for values in bars.values()) == len(parts)
+
+
 def test_damage_is_never_green(model):
     """Friction that changed on one joint alone makes the page red, and its sentence is on it."""
     page = comparison_page(compare(runs_of(model, 2, 1.3)))
-    assert page.status == "bad"
+    assert page.level == "act"
     assert "Friction changed on joint 2 alone: inspect it." in page.verdict
     friction = next(section for section in page.sections if section.title == "Friction")
     assert any(text.startswith("Joint 2: friction +3") and "inspect this joint" in text for text in friction.paragraphs)
+
+
+def test_works_in_a_browser(model: Model, in_browser: Callable[[Page], None]) -> None:
+    """The page of a damaged joint passes all checks of `browser_checks`."""
+    in_browser(comparison_page(compare(runs_of(model, 2, 1.3))))

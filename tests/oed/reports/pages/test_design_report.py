@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
@@ -10,7 +11,8 @@ import numpy as np
 import pytest
 
 from oed.experiments import Design, Effort, Ipopt
-from oed.reports import design_page, render, save_design_report, significant
+from oed.reports import Page, design_page, render, save_design_report, significant
+from oed.reports.pages.design_report import excitation_findings
 from robots.common.files import ResultFolder
 from robots.geometry.chain import Chain, Joint
 from robots.limits import Limits
@@ -68,7 +70,7 @@ def test_tells_the_numbers(design: Design, html: str) -> None:
     for quality in (design.optimised, design.whole):
         assert significant(quality.value("cond")) in html
     assert f"{design.motion.duration:.1f} s" in html
-    assert f"over {design.base.size} parameters" in html
+    assert f"determines all {design.base.size} base parameters" in html
     for name in design.base.names:
         assert f"{name}<" in html
     assert "sinusoid" in html
@@ -86,7 +88,7 @@ def test_warns(html: str) -> None:
 def test_warns_of_assumed_limits() -> None:
     """Acceleration and jerk limits that the description lacks are named by joint, with what was taken instead."""
     design = design_for(robot(acceleration=np.array([10.0, np.inf]), jerk=np.array([np.inf, np.inf])))
-    warnings = " ".join(design_page(design).warnings)
+    warnings = " ".join(finding.text for finding in design_page(design).findings)
     assert "acceleration limit for joint 2;" in warnings
     assert "jerk limit for joint 1, 2;" in warnings
 
@@ -96,9 +98,30 @@ def test_a_passed_limit_is_bad_news(design: Design) -> None:
     fast = next(margin for margin in design.margins if (margin.quantity, margin.joint) == ("velocity", 2))
     worst = replace(fast, slack_fraction=-0.5, value=9.0)
     page = design_page(replace(design, margins=(worst, *design.margins)))
-    assert page.status == "bad"
-    assert f"exceeds a limit: velocity of joint 2 at {fast.time:.3f} s" in page.verdict
-    assert design_page(design).status == "good"
+    assert page.level == "act"
+    assert f"Do not play this motion: it exceeds the limit of velocity of joint 2 at {fast.time:.3f} s" in page.verdict
+    assert page.findings[0].code == "limit.exceeded"
+    assert design_page(design).level == "note"
+
+
+@pytest.mark.parametrize(("condition", "code"), [(9e6, "excitation.weak"), (1e12, "excitation.incomplete")])
+def test_a_motion_that_leaves_parameters_open_gets_no_tick(design: Design, condition: float, code: str) -> None:
+    """A condition number of nine millions, and a regressor without full rank, ask for another design."""
+    values = np.geomspace(1.0, condition, design.base.size)
+    whole = replace(design.whole, singular_values=tuple(values))
+    page = design_page(replace(design, qualities=(*design.qualities[:-1], whole)))
+    assert page.level == "act"
+    assert code in [finding.code for finding in page.findings]
+    assert page.verdict.startswith("Design the experiment again")
+
+
+def test_the_limit_of_condition_numbers_is_that_of_noise(design: Design) -> None:
+    """Noise of 2 % in N samples makes a direction's error 0.02 cond / sqrt(N) of its size: 1 is the limit."""
+    limit = np.sqrt(design.whole.samples) / 0.02
+    found = [
+        excitation_findings(replace(design.whole, singular_values=(1.0, factor * limit))) for factor in (0.99, 1.01)
+    ]
+    assert [len(findings) for findings in found] == [0, 1]
 
 
 def test_pictures_on_request(design: Design, tmp_path: Path) -> None:
@@ -111,3 +134,8 @@ def test_pictures_on_request(design: Design, tmp_path: Path) -> None:
     pictures = sorted((tmp_path / "pictures").glob("*.png"))
     assert [p.stem for p in pictures] == sorted(picture.name for picture in design_page(design).pictures)
     assert all(p.read_bytes().startswith(b"\x89PNG") for p in pictures)
+
+
+def test_works_in_a_browser(design: Design, in_browser: Callable[[Page], None]) -> None:
+    """The page passes all checks of `browser_checks`."""
+    in_browser(design_page(design))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -9,11 +10,12 @@ import pytest
 
 from estimation.diagnosis.experiment_plans.detection_limits import Limit
 from estimation.diagnosis.simulations.simulation_result import Curves, Simulation
+from oed.reports import Page
 from oed.reports.pages.diagnosis_limits import limits_page, limits_section
 from oed.reports.pages.diagnosis_report import diagnosis_page
 from oed.reports.pages.diagnosis_view import DiagnosisView, FindingView
 from oed.reports.pictures.diagnosis_pictures import binned, cause_picture, gain_picture
-from oed.reports.rendering.page import render
+from oed.reports.rendering.html import render
 from robots.common.errors import InputError
 from robots.plants.closed_loop import Loop
 from robots.terms.effects import EFFECTS
@@ -40,6 +42,7 @@ def view():
     base = random.normal(size=(N, 2))
     bend = np.column_stack([np.zeros(N), np.exp(-np.abs(speed) / 0.1) * np.sign(speed)])
     finding = FindingView(
+        effect="stribeck",
         title="Stribeck friction",
         sentence="Joint 2 needs 1 N m more than its Coulomb friction to break away.",
         joint=2,
@@ -98,21 +101,31 @@ def test_the_page_tells_all(view):
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
-    ("verdict", "expected", "following"),
+    ("verdict", "expected", "found", "following", "level"),
     [
         (
             "none",
-            "No missing effect was found. Of 3 effects and places half would have shown from 1.0 % of "
-            "the joint's torque on, nine in ten from 1.8 %; at any size hidden: stribeck of joint 2.",
+            "No missing effect was found",
+            "Of 3 effects and places half would have shown from 1.0 % of the joint&#39;s torque on, nine in ten from "
+            "1.8 %; at any size hidden: stribeck of joint 2.",
             "No further experiment is needed.",
+            "good",
         ),
-        ("unexplained", "no effect of the catalogue explains", "no experiment of the catalogue can identify it"),
+        (
+            "unexplained",
+            "no effect of the catalogue explains",
+            "Part of the residual is not noise",
+            "no experiment of the catalogue can identify it",
+            "act",
+        ),
     ],
 )
-def test_a_page_without_findings(verdict, expected, following, view):
+def test_a_page_without_findings(verdict, expected, found, following, level, view):
     """Where nothing is named, the verdict says so, what would have been seen, and what to do."""
     page = diagnosis_page(replace(view, verdict=verdict, findings=(), next_kind=""))
     assert expected in page.verdict
+    assert page.level == level
+    assert found in render(page)
     assert following in render(page)
 
 
@@ -130,8 +143,9 @@ def test_what_brings_nothing_explains_nothing(interval, told, view):
     """A free function that stands out of the noise and does not surely help elsewhere explains no part of the error."""
     finding = replace(view.findings[0], interval=interval)
     page = diagnosis_page(replace(view, verdict="unexplained", findings=(finding,)))
-    assert page.verdict.startswith("The error is explained in part") == told
-    assert page.verdict.endswith(finding.sentence)
+    assert ("part of the error has no known cause" in page.verdict) == told
+    assert page.level == "act"
+    assert any(found.text == finding.sentence for found in page.findings)
 
 
 def test_the_error_of_every_row_is_told_where_it_is_known(view):
@@ -221,7 +235,7 @@ def test_the_simulated_motion_is_told(view):
     page = diagnosis_page(replace(view, simulation=simulation))
     (picture,) = (picture for picture in page.pictures if picture.name == "simulation")
     assert "swing" in picture.title
-    assert picture.panels[1].y_label == "[mrad]"
+    assert picture.panels[1].y_label == "error [mrad]"
     assert picture.panels[1].series[0].y == pytest.approx(two[:, 1])
     text = render(page)
     for part in ("Simulated motion", "from 2.0 to 7.0 s", "The controller is assumed", "5 Hz", "As it is.", "mm"):
@@ -233,7 +247,7 @@ def test_the_simulated_motion_is_told(view):
 def test_an_ambiguous_verdict_is_no_good_news(view):
     """An ambiguous diagnosis says so, and warns."""
     page = diagnosis_page(replace(view, verdict="ambiguous"))
-    assert page.status == "warning"
+    assert page.level == "act"
     assert "several causes fit" in page.verdict
 
 
@@ -266,6 +280,16 @@ def test_neighbours_in_time_count_as_one():
     assert binned(slow, values)[2].mean() > 5 * binned(quick, values)[2].mean()
 
 
+def test_a_picture_that_does_not_change_is_drawn_once():
+    """Where both residuals look the same there is one panel, and the caption says why; else there are two."""
+    x = np.linspace(0.0, 1.0, 500)
+    before = np.sin(40 * x)
+    same = cause_picture("x [1]", x, before, before + 1e-4, title="same")
+    assert len(same.panels) == same.columns == 1
+    assert "is not drawn again" in same.caption
+    assert len(cause_picture("x [1]", x, before, 0.5 * before, title="changed").panels) == 2
+
+
 def test_pictures_of_nothing():
     """A coordinate without a value, and one that never changes, are drawn without complaint."""
     nothing = np.full(5, np.nan)
@@ -281,10 +305,17 @@ def test_the_page_of_a_plan():
     """A planned experiment's page counts what would be named, and lists what is hidden."""
     page = limits_page((*LIMITS, replace(LIMITS[0], joint=3, note="joint hardly moves")), "two")
     text = render(page)
-    assert "Of 5 pairs of effect and joint, 3 would be found and named at 2 %" in page.verdict
+    assert "finds and names 3 of 5 pairs of effect and joint at 2 %" in page.verdict
     assert "1 (7) / 2" in text
     assert "2 (never) / 4" in text
     assert "0.4 / 0.8" in text
     assert "on joint 3: joint hardly moves." in text
     assert "hidden" in text
-    assert "Stribeck friction" in page.warnings[0]
+    assert "Stribeck friction" in page.findings[0].text
+
+
+@pytest.mark.slow
+def test_works_in_a_browser(view: DiagnosisView, in_browser: Callable[[Page], None]) -> None:
+    """The pages of a diagnosis and of a plan pass all checks of `browser_checks`."""
+    in_browser(diagnosis_page(view))
+    in_browser(limits_page(LIMITS, "two"))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Callable
 from types import SimpleNamespace
 
 import numpy as np
@@ -10,7 +11,7 @@ import pytest
 
 import oed
 from oed.experiments import RetimedExperiment
-from oed.reports import render, retime_page
+from oed.reports import Page, render, retime_page
 from robots.loading import load_robot
 from robots.signals import Motion
 
@@ -42,7 +43,7 @@ def test_tells_before_and_after(case: SimpleNamespace) -> None:
 
 def test_warns_of_assumed_values(case: SimpleNamespace) -> None:
     """What no source backs is said."""
-    assert any("limits.jerk" in warning for warning in case.page.warnings)
+    assert any("limits.jerk" in finding.text for finding in case.page.findings)
 
 
 @pytest.mark.slow
@@ -52,3 +53,9 @@ def test_stands_alone(case: SimpleNamespace) -> None:
     assert not re.search(r"<(?:script|img|iframe)[^>]*\ssrc=", html)
     assert "http://" not in html
     assert "https://" not in html
+
+
+@pytest.mark.slow
+def test_works_in_a_browser(case: SimpleNamespace, in_browser: Callable[[Page], None]) -> None:
+    """The page passes all checks of `browser_checks`."""
+    in_browser(case.page)

@@ -1,5 +1,7 @@
 from __future__ import annotations
 
+import hashlib
+import json
 import re
 from html.parser import HTMLParser
 from typing import Any
@@ -7,7 +9,21 @@ from typing import Any
 import numpy as np
 import pytest
 
-from oed.reports import Fact, Footer, Page, Panel, Picture, Section, Series, Table, render
+from oed.reports import (
+    Fact,
+    Finding,
+    Footer,
+    InputFile,
+    Page,
+    Panel,
+    Picture,
+    Recording,
+    Section,
+    Series,
+    Table,
+    render,
+)
+from oed.reports.rendering.html import SCRIPT
 from robots.common.errors import InputError
 
 pytestmark = pytest.mark.slow
@@ -66,17 +82,27 @@ def full(six: Any) -> str:
     return render(
         Page(
             title="Experiment",
-            subtitle="er3a",
+            robot="er3a",
+            logs=(Recording(name="monday", start=1738310400.0, duration=60.0), Recording(name="undated", start=0.0)),
             verdict="The experiment is good.",
-            status="good",
             facts=(Fact(label="Condition number", value=41.2671, note="scaled"), Fact(label="Duration", value="60 s")),
-            warnings=("A value is assumed.",),
+            findings=(
+                Finding(code="value.assumed", text="A value is assumed."),
+                Finding(code="limit.exceeded", subject="Joint 2:", text="too fast.", action="Do not play it."),
+            ),
             sections=(
                 Section(title="Motion", paragraphs=("Text.",), pictures=pictures[:3]),
                 Section(title="Fit", pictures=pictures[3:], tables=(table,)),
                 Section(title="Fit", folded=True, paragraphs=("Hidden.",)),
             ),
-            footer=Footer(tool="robot-oed 1", date="2025-01-31", command="oed design --robot er3a"),
+            footer=Footer(
+                tool="robot-oed 1",
+                date="2025-01-31",
+                command="oed design --robot er3a",
+                seed=7,
+                versions=(("numpy", "2.0"),),
+                inputs=(InputFile(name="log.csv", size=12, modified="2025-01-30", sha256="0" * 64),),
+            ),
         )
     )
 
@@ -105,14 +131,27 @@ def test_page_loads_nothing_from_anywhere(full: str) -> None:
 
 
 def test_page_stays_small(full: str) -> None:
-    """Sixty seconds at 250 Hz with every picture fit in 8 MB, of which plotly takes 5."""
-    assert len(full.encode()) < 8e6
+    """Sixty seconds at 250 Hz of six joints with every picture there is fit in 4 MB, of which plotly takes 1.2."""
+    assert len(full.encode()) < 4e6
 
 
 def test_drawing_library_is_inside_once(full: str) -> None:
     """plotly.js is written once, however many pictures there are."""
-    assert full.count("plotly.js v") == 1
+    assert full.count("* plotly.js (basic - minified) v") == 1
     assert len([tag for tag, _ in parse(full).seen if tag == "script"]) == 8 + 2
+
+
+def test_drawing_library_is_the_published_one() -> None:
+    """The bundle is the published file of the version that the Python package has, unchanged."""
+    text = SCRIPT.read_bytes()
+    assert hashlib.sha256(text).hexdigest() == "99784e3abfb07b142a15e521a439e6d9addceadb3f79553fd24c72774f0649ba"
+
+
+def test_pictures_use_what_the_basic_bundle_draws(full: str) -> None:
+    """Traces are lines, points and bars only."""
+    figures = re.findall(r'<script type="application/json" id="figure-[^>]*>(.*?)</script>', full, re.DOTALL)
+    kinds = {trace["type"] for figure in figures for trace in json.loads(figure)["data"]}
+    assert kinds == {"scatter", "bar"}
 
 
 def test_texts_and_tables_need_no_script(full: str) -> None:
@@ -122,6 +161,12 @@ def test_texts_and_tables_need_no_script(full: str) -> None:
         "The experiment is good.",
         "Condition number 41.27 scaled",
         "A value is assumed.",
+        "Joint 2: too fast. Do not play it.",
+        "monday (60.00 s), undated",
+        "2025-01-31 08:00 UTC",
+        "seed 7",
+        "numpy 2.0",
+        "0" * 64,
         "Hidden.",
         "Izz_1 12.35 kg m²",
         "m_1 – kg",
@@ -132,10 +177,10 @@ def test_texts_and_tables_need_no_script(full: str) -> None:
         assert words in text
 
 
-def test_verdict_and_facts_come_before_everything_else(full: str) -> None:
-    """The answer and the key numbers stand on the first screen, before warnings, sections and pictures."""
+def test_verdict_and_findings_come_before_everything_else(full: str) -> None:
+    """The answer and the findings, the urgent first, stand before the key figures, sections and pictures."""
     text = parse(full).text
-    places = [text.index(words) for words in ("The experiment", "Condition number", "A value is", "Text.")]
+    places = [text.index(words) for words in ("The experiment", "too fast", "A value is", "Condition number", "Text.")]
     assert places == sorted(places)
 
 
@@ -151,7 +196,7 @@ def test_page_can_be_used_by_keyboard_and_ear(full: str) -> None:
 
 def test_contents_list_every_section(full: str) -> None:
     """Sections of one title have identifiers of their own, and the contents lead to each."""
-    targets = [value for value in parse(full).attributes("href") if value.startswith("#section")]
+    targets = [value for value in parse(full).attributes("href") if value.startswith("#section-")]
     assert targets == ["#section-motion", "#section-fit", "#section-fit-2"]
 
 
@@ -161,10 +206,11 @@ def test_texts_are_escaped_everywhere() -> None:
     html = render(
         Page(
             title=evil,
-            subtitle=evil,
+            robot=evil,
             verdict=evil,
+            logs=(Recording(name=evil),),
             facts=(Fact(label=evil, value=evil, note=evil),),
-            warnings=(evil,),
+            findings=(Finding(code="done", subject=evil, text=evil, action=evil),),
             sections=(
                 Section(
                     title=evil,
@@ -208,10 +254,10 @@ def test_cells_are_rounded_and_aligned() -> None:
         lambda: Table(headings=("a",), rows=(), align=("right", "left")),
         lambda: Table(headings=("a",), rows=(), align=("up",)),
         lambda: Fact(label="a", value=1, status="great"),
-        lambda: Page(title="t", verdict="v", status="great"),
+        lambda: Finding(code="great", text="t"),
         lambda: Page(title="t", verdict="v", sections=(Section(title="s", pictures=(picture(), picture())),)),
     ],
-    ids=["cells", "alignments", "alignment", "fact", "status", "names"],
+    ids=["cells", "alignments", "alignment", "fact", "code", "names"],
 )
 def test_contents_are_checked(build: Any) -> None:
     """Rows, alignments, states and names of pictures that do not fit are errors of ours."""

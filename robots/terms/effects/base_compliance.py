@@ -1,0 +1,227 @@
+"""A compliant base that tilts and oscillates under the moment of the robot on it."""
+
+from __future__ import annotations
+
+from itertools import product
+from typing import TYPE_CHECKING, ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.linalg import solve_banded
+
+from robots.terms.effect_bases.base import Coefficient, Effect, Place, Shape, Situation
+from robots.terms.effects.base_tilt import level_axes, tilted_torque, upright
+
+if TYPE_CHECKING:
+    from robots.robot import Robot
+
+Array = NDArray[np.float64]
+
+DAMPING = 0.05
+"""Damping ratio of the base's resonances, unless the data show another one."""
+SCANNED = (*(3.5 * 1.1**k for k in range(18)), 30.0, 300.0)
+"""Resonances [Hz] of a scan at the log's mean inertia, up to 18 in steps of a tenth: a resonance is narrow."""
+LOWEST, HIGHEST = 2.0, 1000.0
+"""Range of the resonances [Hz]."""
+LIGHTEST = 0.02
+"""Smallest inertia about any axis in any pose, as a fraction of the largest."""
+SOFTEST, FARTHEST = 1e-3, 0.3
+"""Largest compliance [rad/(N m)], and largest tilt by the first link's own moments [rad]."""
+INEXACT = 0.05
+"""Relative error of compliance and stiffness in addition to that of the data: the base rotates about a point other than
+its origin."""
+
+
+class BaseCompliance(Effect):
+    """tau = (d rigid/dg) (g x t) + (d rigid/dw) t' + (d rigid/da) t'': the base rotates by small angles t = C m.
+
+    m is the moment of the robot on its base about the horizontal axes, by weight and accelerations, and C is symmetric.
+    w and a are the base's angular velocity and acceleration. The base oscillates with the robot's inertia I, which
+    couples both axes and depends on the pose: (I + J) t'' + (D + R) t' + K t = K C m. R is the robot's Coriolis matrix.
+    The dynamic stiffness K, about each axis, the inertia J of the base itself and the damping ratio behind D are shape
+    parameters; K C is the unit matrix for an ideal base. On a level robot with a vertical first axis, no log shows the
+    first link's first moments. They tilt the base by an unknown angle o that rotates with the first joint.
+    """
+
+    name: ClassVar[str] = "base_compliance"
+    title: ClassVar[str] = "compliant base"
+    whole_robot: ClassVar[bool] = True
+    shapes: ClassVar[tuple[Shape, ...]] = (
+        Shape("dynamic_stiffness_1", "N m/rad", 1e-6, 1e12, "log", inexact=INEXACT),
+        Shape("dynamic_stiffness_2", "N m/rad", 1e-6, 1e12, "log", inexact=INEXACT),
+        Shape("own_inertia", "kg m2", 0.0, np.inf, "linear", (0.0,), default=0.0, beside=True),
+        Shape("damping_ratio", "", 1e-3, 0.5, "log", (DAMPING,), default=DAMPING, beside=True),
+    )
+    rivals: ClassVar[tuple[str, ...]] = ("joint_elasticity", "base_tilt", "spring")
+    experiments: ClassVar[tuple[str, ...]] = ("multisine", "static_hold", "payload")
+
+    def parameters(self, robot: Robot, joint: Place) -> tuple[Coefficient, ...]:
+        """Describes the compliances about both horizontal axes, their coupling, and the first link's tilt."""
+        unit = "rad/(N m)"
+        compliances = (
+            Coefficient("compliance_1", unit, 0.0, SOFTEST, INEXACT),
+            Coefficient("compliance_2", unit, 0.0, SOFTEST, INEXACT),
+            Coefficient("compliance_12", unit, -SOFTEST, SOFTEST, INEXACT),
+        )
+        own = tuple(Coefficient(f"own_{axis}", "rad", -FARTHEST, FARTHEST) for axis in ("1", "2"))
+        return (*compliances, *own) if upright(robot) else compliances
+
+    def joints(self, robot: Robot) -> tuple[Place, ...]:
+        """Returns the whole robot if gravity acts on it, else nothing."""
+        return (None,) if np.any(robot.chain.gravity) else ()
+
+    def grid(self, situation: Situation, joint: Place) -> tuple[tuple[float, ...], ...]:
+        """Lists stiffnesses for all pairs of the resonances in `SCANNED`."""
+        pairs = [_stiffness(situation, f) for f in SCANNED]
+        return tuple((one[0], other[1], 0.0, DAMPING) for one, other in product(pairs, pairs))
+
+    def propose(
+        self, situation: Situation, joint: Place, residual: Array, count: int = 8
+    ) -> tuple[tuple[float, ...], ...]:
+        """Ranks the resonances about each axis by what that axis' compliance explains, the other axis alike."""
+        pairs = [_stiffness(situation, f) for f in SCANNED]
+        shown = []
+        for pair in pairs:
+            X = self.columns(situation, joint, (*pair, 0.0, DAMPING))[:, :, :2]
+            explained = np.einsum("njk,nj->k", X, residual)
+            shown.append(np.maximum(explained, 0.0) ** 2 / np.maximum(np.einsum("njk,njk->k", X, X), 1e-300))
+        score = np.array(shown)  # (resonances, 2)
+        best = sorted(product(range(len(pairs)), repeat=2), key=lambda at: -(score[at[0], 0] + score[at[1], 1]))
+        return tuple((pairs[one][0], pairs[other][1], 0.0, DAMPING) for one, other in best[:count])
+
+    def bounds(self, situation: Situation, joint: Place) -> tuple[tuple[float, float], ...]:
+        """Bounds the stiffness to usual resonances, and the base's own inertia to the robot's."""
+        pairs = zip(_stiffness(situation, LOWEST), _stiffness(situation, HIGHEST), strict=True)
+        damping = self.shapes[3]
+        return (*pairs, (0.0, float(_inertia(situation).mean(axis=0).max())), (damping.lower, damping.upper))
+
+    def likely(
+        self, situation: Situation, joint: Place, shape: tuple[float, ...], coefficients: Array
+    ) -> tuple[tuple[float | None, ...], ...]:
+        """Lists combinations of the stiffness 1 / C, a light base and the usual damping with refined values."""
+        stiffness: tuple[tuple[float | None, float | None], ...] = ((None, None),)
+        ranges = self.bounds(situation, joint)[:2]
+        first, second, both = coefficients[:3]
+        if first * second > both**2:
+            inverse = np.array([second, first]) / (first * second - both**2)
+            ideal = [float(np.clip(value, *bound)) for value, bound in zip(inverse, ranges, strict=True)]
+            stiffness = ((ideal[0], ideal[1]), (None, None))
+        return tuple((*pair, own, damping) for pair, own, damping in product(stiffness, (0.0, None), (DAMPING, None)))[
+            :-1
+        ]
+
+    def is_plausible(self, robot: Robot, joint: Place, coefficients: Array, shape: tuple[float, ...] = ()) -> bool:
+        """Rejects compliances that would give energy: their matrix is not positive."""
+        first, second, both = coefficients[:3]
+        return bool(first * second > both**2) and super().is_plausible(robot, joint, coefficients, shape)
+
+    def columns(self, situation: Situation, joint: Place, shape: tuple[float, ...] = ()) -> Array:
+        """Evaluates the torque of all joints per compliance (N, n, 3), or per compliance and own angle (N, n, 5)."""
+        robot = situation.robot
+        axes = _axes(situation)
+        one, other = _moment(situation).T
+        none = np.zeros_like(one)
+        static = np.stack([[one, none], [none, other], [other, one]]).transpose(2, 1, 0)  # (N, 2, 3)
+        slow = (static, *situation.derivatives(static))
+        beyond = _oscillation(situation, slow[1], slow[2], shape)
+        courses = [a + b for a, b in zip(slow, (beyond, *situation.derivatives(beyond)), strict=True)]
+        tilt = tilted_torque(situation)
+        rate, acceleration = (situation.sensitivity(f"base_{kind}") @ axes.T for kind in ("rate", "acceleration"))
+        torque = sum(X @ course for X, course in zip((tilt, rate, acceleration), courses, strict=True))
+        if not upright(robot):
+            return np.asarray(torque)
+        first = robot.chain.joints[0]
+        across = axes @ np.cross(first.rotation @ first.axis, axes).T  # e_i' (d x e_k)
+        turned = (
+            np.cos(situation.q[:, 0])[:, None, None] * np.eye(2) + np.sin(situation.q[:, 0])[:, None, None] * across
+        )
+        return np.concatenate([torque, tilt @ turned], axis=2)
+
+    def describe(
+        self,
+        joint: Place,
+        coefficients: Array,
+        shape: tuple[float, ...] = (),
+        *,
+        force: str = "N m",
+        length: str = "rad",
+    ) -> str:
+        """Describes the values in one sentence."""
+        softest = 1e3 * float(np.max(coefficients[:2]))
+        return f"The base is compliant: it tilts by up to {np.degrees(softest):.2g} deg under 1000 N m."
+
+    def coordinate(self, situation: Situation, joint: Place, shape: tuple[float, ...] = ()) -> tuple[str, Array]:
+        """Returns the moment about the first horizontal axis."""
+        return "moment on the base [N m]", _moment(situation)[:, 0]
+
+
+def _axes(situation: Situation) -> Array:
+    return level_axes(np.asarray(situation.robot.chain.gravity, dtype=float))
+
+
+def _moment(situation: Situation) -> Array:
+    """Computes the moment of the robot on its base about the horizontal axes (N, 2) [N m]."""
+    return np.asarray(-situation.sensitivity("base_moment")[:, :, 0] @ _axes(situation).T)
+
+
+def _inertia(situation: Situation) -> Array:
+    """Computes the robot's inertia about both horizontal axes (N, 2, 2) [kg m2], positive definite.
+
+    A base model lacks the first link's inertia and may have a negative one, which would make the base unstable.
+    """
+
+    def positive() -> Array:
+        own = _axes(situation) @ situation.sensitivity("base_inertia") @ _axes(situation).T
+        values, vectors = np.linalg.eigh((own + own.transpose(0, 2, 1)) / 2)
+        least = LIGHTEST * max(float(values.max(initial=0.0)), 1e-9)
+        return np.asarray((vectors * np.maximum(values, least)[:, None]) @ vectors.transpose(0, 2, 1))
+
+    return situation.cached("inertia about the base", positive)
+
+
+def _stiffness(situation: Situation, resonance: float) -> tuple[float, float]:
+    """Computes the stiffnesses that give the log's mean inertia a resonance [Hz] about each axis."""
+    first, second = (2 * np.pi * resonance) ** 2 * np.diag(_inertia(situation).mean(axis=0))
+    return float(first), float(second)
+
+
+def _oscillation(situation: Situation, rate: Array, curve: Array, shape: tuple[float, ...]) -> Array:
+    """Computes what a base's tilt has beyond the static one, C m: that of a spring with the robot's inertia.
+
+    Args:
+        situation: the motion (N samples).
+        rate: first time derivative of the static tilts about both axes (N, 2, k).
+        curve: second time derivative of them (N, 2, k).
+        shape: stiffness about each axis, own inertia and damping ratio.
+
+    Returns:
+        The difference (N, 2, k); zero in logs whose resonances are both above 0.4 of the Nyquist frequency.
+    """
+    K, own, damping = np.array(shape[:2]), shape[2], shape[3]
+    axes, inertia = _axes(situation), _inertia(situation) + own * np.eye(2)
+    about = np.einsum("nkk->nk", inertia)
+    lost = axes @ situation.sensitivity("base_damping") @ axes.T
+    lost = lost + 2 * damping * np.sqrt(K * about)[:, :, None] * np.eye(2)
+    push = -(inertia @ curve + lost @ rate)
+    result = np.zeros_like(push)
+    for run in situation.runs:
+        w = np.sqrt(K / about[run].mean(axis=0))
+        if w.min() * situation.period > 0.4 * np.pi or situation.period == 0.0:
+            continue
+        # Bilinear rule, exact at the mean resonance: two rows of a banded system per sample. Two samples at rest are
+        # put before each log.
+        centre = float(np.clip(np.sqrt(w[0] * w[1]), w.min(), 0.4 * np.pi / situation.period))
+        s = centre / np.tan(0.5 * centre * situation.period)
+        x, m, d = (np.concatenate([values[run][:1]] * 2 + [values[run]]) for values in (push, inertia, lost))
+        m, d, spring = s**2 * m[1:-1], s * d[1:-1], np.diag(K)
+        blocks = [m + d + spring, 2.0 * (spring - m), m - d + spring]  # of the sample itself and of the two before
+        rows = 2 * len(x)
+        band = np.zeros((7, rows))
+        band[1, :4] = 1.0
+        for back, block in enumerate(blocks):
+            for k, j in product(range(2), range(2)):
+                first = 2 * (2 - back) + j
+                band[1 + k - j + 2 * back, first : first + 2 * len(block) : 2] = block[:, k, j]
+        right = np.concatenate([np.zeros_like(x[:2]), x[2:] + 2.0 * x[1:-1] + x[:-2]]).reshape(rows, -1)
+        result[run] = solve_banded((5, 1), band, right).reshape(len(x), 2, -1)[2:]
+    return result
