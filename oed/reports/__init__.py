@@ -5,6 +5,7 @@ from __future__ import annotations
 from robots.common.lazy import lazy_exports, listed
 
 _EXPORTS = {
+    "Animation": "oed.reports.animations.animation",
     "Band": "oed.reports.rendering.picture",
     "Fact": "oed.reports.rendering.page",
     "Finding": "oed.reports.rendering.page",
@@ -19,6 +20,7 @@ _EXPORTS = {
     "Series": "oed.reports.rendering.picture",
     "Span": "oed.reports.rendering.picture",
     "Table": "oed.reports.rendering.page",
+    "animate": "oed.reports.animations.building",
     "campaign_page": "oed.reports.pages.campaign_report",
     "comparison_page": "oed.reports.pages.comparisons.comparison_report",
     "design_page": "oed.reports.pages.design_report",
@@ -30,6 +32,7 @@ _EXPORTS = {
     "limits_page": "oed.reports.pages.diagnosis_limits",
     "loop_page": "oed.reports.pages.loops.loop_report",
     "margins_picture": "oed.reports.pictures.trajectory_pictures",
+    "motion_page": "oed.reports.pages.motions.motion_report",
     "parameter_picture": "oed.reports.pictures.parameter_pictures",
     "pareto_page": "oed.reports.pages.pareto_report",
     "payload_page": "oed.reports.pages.payload_report",
