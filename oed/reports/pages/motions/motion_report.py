@@ -21,15 +21,15 @@ def motion_page(animation: Animation, *, logs: Sequence[Recording] = (), finding
         findings: of a diagnosis of the robot.
     """
     beyond = [margin for margin in animation.approaches if margin.violated]
+    # A recorded motion has been played: a limit that it exceeds is not the robot's, or a derivative is noisy.
+    recorded = animation.source.startswith("log")
     tightest = min(animation.approaches, key=lambda margin: margin.slack_fraction, default=None)
     found = [
         Finding(
-            code="limit.exceeded",
+            code="limit.exceeded_in_log" if recorded else "limit.exceeded",
             subject=f"Joint {margin.joint}:",
             text=f"the {animation.source} exceeds the limit of {approach_text(margin)}.",
-            action="Do not play it."
-            if not animation.source.startswith("log")
-            else "Check the limits in the robot's description.",
+            action="Check the limits in the robot's description." if recorded else "Do not play it.",
         )
         for margin in beyond
     ]
@@ -43,7 +43,7 @@ def motion_page(animation: Animation, *, logs: Sequence[Recording] = (), finding
                 label="Tightest limit",
                 value=f"{100 * tightest.slack_fraction:.2f} % left",
                 note=approach_text(tightest),
-                status="act" if tightest.violated else "good",
+                status="good" if not tightest.violated else "note" if recorded else "act",
             )
         )
     return Page(

@@ -41,6 +41,8 @@ def test_verdicts() -> None:
     page = motion_page(beyond)
     assert page.level == "act"
     assert "velocity of joint 2 at 1.500 s" in page.verdict
+    # A robot that has made a motion can make it.
+    assert motion_page(replace(beyond, source="log")).level == "note"
     assert motion_page(replace(kept, approaches=())).verdict.startswith("The robot's description states no limits")
     found = motion_page(kept, findings=[Finding(code="effect.spring", text="A spring.")])
     assert "the diagnosis has 1 finding." in found.verdict
