@@ -83,7 +83,14 @@ class BaseParameters:
         return self.grouping @ np.asarray(parameters, dtype=float)
 
     def regressor(self, q: ArrayLike, dq: ArrayLike, ddq: ArrayLike, *, gravity: ArrayLike | None = None) -> Array:
-        """Evaluates Y_b (N, n, b), under another gravity (3,) of `gravities` where given."""
+        """Evaluates the base regressor Y_b (N, n, b).
+
+        Args:
+            q: positions (N, n) [rad or m].
+            dq: velocities (N, n) [rad/s or m/s].
+            ddq: accelerations (N, n) [rad/s2 or m/s2].
+            gravity: another one of `gravities` (3,), in the base frame [m/s2]; by default that of the description.
+        """
         return self.model.under(gravity).regressor(q, dq, ddq, columns=self.independent)
 
     def torque(
@@ -95,7 +102,15 @@ class BaseParameters:
         *,
         gravity: ArrayLike | None = None,
     ) -> Array:
-        """Evaluates tau = Y_b pi_b (N, n) for base parameters (b,), under another gravity (3,) where given."""
+        """Evaluates tau = Y_b pi_b (N, n) [N m or N].
+
+        Args:
+            q: positions (N, n) [rad or m].
+            dq: velocities (N, n) [rad/s or m/s].
+            ddq: accelerations (N, n) [rad/s2 or m/s2].
+            parameters: base parameters (b,).
+            gravity: another one of `gravities` (3,), in the base frame [m/s2]; by default that of the description.
+        """
         return self.model.under(gravity).torque(q, dq, ddq, parameters, columns=self.independent)
 
     def essential(
@@ -107,9 +122,9 @@ class BaseParameters:
         least one joint (thesis section 1.3: essential parameters).
 
         Args:
-            q: positions (N, n).
-            dq: velocities (N, n).
-            ddq: accelerations (N, n).
+            q: positions (N, n) [rad or m].
+            dq: velocities (N, n) [rad/s or m/s].
+            ddq: accelerations (N, n) [rad/s2 or m/s2].
             parameters: base parameters (b,).
             threshold: the share, 0 to 1.
 

@@ -106,6 +106,9 @@ class TorqueModel:
     def adjoint(self, columns: Sequence[int] | None = None) -> casadi.Function:
         """Builds the reverse mode of `symbolic`.
 
+        Args:
+            columns: indices of the p' columns that are wanted; all by default.
+
         Returns:
             (q, dq, ddq, Ybar) -> the gradients (n,) of sum(Ybar * Y) by q, dq and ddq; Ybar (n p',) lists the
             weights row by row.
@@ -166,7 +169,14 @@ class TorqueModel:
         *,
         columns: Sequence[int] | None = None,
     ) -> Array:
-        """Evaluates tau = Y pi (N, n) [N m or N] for parameters (p',), those of `columns` where given.
+        """Evaluates tau = Y pi (N, n) [N m or N].
+
+        Args:
+            q: positions (N, n) [rad or m].
+            dq: velocities (N, n) [rad/s or m/s].
+            ddq: accelerations (N, n) [rad/s2 or m/s2].
+            parameters: of the columns that are used (p',).
+            columns: indices of the p' columns that are used; all by default.
 
         Raises:
             InputError: not as many parameters as columns.
@@ -185,7 +195,11 @@ class TorqueModel:
         return tau
 
     def friction_at(self, speed: ArrayLike) -> Array:
-        """Evaluates each friction column on its own joint (p,) at joint velocities (n,); zero for other columns."""
+        """Evaluates each friction column on its own joint (p,); zero for other columns.
+
+        Args:
+            speed: joint velocities (n,) [rad/s or m/s].
+        """
         chosen = [k for k, column in enumerate(self.columns) if column.friction]
         values, n = np.zeros(self.size), self.robot.n
         if chosen:

@@ -216,7 +216,7 @@ class Log(_Samples):
         """Returns the log of some of the samples.
 
         Args:
-            part: which samples, as in ``array[part]``: a slice, or increasing indices.
+            part: which samples, as in ``array[part]``: a slice, or increasing indices (K,).
 
         Raises:
             InputError: no sample is left, or the slice runs backward.

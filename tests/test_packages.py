@@ -5,6 +5,9 @@ from __future__ import annotations
 import importlib
 import subprocess
 import sys
+import tomllib
+from fnmatch import fnmatch
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -24,6 +27,26 @@ def test_names_and_version(name):
     assert set(names.split()) == {*package.__all__, "__version__"}
     assert version == package.__version__ != ""
     assert all(getattr(package, public) is not None for public in package.__all__)
+
+
+ROOT = Path(__file__).parents[1]
+
+
+@pytest.mark.parametrize("name", ["oed", "estimation", "robots"])
+def test_wheels_hold_all_files(name):
+    """Every folder of modules is a package, and every other file is listed as package data: wheels hold both."""
+    data = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["tool"]["setuptools"]["package-data"]
+    files = [path for path in (ROOT / name).rglob("*") if path.is_file() and "__pycache__" not in path.parts]
+    assert files
+    for path in files:
+        if path.suffix == ".py":
+            assert (path.parent / "__init__.py").exists(), path
+            continue
+        assert any(
+            fnmatch(path.relative_to(ROOT / one).as_posix(), pattern)
+            for one in path.relative_to(ROOT).parents
+            for pattern in data.get(".".join(one.parts), ())
+        ), f"{path} is not in the package data"
 
 
 @pytest.mark.slow

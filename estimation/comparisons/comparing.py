@@ -31,7 +31,7 @@ def compare(models: Sequence[Model | Run], *, alpha: float = FALSE_ALARMS) -> Mo
 
     Runs are put in order of time where their logs or names state dates; the first is the baseline. Differences are
     tested by chi-square with the full covariances: the whole model, each part of each joint, each parameter. The prior
-    that the runs share makes these tests conservative.
+    that the runs share makes these tests conservative. The rate of false alarms is kept by Holm (1979).
 
     Args:
         models: two or more; a `Run` states label and date as well.

@@ -87,7 +87,12 @@ class ModelComparison:
         return tuple(item for item in self.friction if item.kind == "own")
 
     def of_run(self, run: int | None, level: str) -> tuple[Difference, ...]:
-        """Gives the tests of one level of one run against the first, or of all runs together (None)."""
+        """Gives the tests of one level of one run against the first.
+
+        Args:
+            run: index of the run; None for all runs together.
+            level: as in `Difference.level`.
+        """
         return tuple(item for item in self.differences if item.run == run and item.level == level)
 
     def verdict(self) -> str:
@@ -115,7 +120,14 @@ class ModelComparison:
         return text
 
     def shared_change(self, run: int) -> tuple[float, float] | None:
-        """Log ratio of the friction that joints share in a run, with its error; None where no joint changed so."""
+        """Gives the log ratio of the friction that joints share in a run, with its standard error.
+
+        Args:
+            run: index of the run.
+
+        Returns:
+            The ratio and its error; None unless more joints changed together than stayed as they were.
+        """
         items = [item for item in self.friction if item.run == run and item.kind in ("common", "unequal")]
         others = [item for item in self.friction if item.run == run and item.kind == "unchanged"]
         if len(items) <= len(others) or not items:
@@ -232,7 +244,11 @@ class ModelComparison:
         }
 
     def plot(self, ax: Axes | None = None) -> Axes:
-        """Draws each run's friction at 0.6 of the largest speed, relative to the first run."""
+        """Draws each run's friction at 0.6 of the largest speed, relative to the first run.
+
+        Args:
+            ax: where to draw; a new figure by default.
+        """
         from matplotlib.figure import Figure
 
         axes = ax if ax is not None else Figure(figsize=(7, 4)).subplots()
@@ -249,6 +265,10 @@ class ModelComparison:
 
     def save(self, folder: str | Path, *, force: bool = False) -> None:
         """Writes `compare.json` and the merged `model.json` into a folder that is there.
+
+        Args:
+            folder: an existing one.
+            force: replace files that are there.
 
         Raises:
             InputError: a file is there, and force is not given.

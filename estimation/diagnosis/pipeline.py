@@ -44,7 +44,8 @@ def diagnose(
     spectrum of the torque noise is estimated. Every effect of the catalogue is scored at every joint, jointly with the
     base model; p-values count all of them (Bonferroni). Shapes are refined and rivals tried before the next effect is
     searched. Causes must explain the data as well as free functions in their place, and improve the held-out
-    prediction. A significant residual that no effect explains is reported as unexplained.
+    prediction. A significant residual that no effect explains is reported as unexplained. Effects and shapes are
+    compared by the Bayesian information criterion (Schwarz 1978).
 
     Args:
         robot: the robot.

@@ -43,10 +43,16 @@ void {prefix}_gravity(const double* q, double* tau) {{
 
 
 def export_c(model: Model, path: str | Path, *, prefix: str = "robot", force: bool = False) -> None:
-    """Writes the C of `c_code`.
+    """Writes torque and gravity of a model as C99, see `c_code`.
+
+    Args:
+        model: an identified model.
+        path: the file.
+        prefix: of the functions' names.
+        force: replace a file that is there.
 
     Raises:
-        InputError: the file is there, and force is not given.
+        InputError: the file is there, and force is not given; see also `c_code`.
     """
     write_atomic(Path(path), c_code(model, prefix=prefix), force=force)
 

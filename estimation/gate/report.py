@@ -51,9 +51,9 @@ class GateReport:
         parts: (first, stop) indices of the parts without a gap and without a column that hung. Nothing is interpolated
             between them.
         motion_parts: the same, with the rows in which a torque or current hung.
-        spikes: indices of rows with isolated outliers, which a fit leaves out.
-        stale: indices of rows with wrong times, which a fit leaves out: copies of the row before, and rows that were
-            written late by an unknown time.
+        spikes: indices (K,) of rows with isolated outliers, which a fit leaves out.
+        stale: indices (K,) of rows with wrong times, which a fit leaves out: copies of the row before, and rows
+            that were written late by an unknown time.
         t: times of the rows (N,) [s], corrected for rows that were written late, if possible.
         q: positions (N, n) [rad or m], with unwrapped angles.
         delay: by which the torque lags the position (n,) [s], NaN if the log does not determine it.

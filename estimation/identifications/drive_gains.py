@@ -29,12 +29,12 @@ def identify_drive_gains(
     friction: str = "polynomial",
     cutoff: float = CUTOFF,
 ) -> DriveGains:
-    """Identifies the torque per ampere of each joint, from currents under a payload that is known.
+    """Identifies the torque per ampere of each joint, from currents under a known payload (Gautier and Briot 2014).
 
     Args:
         robot: the robot.
-        runs: logs with currents, each with the payload's ten parameters about the last link's frame, or None for a run
-            without: at least one with a payload, and better one without.
+        runs: logs with currents, each with the payload's parameters (10,) about the last link's frame, or None for a
+            run without: at least one with a payload, and better one without.
         friction: ``polynomial`` or ``coulomb-viscous``.
         cutoff: of the smoothing [Hz].
 

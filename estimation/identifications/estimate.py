@@ -70,7 +70,7 @@ class Estimate:
         joints: how well each joint is explained.
         white_noise_errors: standard errors (b,) that white noise would have: too small where noise is coloured.
         t: times (N,) of the fitted rows [s].
-        dq: joint velocities (N, n) of the fitted rows.
+        dq: joint velocities (N, n) of the fitted rows [rad/s or m/s].
         measured: torque (N, n) of the fitted rows, minus that of known payloads [N m or N].
         predicted: by the model (N, n).
         dropped_rows: rows of the logs that repeated an old position.
@@ -216,7 +216,11 @@ class Estimate:
         }
 
     def plot(self, ax: Axes | None = None) -> Axes:
-        """Draws measured against predicted torque of all joints, each over its RMS."""
+        """Draws measured against predicted torque of all joints, each over its RMS.
+
+        Args:
+            ax: where to draw; a new figure by default.
+        """
         from matplotlib.figure import Figure
 
         axes = ax if ax is not None else Figure(figsize=(5, 5)).subplots()
@@ -231,6 +235,10 @@ class Estimate:
 
     def save(self, folder: str | Path, *, force: bool = False) -> None:
         """Writes `model.json` into a folder that is there.
+
+        Args:
+            folder: an existing one.
+            force: replace a file that is there.
 
         Raises:
             InputError: the file is there, and force is not given.

@@ -114,16 +114,16 @@ class Model:
         payload: ArrayLike | None = None,
         before: Sequence[Motion] = (),
     ) -> Array:
-        """Predicts the torque (N, n) [N m or N] of a motion given by arrays (N, n).
+        """Predicts the torque (N, n) [N m or N] of a motion.
 
         Args:
-            q: positions.
-            dq: velocities.
-            ddq: accelerations.
+            q: positions (N, n) [rad or m].
+            dq: velocities (N, n) [rad/s or m/s].
+            ddq: accelerations (N, n) [rad/s2 or m/s2].
             t: times (N,) [s]. With them the extensions count, some of which depend on time or on what came before;
                 without, the terms alone.
             gravity: (3,) in the base frame [m/s2], where the base stands otherwise than the robot's description says.
-            payload: ten inertial parameters of a body on the flange, in its frame, as `Log` has them.
+            payload: inertial parameters (10,) of a body on the flange, in its frame, as in `Log`.
             before: motions that came before on the same clock, with the same gravity and payload: the heat they left
                 acts.
 
@@ -213,6 +213,10 @@ class Model:
     def save(self, path: Path, *, force: bool = False) -> None:
         """Writes `model.json`, whole or not at all.
 
+        Args:
+            path: the file.
+            force: replace a file that is there.
+
         Raises:
             InputError: the file is there, and force is not given.
         """
@@ -220,9 +224,7 @@ class Model:
 
 
 def load_model(path: str | Path) -> Model:
-    """Reads a `model.json`, or the one in a folder.
-
-    The file holds what the model refers to of the robot, so that a prediction needs nothing else.
+    """Reads the `model.json` at `path`, or in the folder there. It holds all of the robot that a prediction needs.
 
     Raises:
         InputError: a missing file, or one that is no model.

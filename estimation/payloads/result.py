@@ -178,7 +178,11 @@ class PayloadEstimate:
         }
 
     def plot(self, ax: Axes | None = None) -> Axes:
-        """Draws each joint's torque error without and with the payload."""
+        """Draws each joint's torque error without and with the payload.
+
+        Args:
+            ax: where to draw; a new figure by default.
+        """
         from matplotlib.figure import Figure
 
         axes = ax if ax is not None else Figure(figsize=(6, 4)).subplots()
@@ -195,6 +199,10 @@ class PayloadEstimate:
     def save(self, folder: str | Path, *, force: bool = False) -> None:
         """Writes `payload.json` into a folder that is there.
 
+        Args:
+            folder: an existing one.
+            force: replace a file that is there.
+
         Raises:
             InputError: the file is there, and force is not given.
         """
@@ -204,6 +212,9 @@ class PayloadEstimate:
 
 def load_payload(path: str | Path) -> PayloadEstimate:
     """Reads a `payload.json`, or the one in a folder.
+
+    Args:
+        path: the file, or its folder.
 
     Raises:
         InputError: a missing file, or one that is no payload.

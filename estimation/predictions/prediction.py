@@ -166,6 +166,10 @@ class Prediction:
     def save(self, path: str | Path, *, force: bool = False) -> None:
         """Writes CSV or Parquet: t, tau1..taun, and the band: tau1_lower, tau1_upper, tau1_extrapolates (0 or 1) ...
 
+        Args:
+            path: the file, ending in .csv or .parquet.
+            force: replace a file that is there.
+
         Raises:
             InputError: the file is there, and force is not given.
         """
@@ -201,7 +205,7 @@ def predict(
             or a gravity that it states counts. Where it overlaps in time the logs in which a model's change was found,
             it counts as recorded after them (`clock_shift`).
         thermal: this model with its thermal models: friction falls as the motion heats the joints.
-        start: temperatures of each joint's zones at first [degC]; ambient temperature by default.
+        start: temperatures (z,) of each joint's z zones at first [degC]; ambient temperature by default.
         ambient: ambient temperature where the log does not state it [degC]; each model's by default.
         later: how much later [s] than its own clock says the log counts; by default what `clock_shift` says.
         before: logs of what the robot did before, for a model whose effects keep heat: without any it begins cold.
@@ -212,9 +216,8 @@ def predict(
         The torques at the log's own times, without parts that are too short to be smoothed.
 
     Raises:
-        InputError: another number of joints, too few rows, or a motion that the gate refuses; a gravity that shows
-            parameters which the model lacks; a payload or a gravity beside heat; logs before the motion that come after
-            it, or of a model that keeps none.
+        InputError: another number of joints, too few rows, a motion that the gate refuses; a gravity that needs missing
+            parameters; a payload or gravity beside heat; `before` after the motion, or for a model that keeps no heat.
     """
     robot = model.robot
     if log.n != robot.n:

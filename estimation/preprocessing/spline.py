@@ -52,7 +52,7 @@ class SmoothingSpline(Smoother):
         normal = (basis.T @ basis).todia()
         size = pieces + DEGREE
         banded = np.zeros((DEGREE + 1, size))
-        for offset, diagonal in zip(normal.offsets, normal.data, strict=True):
+        for offset, diagonal in zip(normal.offsets.tolist(), normal.data, strict=True):
             if 0 <= offset <= DEGREE:
                 banded[DEGREE - offset, offset:] = diagonal[offset:size]
         rate = (len(t) - 1) / duration
@@ -61,7 +61,7 @@ class SmoothingSpline(Smoother):
         weight = agreement * rate * (2 * np.pi * own) ** -6 * width**-5
         for offset, diagonal in enumerate(_third_differences(size)):
             banded[DEGREE - offset, offset:] += weight * diagonal
-        coefficients = solveh_banded(banded, basis.T @ q)
+        coefficients = solveh_banded(banded, np.asarray(basis.T @ q))
         spline = BSpline(knots, coefficients, DEGREE)
         at = np.clip((positions.original - start) / width, 0.0, pieces)
         derivatives = (spline(at, nu=order) / width**order for order in (0, 1, 2))

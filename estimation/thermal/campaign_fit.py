@@ -13,6 +13,7 @@ from estimation.identifications.identification import identify
 from estimation.logs.known_setup import HEAT, require_plain
 from estimation.models.model import Model
 from estimation.thermal.band import error_band
+from estimation.thermal.expected_rounds import expected_rounds
 from estimation.thermal.information import inverse_of, solve_normal
 from estimation.thermal.results.campaign_estimate import CampaignEstimate
 from estimation.thermal.results.estimate import ThermalEstimate
@@ -51,7 +52,8 @@ def fit_campaign(
     """Fits rigid body, friction at T0 and each joint's heat to all logs of a campaign.
 
     The logs are condensed to normal equations of short times, in which a temperature is constant. Linear parameters and
-    thermal models are fitted in turn until both converge. Standard errors come from the joint information.
+    thermal models (thesis chapter 4) are fitted in turn until both converge. Standard errors come from the joint
+    information.
 
     Args:
         robot: the robot.
@@ -109,7 +111,7 @@ class _AlternatingFit:
         self._solve_linear()
         without = self._residuals()
         fits: list[ThermalEstimate | None] = [None] * len(self.moves)
-        rounds = 0
+        rounds, whole, changes = 0, float(MOST_ROUNDS), list[float]()
         for rounds in range(1, MOST_ROUNDS + 1):
             change = 0.0
             for j, sums in enumerate(self.condensed.joints):
@@ -120,8 +122,11 @@ class _AlternatingFit:
                 factor = self._factor(fit, runs) / fit.model.beta
                 change = max(change, float(np.abs(factor / self.factors[j] - 1.0).max()))
                 fits[j], self.factors[j] = fit, factor
+                share = (rounds - 1 + (j + 1) / len(self.moves)) / max(whole, rounds)
+                bar.update(2.0 + MOST_ROUNDS * share, f"round {rounds}, joint {j + 1}")
             self._solve_linear()
-            bar.update(2.0 + rounds, f"friction changed by {change:.1e}")
+            changes.append(change)
+            whole = expected_rounds(changes, SETTLED, MOST_ROUNDS)
             if change < SETTLED:
                 break
         notes = (

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -66,7 +67,8 @@ def choose_thermal(
     if not orders:
         raise InputError("no models", allowed=", ".join(THERMAL_MODELS))
     bar = progress or SILENT
-    bar.start("comparing thermal models", float(len(orders)))
+    fits = 1 + (len(data) if how == "runs" else 1)
+    bar.start("comparing thermal models", float(len(orders) * fits))
     found: list[Candidate] = []
     trouble: OedError | None = None
     try:
@@ -75,7 +77,7 @@ def choose_thermal(
             options: dict[str, Any] = {"order": order, "alpha": alpha, "fixed": own, "start": start, "seed": seed}
             try:
                 estimate = fit_thermal(data, starts=starts, **options)
-                errors = _held_out_errors(data, how, estimate, options)
+                errors = _held_out_errors(data, how, estimate, options, partial(_fitted, bar, fits * k + 1, order))
                 found.append(
                     Candidate(
                         order=estimate.model.name,
@@ -94,7 +96,7 @@ def choose_thermal(
                         order=order, estimate=None, held_out=np.nan, heating=None, cooling=None, failure=str(error)
                     )
                 )
-            bar.update(float(k + 1), order)
+            _fitted(bar, fits * k, order, fits)
     finally:
         bar.finish()
     usable = [item for item in found if item.estimate is not None]
@@ -107,14 +109,22 @@ def choose_thermal(
     return ThermalChoice(candidates=tuple(found), best=best.order, held_out=how)
 
 
-def _held_out_errors(data: list[ThermalRun], how: str, whole: ThermalEstimate, options: dict[str, Any]) -> Array:
+def _fitted(bar: Progress, before: int, order: str, number: int) -> None:
+    bar.update(float(before + number), order)
+
+
+def _held_out_errors(
+    data: list[ThermalRun], how: str, whole: ThermalEstimate, options: dict[str, Any], fitted: Callable[[int], None]
+) -> Array:
     """Errors on what a fit had not seen: friction over its cold value, and temperatures [K]."""
     parts = []
+    fitted(0)
     if how == "runs":
-        for run in data:
+        for number, run in enumerate(data, start=1):
             rest = fit_thermal([other for other in data if other is not run], starts=1, **options)
             start = next(fit.start for fit in whole.runs if fit.name == run.name)
             parts.append(predict_run(rest.model, run, start)[1])
+            fitted(number)
     else:
         cuts = [max(3, round(2 * len(run.t) / 3)) for run in data]
         short = [run.rows(slice(0, cut)) for run, cut in zip(data, cuts, strict=True)]

@@ -32,7 +32,7 @@ def fit_thermal(
     seed: int = 0,
     progress: Progress | None = None,
 ) -> ThermalEstimate:
-    """Fits one thermal model to all runs of a joint at once, by direct collocation.
+    """Fits one thermal model to all runs of a joint at once, by direct collocation (models: thesis chapter 4).
 
     Args:
         runs: heatings and coolings of one joint, of different power if possible.

@@ -83,8 +83,7 @@ class Campaign:
     @property
     def samples(self) -> int:
         """How many samples are played."""
-        stages = self.stages_by_name
-        return sum(len(stages[slot.stage].motion) for slot in self.slots if slot.stage is not None)
+        return sum(len(self.stages_by_name[slot.stage].motion) for slot in self.slots if slot.stage is not None)
 
     @property
     def success(self) -> bool:
@@ -152,12 +151,11 @@ class Campaign:
         return pd.DataFrame([slot.to_dict() for slot in self.slots])
 
     def plot(self, ax: Axes | None = None) -> Axes:
-        """Draws the expected temperatures where heat is produced; without a thermal model, the heat so far."""
+        """Draws on `ax` the expected temperatures where heat is produced; without a thermal model, the heat so far."""
         from matplotlib.figure import Figure
 
         axes = ax if ax is not None else Figure(figsize=(9, 4)).subplots()
-        temperatures = self.temperatures
-        if temperatures is not None:
+        if (temperatures := self.temperatures) is not None:
             t, values, label = temperatures.t, temperatures.T1, "expected temperature [degC]"
         else:
             t = np.array([0.0, *(slot.end for slot in self._last_slots())])
@@ -211,7 +209,11 @@ class Campaign:
         }
 
     def save(self, folder: str | PathLike[str], *, force: bool = False) -> None:
-        """Writes a CSV per stage and `campaign.json` into a folder that is there.
+        """Writes a CSV per stage and `campaign.json`.
+
+        Args:
+            folder: an existing one.
+            force: replace files that are there.
 
         Raises:
             InputError: a file is there, and force is not given.

@@ -29,9 +29,11 @@ from oed.cli.commands.predict import predict
 from oed.cli.commands.record import record
 from oed.cli.commands.retime import retime
 from oed.cli.commands.robot import robot, robots
+from oed.cli.commands.show import show
 from oed.cli.commands.simulate import simulate
 from oed.cli.commands.stream import stream
 from oed.cli.commands.thermal import thermal
+from oed.cli.commands.view import view
 from oed.cli.configuration.defaults import HELP_TEXT
 from oed.cli.help.groups import Commands
 
@@ -46,6 +48,7 @@ FUNCTIONS = (
     campaign,
     loop,
     simulate,
+    show,
     check,
     identify,
     thermal,
@@ -57,6 +60,7 @@ FUNCTIONS = (
     payload,
     force,
     benchmark,
+    view,
     example,
     robot,
     robots,

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from functools import partial
+from typing import Any
+
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.optimize import least_squares, minimize
@@ -133,11 +136,14 @@ def nearest_feasible(limits: GeometricLimits, home: ArrayLike, *, seed: int = 0,
     def values(x: Array) -> Array:
         return np.array(function(x)[0])[:, 0] - room
 
-    rows = {"type": "ineq", "fun": values, "jac": lambda x: np.array(function(x)[1])}
+    def distance(x: Array) -> tuple[float, Array]:
+        return float((x - q) @ (x - q)), 2.0 * (x - q)
+
+    rows: Any = {"type": "ineq", "fun": values, "jac": lambda x: np.array(function(x)[1])}
     for attempt in range(STARTS):
         start = np.clip(q + random.normal(scale=0.2 * attempt, size=robot.n), lower, upper)
         result = minimize(
-            lambda x: (float((x - q) @ (x - q)), 2.0 * (x - q)),
+            distance,
             start,
             jac=True,
             bounds=list(zip(lower, upper, strict=True)),
@@ -168,11 +174,14 @@ def tool_approach(robot: Robot, box: ToolBox, *, seed: int = 0) -> tuple[float, 
     q = low + span * np.random.default_rng(seed).uniform(0.001, 0.999, (SAMPLES, robot.n))
     distances = np.linalg.norm(_beyond(robot, box, q), axis=1)
     best = q[int(distances.argmin())]
+
+    def beyond(x: Array) -> Array:
+        return _beyond(robot, box, x[None])[0]
+
     if distances.min() > 0.0:
         for start in q[np.argsort(distances)[:STARTS]]:
-            result = least_squares(
-                lambda x: _beyond(robot, box, x[None])[0], start, lambda x: _slope(robot, box, x), (low, low + span)
-            )
+            slope = partial(_slope, robot, box)
+            result = least_squares(beyond, start, slope, (low, low + span))
             if np.linalg.norm(_beyond(robot, box, result.x[None])) < np.linalg.norm(_beyond(robot, box, best[None])):
                 best = result.x
     return float(np.linalg.norm(_beyond(robot, box, best[None]))), _tool(robot, box, best[None])[0]

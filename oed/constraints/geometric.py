@@ -25,15 +25,27 @@ class GeometricLimit(ABC):
 
     @abstractmethod
     def names(self, robot: Robot) -> tuple[str, ...]:
-        """Names the m rows for people."""
+        """Names the m rows for people.
+
+        Args:
+            robot: the robot that keeps the limit.
+        """
 
     @abstractmethod
     def units(self, robot: Robot) -> tuple[str, ...]:
-        """Gives the unit of each row."""
+        """Gives the unit of each row.
+
+        Args:
+            robot: the robot that keeps the limit.
+        """
 
     @abstractmethod
     def rows(self, frames: Frames) -> Rows:
-        """Writes g (m, 1) and its gradient by q (m, n)."""
+        """Writes g (m, 1) and its gradient by q (m, n).
+
+        Args:
+            frames: the links' frames at q, symbolic.
+        """
 
     def check(self, robot: Robot) -> None:  # noqa: B027 - most limits suit every robot
         """Refuses a robot that the limit does not suit.

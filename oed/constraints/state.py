@@ -28,7 +28,11 @@ class StateLimit(ABC):
 
     @abstractmethod
     def names(self, robot: Robot) -> tuple[str, ...]:
-        """Names the rows for people."""
+        """Names the rows for people.
+
+        Args:
+            robot: the robot that keeps the limit.
+        """
 
     @abstractmethod
     def rows(self, frames: Frames, dq: casadi.SX, ddq: casadi.SX) -> casadi.SX:

@@ -41,10 +41,19 @@ class Criterion(ABC):
 
     @abstractmethod
     def surrogate(self, eigenvalues: Array, sharpness: float) -> tuple[float, Array]:
-        """Gives a smooth function to minimise and its derivatives (m,) by the eigenvalues."""
+        """Gives a smooth function to minimise and its derivatives (m,) by the eigenvalues.
+
+        Args:
+            eigenvalues: of Y'Y (m,), ascending.
+            sharpness: p, see `stages`.
+        """
 
     def cost(self, eigenvalues: Array) -> float:
-        """Gives the criterion itself in the sense of the surrogates, smaller being better, to compare designs by."""
+        """Gives the criterion itself in the sense of the surrogates, smaller being better, to compare designs by.
+
+        Args:
+            eigenvalues: of Y'Y (m,), ascending.
+        """
         return -self.value(eigenvalues) if self.larger_is_better else self.value(eigenvalues)
 
 

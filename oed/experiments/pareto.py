@@ -81,7 +81,11 @@ class ParetoFront:
         return "\n".join(lines)
 
     def plot(self, ax: Axes | None = None) -> Axes:
-        """Draws the first two criteria against each other."""
+        """Draws the first two criteria against each other.
+
+        Args:
+            ax: where to draw; a new figure by default.
+        """
         from matplotlib.figure import Figure
 
         axes = ax if ax is not None else Figure(figsize=(6, 5)).subplots()
@@ -114,6 +118,10 @@ class ParetoFront:
 
     def save(self, folder: str | Path, *, force: bool = False) -> None:
         """Writes `pareto.json`, and each design in a folder of its own.
+
+        Args:
+            folder: an existing one.
+            force: replace files that are there.
 
         Raises:
             InputError: a file is there, and force is not given.

@@ -41,6 +41,7 @@ def retime(
 ) -> RetimedExperiment:
     """Runs through the path of a motion, or through waypoints, as fast as the robot's limits allow.
 
+    ``toppra`` is TOPP-RA (Pham and Pham 2018), ``ruckig`` the generator of Berscheid and Kröger (2021).
     Through waypoints ``toppra`` lays a smooth path that stops only where it turns back. It is compared with straight
     moves that stop at each waypoint.
 

@@ -2,83 +2,67 @@
 
 from __future__ import annotations
 
-from oed.reports.pages.campaign_report import campaign_page, save_campaign_report
-from oed.reports.pages.comparisons.comparison_report import comparison_page, save_comparison_report
-from oed.reports.pages.design_report import design_page, save_design_report
-from oed.reports.pages.diagnosis_limits import limits_page, save_limits_report
-from oed.reports.pages.diagnosis_report import diagnosis_page, save_diagnosis_report
-from oed.reports.pages.estimate_report import estimate_page, save_estimate_report
-from oed.reports.pages.forces.force_report import force_page, save_force_report
-from oed.reports.pages.loops.loop_report import loop_page, save_loop_report
-from oed.reports.pages.pareto_report import pareto_page, save_pareto_report
-from oed.reports.pages.payload_report import payload_page, save_payload_report
-from oed.reports.pages.prediction_report import prediction_page
-from oed.reports.pages.retime_report import retime_page, save_retime_report
-from oed.reports.pictures.parameter_pictures import error_bars_picture, friction_picture, parameter_picture
-from oed.reports.pictures.torque_pictures import residual_picture, torque_picture
-from oed.reports.pictures.trajectory_pictures import margins_picture, spectrum_picture, trajectory_picture
-from oed.reports.rendering.html import render
-from oed.reports.rendering.matplotlib_ import save_png, to_matplotlib
-from oed.reports.rendering.page import Fact, Finding, Page, Section, Table
-from oed.reports.rendering.picture import Band, Line, Panel, Picture, Series, Span
-from oed.reports.rendering.plotly_ import to_plotly
-from oed.reports.rendering.provenance import Footer, InputFile, Recording
-from oed.reports.rendering.severity import severity
-from oed.reports.rendering.significant import percent, significant, significant_error, with_error
+from robots.common.lazy import lazy_exports, listed
 
-__all__ = [
-    "Band",
-    "Fact",
-    "Finding",
-    "Footer",
-    "InputFile",
-    "Line",
-    "Page",
-    "Panel",
-    "Picture",
-    "Recording",
-    "Section",
-    "Series",
-    "Span",
-    "Table",
-    "campaign_page",
-    "comparison_page",
-    "design_page",
-    "diagnosis_page",
-    "error_bars_picture",
-    "estimate_page",
-    "force_page",
-    "friction_picture",
-    "limits_page",
-    "loop_page",
-    "margins_picture",
-    "parameter_picture",
-    "pareto_page",
-    "payload_page",
-    "percent",
-    "prediction_page",
-    "render",
-    "residual_picture",
-    "retime_page",
-    "save_campaign_report",
-    "save_comparison_report",
-    "save_design_report",
-    "save_diagnosis_report",
-    "save_estimate_report",
-    "save_force_report",
-    "save_limits_report",
-    "save_loop_report",
-    "save_pareto_report",
-    "save_payload_report",
-    "save_png",
-    "save_retime_report",
-    "severity",
-    "significant",
-    "significant_error",
-    "spectrum_picture",
-    "to_matplotlib",
-    "to_plotly",
-    "torque_picture",
-    "trajectory_picture",
-    "with_error",
-]
+_EXPORTS = {
+    "Animation": "oed.reports.animations.animation",
+    "Band": "oed.reports.rendering.picture",
+    "Fact": "oed.reports.rendering.page",
+    "Finding": "oed.reports.rendering.page",
+    "Footer": "oed.reports.rendering.provenance",
+    "InputFile": "oed.reports.rendering.provenance",
+    "Line": "oed.reports.rendering.picture",
+    "Page": "oed.reports.rendering.page",
+    "Panel": "oed.reports.rendering.picture",
+    "Picture": "oed.reports.rendering.picture",
+    "Recording": "oed.reports.rendering.provenance",
+    "Section": "oed.reports.rendering.page",
+    "Series": "oed.reports.rendering.picture",
+    "Span": "oed.reports.rendering.picture",
+    "Table": "oed.reports.rendering.page",
+    "animate": "oed.reports.animations.building",
+    "campaign_page": "oed.reports.pages.campaign_report",
+    "comparison_page": "oed.reports.pages.comparisons.comparison_report",
+    "design_page": "oed.reports.pages.design_report",
+    "diagnosis_page": "oed.reports.pages.diagnosis_report",
+    "error_bars_picture": "oed.reports.pictures.parameter_pictures",
+    "estimate_page": "oed.reports.pages.estimate_report",
+    "force_page": "oed.reports.pages.forces.force_report",
+    "friction_picture": "oed.reports.pictures.parameter_pictures",
+    "limits_page": "oed.reports.pages.diagnosis_limits",
+    "loop_page": "oed.reports.pages.loops.loop_report",
+    "margins_picture": "oed.reports.pictures.trajectory_pictures",
+    "motion_page": "oed.reports.pages.motions.motion_report",
+    "parameter_picture": "oed.reports.pictures.parameter_pictures",
+    "pareto_page": "oed.reports.pages.pareto_report",
+    "payload_page": "oed.reports.pages.payload_report",
+    "percent": "oed.reports.rendering.significant",
+    "prediction_page": "oed.reports.pages.prediction_report",
+    "render": "oed.reports.rendering.html",
+    "residual_picture": "oed.reports.pictures.torque_pictures",
+    "retime_page": "oed.reports.pages.retime_report",
+    "save_campaign_report": "oed.reports.pages.campaign_report",
+    "save_comparison_report": "oed.reports.pages.comparisons.comparison_report",
+    "save_design_report": "oed.reports.pages.design_report",
+    "save_diagnosis_report": "oed.reports.pages.diagnosis_report",
+    "save_estimate_report": "oed.reports.pages.estimate_report",
+    "save_force_report": "oed.reports.pages.forces.force_report",
+    "save_limits_report": "oed.reports.pages.diagnosis_limits",
+    "save_loop_report": "oed.reports.pages.loops.loop_report",
+    "save_pareto_report": "oed.reports.pages.pareto_report",
+    "save_payload_report": "oed.reports.pages.payload_report",
+    "save_png": "oed.reports.rendering.matplotlib_",
+    "save_retime_report": "oed.reports.pages.retime_report",
+    "severity": "oed.reports.rendering.severity",
+    "significant": "oed.reports.rendering.significant",
+    "significant_error": "oed.reports.rendering.significant",
+    "spectrum_picture": "oed.reports.pictures.trajectory_pictures",
+    "to_matplotlib": "oed.reports.rendering.matplotlib_",
+    "to_plotly": "oed.reports.rendering.plotly_",
+    "torque_picture": "oed.reports.pictures.torque_pictures",
+    "trajectory_picture": "oed.reports.pictures.trajectory_pictures",
+    "with_error": "oed.reports.rendering.significant",
+}
+__all__ = list(_EXPORTS)
+__getattr__ = lazy_exports(__name__, _EXPORTS)
+__dir__ = listed(_EXPORTS)

@@ -171,7 +171,13 @@ def _fastest(stretch: Stretch, task: _Task) -> _Timing:
 
 def _by_toppra(path: Motion | ArrayLike, task: _Task) -> _Timing:
     # Imported here because toppra brings in matplotlib.pyplot, which most commands do not need.
-    from oed.retiming.path_speed import TorqueConstraint, path_speed
+    try:
+        from oed.retiming.path_speed import TorqueConstraint, path_speed
+    except ModuleNotFoundError as error:
+        raise InputError(
+            f"this retiming needs the package {error.name}, which is not installed",
+            remedy="use --method ruckig, or pip install toppra (a C++ compiler builds it where there is no wheel)",
+        ) from error
 
     limits = task.limits
     pieces = split_path(path, limits.velocity)

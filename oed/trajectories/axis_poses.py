@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -137,7 +137,7 @@ class _Search:
         if self._angles(self._poses(start[None]))[0] < ALIGNED:
             return start
         box = (self._lower, self._upper)
-        tight = {"xtol": 1e-15, "gtol": 1e-15, "ftol": 1e-15}
+        tight: dict[str, Any] = {"xtol": 1e-15, "gtol": 1e-15, "ftol": 1e-15}
         return least_squares(self._residual, start, self._jacobian, bounds=box, args=(start,), **tight).x
 
     def _poses(self, free: Array) -> Array:

@@ -104,7 +104,7 @@ def _libc() -> str:
     # A library built with a newer one does not load with an older.
     try:
         return os.confstr("CS_GNU_LIBC_VERSION") or ""
-    except ValueError:
+    except (AttributeError, ValueError):  # Windows; macOS
         return ""
 
 
@@ -120,11 +120,13 @@ def _processor() -> str:
 def _build(source: str) -> Path:
     path, identity = compiler()
     key = hashlib.sha256("\0".join((source, identity, *FLAGS, *VECTOR_LIBM)).encode()).hexdigest()[:32]
-    for folder in (cache_folder(), Path(tempfile.gettempdir()) / f"robot-oed-{os.getuid()}"):
+    # Windows has no numbers of users, and a temporary folder for each of them.
+    user = os.getuid() if hasattr(os, "getuid") else None
+    for folder in (cache_folder(), Path(tempfile.gettempdir()) / f"robot-oed-{'user' if user is None else user}"):
         library = folder / f"{key}.so"
         try:
             folder.mkdir(parents=True, exist_ok=True, mode=0o700)
-            if folder.stat().st_uid != os.getuid():
+            if user is not None and folder.stat().st_uid != user:
                 raise PermissionError(f"{folder} belongs to another user")  # who could leave any code there
             if not library.exists():
                 _compile(path, source, library)

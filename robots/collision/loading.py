@@ -56,7 +56,7 @@ def collision_model(
     stated = description
     own_links = True
     if stated is None:
-        stated, own_links = _stated(robot)
+        stated, own_links = stated_collision(robot)
     try:
         shapes, reason = Scene(), ""
         touching: tuple[frozenset[int | str], ...] = ()
@@ -89,8 +89,15 @@ def collision_model(
     return model
 
 
-def _stated(robot: Robot) -> tuple[CollisionDescription, bool]:
-    """Reads the collision part of the robot's file, and whether its link numbers are those of this robot."""
+def stated_collision(robot: Robot) -> tuple[CollisionDescription, bool]:
+    """Reads the collision part of the robot's file, and whether its link numbers are those of this robot.
+
+    Args:
+        robot: of the catalogue, a YAML, or another file, which states none.
+
+    Raises:
+        InputError: the file is wrong or has moved.
+    """
     if robot.origin in catalogue():
         path = CATALOG / f"{robot.origin}.yaml"
     else:

@@ -42,10 +42,16 @@ class UrdfShape:
 
 
 def collision_shapes(source: str | Path) -> dict[str, tuple[UrdfShape, ...]]:
-    """Reads the ``<collision>`` shapes of a URDF or xacro file.
+    """Reads the ``<collision>`` shapes of a URDF or xacro file: see `drawn_shapes`."""
+    return drawn_shapes(source, "collision")
+
+
+def drawn_shapes(source: str | Path, use: Literal["collision", "visual"]) -> dict[str, tuple[UrdfShape, ...]]:
+    """Reads the shapes of a URDF or xacro file.
 
     Args:
         source: the file, as for `urdf_bytes`.
+        use: which of a link's shapes: those for distances or those for pictures.
 
     Returns:
         Link to its shapes; links without any are left out.
@@ -62,7 +68,7 @@ def collision_shapes(source: str | Path) -> dict[str, tuple[UrdfShape, ...]]:
     for link in root.findall("link"):
         name = link.get("name", "")
         read = UrdfReader(str(source), f"link {name!r}")
-        found = tuple(_shape(element, name, read) for element in link.findall("collision"))
+        found = tuple(_shape(element, name, read) for element in link.findall(use))
         if found:
             shapes[name] = found
     return shapes
@@ -73,7 +79,9 @@ def _shape(element: ElementTree.Element, link: str, read: UrdfReader) -> UrdfSha
     geometry = element.find("geometry")
     drawn = [] if geometry is None else [child for child in geometry if child.tag in (*_SIZES, "mesh")]
     if len(drawn) != 1:
-        raise read.error("<collision> has no shape", allowed="one box, cylinder, sphere, capsule or mesh in <geometry>")
+        raise read.error(
+            f"<{element.tag}> has no shape", allowed="one box, cylinder, sphere, capsule or mesh in <geometry>"
+        )
     (shape,) = drawn
     if shape.tag == "mesh":
         file = shape.get("filename", "")

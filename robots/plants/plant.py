@@ -40,6 +40,9 @@ class Plant:
         sensors: what the log sees of it.
         effects: what it has beyond the model.
         heat: of its friction; None where friction does not change.
+
+    Raises:
+        InputError: parameters that are not one finite number per column.
     """
 
     model: TorqueModel
@@ -49,11 +52,7 @@ class Plant:
     heat: PlantHeat | None = None
 
     def __post_init__(self) -> None:
-        """Checks the parameters.
-
-        Raises:
-            InputError: not one finite number per column.
-        """
+        """Checks the parameters."""
         parameters = np.array(self.parameters, dtype=float)
         if parameters.shape != (self.model.size,):
             raise InputError(f"{parameters.shape} plant parameters", allowed=f"({self.model.size},)")
@@ -80,7 +79,12 @@ class Plant:
         return self.heat.follow([heat_piece(motion, friction)])
 
     def torque(self, motion: Motion, warmth: Warmth | None = None) -> Array:
-        """Evaluates the true torque (N, n) [N m or N] of a motion, which begins unstrained, and cold by default."""
+        """Evaluates the true torque (N, n) [N m or N] of a motion, which begins unstrained.
+
+        Args:
+            motion: the motion.
+            warmth: its temperatures over time; by default those of a motion that begins cold.
+        """
         now = self.warmth(motion) if warmth is None else warmth
         torque = self._torque_at_reference(motion)
         if now is None:

@@ -25,6 +25,9 @@ class Sensors:
             white.
         correlation_time: time constant of the coloured part [s].
         torque_step: resolution of the logged torque [N m]; 0 for none.
+
+    Raises:
+        InputError: a negative number, or a share outside 0 to 1.
     """
 
     encoder_counts: float = 131072.0
@@ -34,11 +37,7 @@ class Sensors:
     torque_step: float = 0.0
 
     def __post_init__(self) -> None:
-        """Checks the ranges.
-
-        Raises:
-            InputError: a negative number, or a share outside 0 to 1.
-        """
+        """Checks the ranges."""
         for name in ("encoder_counts", "torque_noise", "correlation_time", "torque_step"):
             if not 0 <= getattr(self, name) < np.inf:
                 raise InputError(f"sensors: {name} is {getattr(self, name)}", allowed="zero or a positive number")
@@ -46,14 +45,25 @@ class Sensors:
             raise InputError(f"sensors: coloured_share is {self.coloured_share}", allowed="0 to 1")
 
     def position(self, q: Array, gear_ratio: Array) -> Array:
-        """Rounds joint positions (N, n) to the encoders' steps."""
+        """Rounds joint positions (N, n) to the encoders' steps.
+
+        Args:
+            q: positions (N, n) [rad or m].
+            gear_ratio: motor turns per joint turn (n,).
+        """
         if not self.encoder_counts:
             return q
         step = 2 * np.pi / (self.encoder_counts * np.abs(gear_ratio))
         return np.round(q / step) * step
 
     def torque(self, tau: Array, period: float, rng: np.random.Generator) -> Array:
-        """Adds noise to joint torques (N, n) [N m] sampled at `period` [s], and rounds them."""
+        """Adds noise to joint torques (N, n), and rounds them.
+
+        Args:
+            tau: torques (N, n) [N m or N].
+            period: sample period [s].
+            rng: source of the noise.
+        """
         level = self.torque_noise * np.sqrt(np.mean(tau**2, axis=0))
         white = rng.standard_normal(tau.shape)
         coloured = _autoregressive(rng.standard_normal(tau.shape), period, self.correlation_time)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import lru_cache
 from itertools import pairwise
-from typing import Literal, overload
+from typing import Any, Literal, overload
 
 import numpy as np
 import scipy.fft
@@ -104,7 +104,7 @@ class Band:
         return result[0] if series.ndim == 1 else result.T
 
 
-def _decimated(spectrum: Array, size: int, short: int) -> Array:
+def _decimated(spectrum: NDArray[Any], size: int, short: int) -> NDArray[Any]:
     """Keeps one row in `size / short`: averages the half spectra (k, size // 2 + 1) that alias onto each other."""
     if size == short:
         return spectrum

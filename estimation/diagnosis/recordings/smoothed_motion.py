@@ -102,7 +102,7 @@ def _free(x: Array, period: float, cutoff: float) -> tuple[Array, Array, Array]:
     bands = np.zeros((ORDER + 1, size))
     for k in range(ORDER + 1):
         bands[ORDER - k, k:] = normal.diagonal(k)
-    curve = BSpline(knots, solveh_banded(bands, design.T @ x), DEGREE)
+    curve = BSpline(knots, solveh_banded(bands, np.asarray(design.T @ x)), DEGREE)
     return curve(t), curve(t, 1), curve(t, 2)
 
 

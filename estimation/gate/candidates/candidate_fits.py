@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -96,11 +97,15 @@ class CandidateFits:
             turned = start / np.linalg.norm(start) + np.tan(np.clip(angles, -1.0, 1.0)) @ aside
             return np.asarray(STANDARD * turned / np.linalg.norm(turned))
 
+        def cost(angles: Array) -> float:
+            return self.cost(Meaning(gravity=direction(angles)), few=True)
+
+        options: Any = {"initial_simplex": SIMPLEX, "xatol": 2e-3, "fatol": 1e-3, "maxfev": EVALUATIONS}
         found = minimize(
-            lambda angles: self.cost(Meaning(gravity=direction(angles)), few=True),
+            cost,
             np.zeros(2),
             method="Nelder-Mead",
-            options={"initial_simplex": SIMPLEX, "xatol": 2e-3, "fatol": 1e-3, "maxfev": EVALUATIONS},
+            options=options,
         )
         return direction(found.x)
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -145,7 +146,7 @@ def survey(robot: Robot, stream: LogStream, advance: Callable[[int, str], None])
     found = Survey()
     for start, end in stream.runs():
         bounds = np.linspace(start, end, max(1, -(-(end - start) // BLOCK)) + 1).astype(int).tolist()
-        for first, stop in zip(bounds[:-1], bounds[1:], strict=True):
+        for first, stop in pairwise(bounds):
             log = as_joint_torque(robot, stream.rows(first, stop), stream.torque_is)
             report = check_log(robot, log)
             for name, same in (("t", np.array_equal(report.t, log.t)), ("q1", np.array_equal(report.q, log.q))):

@@ -194,7 +194,11 @@ class ThermalEstimate:
         }
 
     def plot(self, ax: Axes | None = None) -> Axes:
-        """Draws the friction, or without it the temperatures, against time, run by run."""
+        """Draws the friction, or without it the temperatures, against time, run by run.
+
+        Args:
+            ax: where to draw; a new figure by default.
+        """
         from matplotlib.figure import Figure
 
         axes = ax if ax is not None else Figure(figsize=(7, 4)).subplots()
@@ -210,6 +214,10 @@ class ThermalEstimate:
 
     def save(self, folder: str | PathLike[str], *, force: bool = False) -> None:
         """Writes `thermal.json` into a folder that is there.
+
+        Args:
+            folder: an existing one.
+            force: replace a file that is there.
 
         Raises:
             InputError: the file is there, and force is not given.

@@ -132,7 +132,10 @@ class ThermalRun:
         return np.concatenate([under[:1], under])
 
     def readings(self, kind: type[ThermalModel]) -> dict[str, Array]:
-        """Gives the temperatures by the zones of a model.
+        """Gives the temperatures (N,) [degC] by the zones of a model.
+
+        Args:
+            kind: the class of the model.
 
         Raises:
             InputError: a reading of a zone that the model does not have.
@@ -152,7 +155,11 @@ class ThermalRun:
         return found
 
     def rows(self, part: slice) -> ThermalRun:
-        """Gives the run at some of its times, consecutive ones."""
+        """Gives the run at some of its times, consecutive ones.
+
+        Args:
+            part: which times, as in ``array[part]``.
+        """
         cut = {
             name: getattr(self, name)[part]
             for name in ("t", "power", "friction", "cold_friction", "T3", "drives", "weight", "ambient")

@@ -54,7 +54,7 @@ def discriminate(
 
     A reference motion within the robot's limits, the best of several, is followed by each kind of experiment. The kind
     that distinguishes the smallest effects is used. Kinds that need no manual change are preferred if they are sure,
-    and the best of its variants.
+    and the best of its variants (T-optimality: Atkinson and Fedorov 1975).
 
     Args:
         robot: the robot, its nominal dynamics known.

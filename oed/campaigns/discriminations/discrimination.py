@@ -205,7 +205,11 @@ class Discrimination:
         }
 
     def save(self, folder: str | Path) -> None:
-        """Writes the trajectories and `design.json`."""
+        """Writes the trajectories and `design.json`.
+
+        Args:
+            folder: an existing one; files that are there are replaced.
+        """
         target = Path(folder)
         written: set[str] = set()
         for file, run in zip(self.files, self.runs, strict=True):

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import fcntl
+import importlib
 import os
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -106,7 +106,7 @@ def run_lock(folder: Path, what: str) -> Iterator[None]:
         raise InputError(f"cannot be written to ({reason})", file=folder, remedy="choose another folder") from error
     try:
         try:
-            fcntl.flock(number, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            _lock(number)
         except OSError as error:
             raise InputError(
                 f"another program {what} in this folder", file=folder, remedy="wait for its end, or end it"
@@ -114,3 +114,13 @@ def run_lock(folder: Path, what: str) -> Iterator[None]:
         yield
     finally:
         os.close(number)
+
+
+def _lock(number: int) -> None:
+    try:
+        import fcntl
+    except ImportError:  # Windows
+        msvcrt = importlib.import_module("msvcrt")
+        msvcrt.locking(number, msvcrt.LK_NBLCK, 1)
+    else:
+        fcntl.flock(number, fcntl.LOCK_EX | fcntl.LOCK_NB)

@@ -86,11 +86,18 @@ def benchmark(
     """
     console = Console(json=json, quiet=quiet)
     with console.working() as progress:
-        from oed.benchmarks.making import MakeOptions, make_benchmark
-        from oed.benchmarks.scores import score_benchmark
-        from oed.benchmarks.solving import METHODS, answer_benchmark
         from robots.common.errors import InputError
         from robots.common.files import write_atomic
+
+        try:
+            from oed.benchmarks.making import MakeOptions, make_benchmark
+            from oed.benchmarks.scores import score_benchmark
+            from oed.benchmarks.solving import METHODS, answer_benchmark
+        except ModuleNotFoundError as error:
+            raise InputError(
+                f"the benchmark needs the package {error.name}, which is not installed",
+                remedy="pip install pin (Linux and macOS)",
+            ) from error
 
         if action not in ("make", "answer", "score"):
             raise InputError(f"oed benchmark {action}", allowed="make, answer or score")

@@ -277,7 +277,7 @@ def _diagnosis(
                     motion = at_rate(made, robot.period)
                     stated = {"robot": robot.name, "experiment": following.kind}
                     write_trajectory(path, motion, stated, kinds=robot.chain.kinds)
-            save_diagnosis_report(result, folder, png=png)
+            save_diagnosis_report(result, folder, log=(other or read)[0], png=png)
             lines, data = [result.summary()], result.to_dict()
             unfit = unfit_of(result.model, both)
             if unfit is not None:

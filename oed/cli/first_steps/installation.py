@@ -23,6 +23,7 @@ EXTRAS = {
 """What the extras bring to users; those that are not listed are for developers."""
 
 _REQUIREMENT = re.compile(r"([A-Za-z0-9._-]+)\s*(?:\[.*?\])?\s*\(?([^;)]*)\)?\s*(?:;\s*(.*))?")
+_SYSTEM = re.compile(r"""sys_platform\s*(==|!=)\s*['"](\w+)['"]""")
 _EXTRA = re.compile(r"""extra\s*==\s*['"]([\w-]+)['"]""")
 
 
@@ -99,10 +100,16 @@ def requires_of(package: str = PACKAGE) -> list[tuple[str, str, str | None]]:
     found = []
     for line in lines:
         match = _REQUIREMENT.match(line)
-        if match is not None:
+        if match is not None and _here(match[3] or ""):
             extra = _EXTRA.search(match[3] or "")
             found.append((match[1], (match[2] or "").strip(), extra[1] if extra else None))
     return found
+
+
+def _here(marker: str) -> bool:
+    """Whether a requirement with this marker is one on this operating system."""
+    found = _SYSTEM.search(marker)
+    return found is None or (sys.platform == found[2]) == (found[1] == "==")
 
 
 def installation_text(found: dict[str, Any]) -> str:

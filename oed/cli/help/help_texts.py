@@ -6,10 +6,10 @@ from collections.abc import Mapping
 
 COMMANDS: dict[str, tuple[str, ...]] = {
     "First steps": ("example", "robots", "robot", "effects", "doctor"),
-    "Experiments": ("design", "pareto", "retime", "campaign", "export"),
+    "Experiments": ("design", "pareto", "retime", "campaign", "export", "show"),
     "Robot and virtual robot": ("stream", "record", "loop", "controller", "simulate"),
     "Models": ("check", "identify", "thermal", "predict", "payload"),
-    "Diagnosis": ("diagnose", "compare", "monitor", "fleet", "force", "benchmark"),
+    "Diagnosis": ("diagnose", "compare", "monitor", "fleet", "force", "view", "benchmark"),
 }
 """Commands by purpose; those that are not listed come last."""
 
@@ -35,7 +35,7 @@ OPTIONS = {
             "model",
             "campaign_folder",
         ),
-        *("payload", "gravity", "ambient", "plant", "after", "task", "design", "extension", "answers"),
+        *("payload", "gravity", "ambient", "plant", "after", "task", "design", "extension", "answers", "diagnosis"),
     ),
     "Output": (
         *(
@@ -76,6 +76,11 @@ EXAMPLES = {
         "oed export experiment/trajectory.csv --to mcap --out planned.mcap",
         "oed export experiment/trajectory.csv --to urscript --period 0.008 --out excitation.script",
     ),
+    "show": (
+        "oed show experiment/trajectory.csv --out robot.html",
+        "oed show log.csv --robot er3a --diagnosis diagnosed --out robot.html",
+    ),
+    "view": ("oed view results", "oed view results --out results.html"),
     "stream": (
         "oed stream experiment/trajectory.csv --host 192.168.0.10 --dry-run",
         "oed stream experiment/trajectory.csv --host 192.168.0.10 --log log.csv",

@@ -197,7 +197,11 @@ class Design:
         return motion_frame(self.motion)
 
     def plot(self, ax: Axes | None = None) -> Axes:
-        """Draws the joint velocities as shares of their limits over time."""
+        """Draws the joint velocities as shares of their limits over time.
+
+        Args:
+            ax: where to draw; a new figure by default.
+        """
         return plot_velocities(self.motion, self.robot.limits, ax)
 
     def to_dict(self) -> dict[str, Any]:
@@ -250,6 +254,10 @@ class Design:
     def save(self, folder: str | Path, *, force: bool = False) -> None:
         """Writes `trajectory.csv` and `design.json` into a folder that is there.
 
+        Args:
+            folder: an existing one.
+            force: replace files that are there.
+
         Raises:
             InputError: a file is there, and force is not given.
         """
@@ -273,7 +281,7 @@ class Design:
         return cls(**read_design(folder, robot, criterion))
 
     def metadata(self) -> dict[str, Any]:
-        """Metadata of the trajectory file."""
+        """Gives the metadata of the trajectory file."""
         return {
             "robot": self.robot.origin or self.robot.name,
             "period": self.robot.period,

@@ -122,7 +122,11 @@ class RetimedExperiment:
         return motion_frame(self.motion)
 
     def plot(self, ax: Axes | None = None) -> Axes:
-        """Draws the new joint velocities as shares of their limits over time."""
+        """Draws the new joint velocities as shares of their limits over time.
+
+        Args:
+            ax: where to draw; a new figure by default.
+        """
         return plot_velocities(self.motion, self.robot.limits, ax)
 
     def to_dict(self) -> dict[str, Any]:
@@ -164,6 +168,10 @@ class RetimedExperiment:
 
     def save(self, folder: str | Path, *, force: bool = False) -> None:
         """Writes `trajectory.csv` and `design.json` into a folder that is there.
+
+        Args:
+            folder: an existing one.
+            force: replace files that are there.
 
         Raises:
             InputError: a file is there, and force is not given.

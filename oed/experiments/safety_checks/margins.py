@@ -38,19 +38,28 @@ def measured_margins(
     """
     limits: Limits = robot.limits
     margins = list(limits.margins(motion))
-    nominal = base.model.nominal
-    if np.isfinite(nominal).all() and np.isfinite(limits.torque).any():
-        tau = _torque(base, motion, effects)
+    limited = np.isfinite(limits.torque).any() or np.isfinite(limits.torque_rms).any()
+    tau = nominal_torque(base, motion, effects) if limited else None
+    if tau is not None and np.isfinite(limits.torque).any():
         margins += symmetric_margins("torque", motion.t, tau, limits.torque)
-    if np.isfinite(nominal).all() and np.isfinite(limits.torque_rms).any():
-        margins += _rms_margins(motion, _torque(base, motion, effects), limits)
+    if tau is not None and np.isfinite(limits.torque_rms).any():
+        margins += _rms_margins(motion, tau, limits)
     if np.isfinite(robot.motor_speed).any():
         margins += symmetric_margins("motor speed", motion.t, robot.gear_ratio * motion.dq, robot.motor_speed)
     return tuple(margins)
 
 
-def _torque(base: BaseParameters, motion: Motion, effects: Sequence[PlantEffect]) -> Array:
+def nominal_torque(base: BaseParameters, motion: Motion, effects: Sequence[PlantEffect] = ()) -> Array | None:
+    """Computes the torque (N, n) [N m or N] that margins refer to; None where the robot's dynamics are not described.
+
+    Args:
+        base: whose model gives the torque.
+        motion: what the robot does.
+        effects: what the robot has beyond its description.
+    """
     model = base.model
+    if not np.isfinite(model.nominal).all():
+        return None
     if not effects:
         return model.torque(motion.q, motion.dq, motion.ddq, model.nominal)
     now = situation(model, model.nominal, motion.t, motion.q, motion.dq, motion.ddq)

@@ -38,6 +38,9 @@ class Effort:
         screened: random points from which each start takes its best.
         hops: how often the best designs are thrown and solved again.
         finish_samples: per period, for the finish.
+
+    Raises:
+        InputError: a count that is no whole number, or too small.
     """
 
     islands: int = 2
@@ -47,11 +50,7 @@ class Effort:
     finish_samples: int = 400
 
     def __post_init__(self) -> None:
-        """Checks the counts.
-
-        Raises:
-            InputError: a count that is no whole number, or too small.
-        """
+        """Checks the counts."""
         for name, least in (("islands", 1), ("starts", 1), ("screened", 1), ("hops", 0), ("finish_samples", 20)):
             value = getattr(self, name)
             if value != int(value) or value < least:

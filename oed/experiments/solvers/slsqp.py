@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -77,12 +77,12 @@ class Slsqp(Solver):
         return Solved(z=z, iterations=iterations, evaluations=evaluations, status=status)
 
 
-def _limits(working: WorkingSet, pointwise: PointwiseRows) -> list[dict[str, object]]:
+def _limits(working: WorkingSet, pointwise: PointwiseRows) -> list[Any]:
     """Writes the rows of the moment as functions that stay at or above zero, with their Jacobians."""
     sparse, offset = working.matrix()
     matrix = np.array(sparse.full())
     slopes = np.concatenate([-matrix, matrix])
-    limits: list[dict[str, object]] = [
+    limits: list[dict[str, Any]] = [
         {"type": "ineq", "fun": lambda z: 1 + slopes @ z + np.append(-offset, offset), "jac": lambda z: slopes}
     ]
     if pointwise.size:

@@ -7,7 +7,9 @@ from numpy.typing import NDArray
 
 from oed.experiments import Design
 from oed.experiments.quality import Quality
-from oed.experiments.safety_checks.margins import missing_limits
+from oed.experiments.safety_checks.margins import missing_limits, nominal_torque
+from oed.reports.animations.building import animate
+from oed.reports.pages.motions.motion_report import animation_section
 from oed.reports.pictures.trajectory_pictures import margins_picture, spectrum_picture, trajectory_picture
 from oed.reports.rendering.page import Cell, Fact, Finding, Page, Section, Table, findings_of
 from oed.reports.rendering.provenance import footer
@@ -61,12 +63,22 @@ def design_page(design: Design) -> Page:
                 ),
                 tables=(_segments(design),),
             ),
+            _animation(design),
             quality_section(design.qualities),
             margins_section(design.margins, robot.joint_names),
             Section(title="Search", paragraphs=(_search_text(design),), tables=(_islands(design),)),
             parameters_section(design.base.names, design.base.formulas()),
         ),
         footer=footer(design.settings["seed"]),
+    )
+
+
+def _animation(design: Design) -> Section:
+    """The robot that plays the motion, with the limits as the design checked them."""
+    static = [effect for effect in design.effects if effect.static]
+    torque = nominal_torque(design.base, design.motion, static)
+    return animation_section(
+        animate(design.robot, design.motion, torque=torque, margins=design.margins, source="designed motion")
     )
 
 

@@ -9,10 +9,13 @@ from numpy.typing import NDArray
 
 from estimation.diagnosis.calibration import CLOSE_RIVAL_BIC
 from estimation.diagnosis.results.diagnosis import Diagnosis
+from oed.reports.animations.animation import Animation
 from oed.reports.pages.diagnosis_actions import findings_in, verdict_of
 from oed.reports.pages.diagnosis_limits import limits_section
 from oed.reports.pages.diagnosis_simulation import simulation_section
 from oed.reports.pages.diagnosis_view import DiagnosisView, view_of
+from oed.reports.pages.motions.diagnosis_motion import diagnosis_animation
+from oed.reports.pages.motions.motion_report import animation_section
 from oed.reports.pictures.diagnosis_pictures import cause_picture, gain_picture
 from oed.reports.pictures.torque_pictures import torque_picture
 from oed.reports.rendering.joint_units import joint_titles, joint_units
@@ -22,6 +25,7 @@ from oed.reports.rendering.provenance import footer
 from oed.reports.rendering.saving import save_page
 from oed.reports.rendering.significant import NORMAL_95, significant
 from robots.common.files import ResultFolder
+from robots.signals import Log
 
 Array = NDArray[np.float64]
 
@@ -29,14 +33,31 @@ SMALL = 1e-12
 """Smallest probability that is written: the tail of the noise distribution is unknown beyond it."""
 
 
-def save_diagnosis_report(diagnosis: Diagnosis, folder: ResultFolder, *, png: bool = False) -> None:
-    """Writes the page of a diagnosis, and its pictures as PNG on request."""
-    save_page(diagnosis_page(view_of(diagnosis)), folder, png=png)
+def save_diagnosis_report(
+    diagnosis: Diagnosis, folder: ResultFolder, *, log: Log | None = None, png: bool = False
+) -> None:
+    """Writes the page of a diagnosis, and its pictures as PNG on request.
+
+    Args:
+        diagnosis: what was found.
+        folder: where the page goes.
+        log: one of the logs, which the robot plays in 3-D.
+        png: whether to write the pictures.
+    """
+    animation = None if log is None else diagnosis_animation(diagnosis, log)
+    save_page(diagnosis_page(view_of(diagnosis), animation), folder, png=png)
 
 
-def diagnosis_page(view: DiagnosisView) -> Page:
-    """Builds the page: findings with their evidence, gain of the extended model, detection limits, next step."""
+def diagnosis_page(view: DiagnosisView, animation: Animation | None = None) -> Page:
+    """Builds the page: findings with their evidence, gain of the extended model, detection limits, next step.
+
+    Args:
+        view: the diagnosis.
+        animation: the robot in 3-D with the joints marked that have a finding.
+    """
     sections = [_torque(view)]
+    if animation is not None:
+        sections.append(animation_section(animation))
     sections += [_finding(view, index) for index in range(len(view.findings))]
     if view.simulation is not None:
         sections.append(simulation_section(view.simulation, view.joint_names, view.kinds))

@@ -6,7 +6,10 @@ import numpy as np
 
 from oed.criteria import CRITERIA
 from oed.experiments import RetimedExperiment
+from oed.experiments.safety_checks.margins import nominal_torque
+from oed.reports.animations.building import animate
 from oed.reports.pages.design_report import excitation_findings, margins_section, parameters_section, quality_section
+from oed.reports.pages.motions.motion_report import animation_section
 from oed.reports.pictures.trajectory_pictures import trajectory_picture
 from oed.reports.rendering.page import Cell, Fact, Finding, Page, Section, Table, findings_of
 from oed.reports.rendering.provenance import footer
@@ -74,6 +77,15 @@ def retime_page(result: RetimedExperiment, given: Motion) -> Page:
         ),
         sections=(
             Section(title="New motion", pictures=pictures[:1]),
+            animation_section(
+                animate(
+                    robot,
+                    result.motion,
+                    torque=nominal_torque(result.base, result.motion),
+                    margins=result.margins,
+                    source="retimed motion",
+                )
+            ),
             *_torque_sections(result),
             quality_section((result.before, result.after)),
             margins_section(tuple(m for m in result.margins if np.isfinite(m.limit)), robot.joint_names),

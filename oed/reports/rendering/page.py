@@ -6,6 +6,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass, field
 from typing import Literal
 
+from oed.reports.animations.animation import Animation
 from oed.reports.rendering.picture import Picture
 from oed.reports.rendering.provenance import Footer, Recording
 from oed.reports.rendering.severity import LEVELS, Level, severity
@@ -112,6 +113,7 @@ class Section:
         paragraphs: text before the pictures.
         pictures: pictures, in order.
         tables: tables, after the pictures.
+        animation: a robot in 3-D that plays a motion, before the pictures.
         folded: whether it is closed until someone opens it.
     """
 
@@ -119,6 +121,7 @@ class Section:
     paragraphs: tuple[str, ...] = ()
     pictures: tuple[Picture, ...] = ()
     tables: tuple[Table, ...] = ()
+    animation: Animation | None = None
     folded: bool = False
 
 
@@ -166,6 +169,11 @@ class Page:
     def pictures(self) -> tuple[Picture, ...]:
         """All pictures, in order."""
         return tuple(picture for section in self.sections for picture in section.pictures)
+
+    @property
+    def animations(self) -> tuple[Animation, ...]:
+        """All robots in 3-D, in order."""
+        return tuple(section.animation for section in self.sections if section.animation is not None)
 
     @property
     def dates(self) -> tuple[str, ...]:

@@ -40,6 +40,7 @@ LEVELS: dict[str, Level] = {
     "done": "good",
     # Experiments.
     "limit.exceeded": "act",
+    "limit.exceeded_in_log": "note",
     "limit.assumed": "note",
     "value.assumed": "note",
     "torque.unchecked": "note",

@@ -68,11 +68,20 @@ class Family(ABC):
         """
 
     def trajectory(self, free: Array, periods: int = 1) -> Trajectory:
-        """Builds the motion of free coefficients (n, K), repeated."""
+        """Builds the motion of free coefficients.
+
+        Args:
+            free: coefficients (n, K).
+            periods: how often the motion is repeated.
+        """
         return Excitation(family=self, free=free, periods=periods)
 
     def coefficients(self, free: Array) -> Array:
-        """Gives the coefficients as a design file lists them, (n, K) by default."""
+        """Gives the coefficients as a design file lists them, (n, K) by default.
+
+        Args:
+            free: coefficients (n, K).
+        """
         return free
 
     def settings(self) -> dict[str, Any]:
@@ -89,11 +98,19 @@ class Family(ABC):
         return np.inf
 
     def regressor_times(self, samples: int) -> Array:
-        """Times (M,) [s] at which the regressor counts, half a step off the ends: at rest a row has no information."""
+        """Times (M,) [s] at which the regressor counts, half a step off the ends: at rest a row has no information.
+
+        Args:
+            samples: M.
+        """
         return (np.arange(samples) + 0.5) / samples * self.duration
 
     def limit_times(self, samples: int) -> Array:
-        """Times (M,) [s] at which limits are imposed, evenly spaced; both ends by default."""
+        """Times (M,) [s] at which limits are imposed, evenly spaced; both ends by default.
+
+        Args:
+            samples: M.
+        """
         return np.linspace(0.0, self.duration, samples)
 
     def shares(self, samples: int) -> tuple[float, ...]:
@@ -124,7 +141,7 @@ class Family(ABC):
 
         Args:
             half: of each joint's range (n,) [rad or m].
-            velocity: its limit (n,).
+            velocity: its limit (n,) [rad/s or m/s].
         """
         q, dq, *_ = self.basis(self.limit_times(50 * self.size))
         with np.errstate(divide="ignore"):

@@ -169,7 +169,7 @@ def fit_capsule(balls: Balls, *, polish: bool = True) -> Spine:
 
         guess = np.concatenate([best.start, best.end])
         size = max(best.radius, float(np.linalg.norm(best.end - best.start)))
-        options = {"maxiter": 800, "xatol": 1e-4 * size, "fatol": 1e-4 * best.volume}
+        options: Any = {"maxiter": 800, "xatol": 1e-4 * size, "fatol": 1e-4 * best.volume}
         found = minimize(volume, guess, method="Nelder-Mead", options=options).x
         best = min(best, _enclosing(found[:3], found[3:], balls), key=lambda spine: spine.volume)
     return best

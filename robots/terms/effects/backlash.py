@@ -196,8 +196,8 @@ def _lag(t: Array, pushed: Array) -> Array:
     Returns:
         The lag (N,).
     """
-    speed = cumulative_trapezoid(pushed, t, initial=0.0)
-    way = cumulative_trapezoid(speed, t, initial=0.0)
+    speed = cumulative_trapezoid(pushed, t, initial=0)
+    way = cumulative_trapezoid(speed, t, initial=0)
     changes = np.flatnonzero(pushed[:-1] * pushed[1:] < 0) + 1
     lag = np.empty(len(t))
     side = 1.0 if np.sum(pushed[: max(len(t) // 100, 1)]) >= 0 else -1.0

@@ -146,7 +146,7 @@ def _past(situation: Situation, smooth: Array) -> list[tuple[Callable[[Array], A
 
     Velocities are interpolated by cubics without overshoot, which next to standstill would be a false reversal.
     """
-    result = []
+    result: list[tuple[Callable[[Array], Array], Callable[[Array], Array]]] = []
     for run in situation.runs:
         t, count = situation.t[run], run.stop - run.start
         torque = make_interp_spline(t, smooth[run], min(3, count - 1))

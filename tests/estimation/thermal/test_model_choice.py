@@ -12,12 +12,33 @@ from estimation.thermal import ThermalRun, choose_thermal, fit_thermal, predict_
 from robots.common.errors import InputError
 
 
+class Listener:
+    """Hears how far it is."""
+
+    def __init__(self) -> None:
+        self.total: float | None = None
+        self.done: list[float] = []
+
+    def start(self, task: str, total: float | None = None) -> None:
+        self.total = total
+
+    def update(self, done: float, note: str = "") -> None:
+        self.done.append(done)
+
+    def finish(self) -> None:
+        pass
+
+
 @pytest.mark.slow
 def test_two_time_constants_are_chosen_where_there_are_two(four_duties: Callable[[int], list[ThermalRun]]) -> None:
     """On the thesis' data the second order wins, and the first order's mean error is five times as large (Table 6)."""
     runs = [four_duties(11)[k] for k in (1, 3)]
-    choice = choose_thermal(runs, orders=("first", "second"), alpha=-0.0141, starts=1)
+    progress = Listener()
+    choice = choose_thermal(runs, orders=("first", "second"), alpha=-0.0141, starts=1, progress=progress)
     assert choice.best == "second"
+    # The bar advances after each fit: one of all runs and two of one run, for each model.
+    assert progress.total == 6
+    assert sorted(set(progress.done)) == [1, 2, 3, 4, 5, 6]
     first, second = choice.candidates
     assert first.heating is not None
     assert second.heating is not None

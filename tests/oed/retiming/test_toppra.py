@@ -1,4 +1,5 @@
 import dataclasses
+import sys
 
 import numpy as np
 import pinocchio
@@ -224,3 +225,11 @@ def test_the_summary_says_what_happened(limits):
     name, joint, fraction = result.peak
     assert f"{name} limit of joint {joint}" in result.summary()
     assert 0.9 < fraction <= 1.0
+
+
+def test_without_the_package_the_message_says_what_to_do(monkeypatch):
+    """Where toppra is not installed, retiming names it and the method that works without."""
+    monkeypatch.delitem(sys.modules, "oed.retiming.path_speed", raising=False)
+    monkeypatch.setitem(sys.modules, "toppra", None)
+    with pytest.raises(InputError, match=r"needs the package toppra.*--method ruckig"):
+        retime(_wave(duration=2.0), _limits(1.0, 2.0, n=6), period=PERIOD)

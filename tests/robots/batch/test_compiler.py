@@ -116,6 +116,15 @@ def test_a_folder_of_another_user_is_not_trusted(fresh, needs_compiler, square, 
     assert isinstance(batch_function(square), VectorisedFunction)
 
 
+def test_a_system_without_user_numbers_compiles(fresh, needs_compiler, square, monkeypatch):
+    """Where the system has neither numbers of users nor `confstr`, as Windows, libraries are built and kept."""
+    compiled.compiler.cache_clear()
+    monkeypatch.delattr(os, "getuid")
+    monkeypatch.delattr(os, "confstr")
+    assert works(batch_function(square, "compiled"))
+    assert [path.suffix for path in fresh.iterdir()] == [".so"]
+
+
 @pytest.mark.slow
 def test_another_compiler_builds_anew(fresh, needs_compiler, square, monkeypatch, tmp_path):
     """A library is used again only with the compiler, the processor and the source it was built for."""

@@ -9,6 +9,7 @@ import sys
 from collections import namedtuple
 from collections.abc import Iterator
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -159,6 +160,25 @@ def test_rests_and_progress(campaign: Path, endpoint: Endpoint) -> None:
     assert (np.diff(ends) > 12.0 - 2.0).all()
     again = run_campaign(campaign, NOWHERE)
     assert again.stages == result.stages
+
+
+def test_a_folder_is_locked_on_windows_too(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Without `fcntl` the lock is that of `msvcrt`, which raises OSError where another program has it."""
+    held: list[int] = []
+
+    def locking(number: int, mode: int, size: int) -> None:
+        assert (mode, size) == (2, 1)
+        if held:
+            raise PermissionError(13, "Permission denied")
+        held.append(number)
+
+    monkeypatch.setitem(sys.modules, "fcntl", None)
+    monkeypatch.setitem(sys.modules, "msvcrt", SimpleNamespace(locking=locking, LK_NBLCK=2))
+    with run_lock(tmp_path, "runs"):
+        second = run_lock(tmp_path, "runs")
+        with pytest.raises(InputError, match="another program runs in this folder"):
+            second.__enter__()
+    assert len(held) == 1
 
 
 def test_what_is_refused(campaign: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

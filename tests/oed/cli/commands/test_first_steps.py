@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import shlex
+import subprocess
+import sys
 from importlib.metadata import version
 from pathlib import Path
 
@@ -121,6 +123,27 @@ def test_doctor_finds_what_is_wrong(run, monkeypatch: pytest.MonkeyPatch, needed
     assert "ROS bags: missing; pip install 'robot-oed[ros]'" in text
     if code:
         assert f"{name} is {status}" in text
+
+
+@pytest.mark.parametrize(("system", "wanted"), [("linux", {"a", "b"}), ("darwin", {"a"}), ("win32", set())])
+def test_doctor_expects_what_the_system_can_have(monkeypatch: pytest.MonkeyPatch, system: str, wanted: set) -> None:
+    """A library that is required on other operating systems only is not missing on this one."""
+    lines = ["a>=1; sys_platform != 'win32'", 'b>=2; sys_platform == "linux"']
+    monkeypatch.setattr(installation, "requires", lambda _: lines)
+    monkeypatch.setattr(installation.sys, "platform", system)
+    assert {name for name, *_ in installation.requires_of()} == wanted
+
+
+@pytest.mark.slow
+def test_what_a_missing_library_hinders_is_said(tmp_path: Path) -> None:
+    """Without pinocchio the benchmark says so in one message."""
+    code = "import sys; sys.modules['pinocchio'] = None; from oed.cli import main; main()"
+    words = [sys.executable, "-c", code, "benchmark", "make", str(tmp_path / "cases")]
+    done = subprocess.run(words, capture_output=True, text=True, check=False)
+    assert done.returncode == 2
+    assert "needs the package pinocchio, which is not installed" in done.stderr
+    assert "pip install pin" in done.stderr
+    assert "Traceback" not in done.stderr
 
 
 def test_doctor_without_an_installation(run, monkeypatch: pytest.MonkeyPatch) -> None:

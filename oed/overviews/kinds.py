@@ -1,0 +1,279 @@
+"""What the files of each kind of result say: verdict, how urgent it is, and key figures."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+from oed.reports.pages.design_report import NOISE
+from oed.reports.rendering.severity import LEVELS
+
+Figure = float | str | None
+Data = Mapping[str, Any]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Reading:
+    """What one file says.
+
+    Attributes:
+        kind: in words.
+        verdict: in one sentence.
+        codes: keys of `severity.LEVELS`; empty for a result without a judgement.
+        figures: by their labels with units.
+        robot: its name; empty where the file states none.
+    """
+
+    kind: str
+    verdict: str
+    codes: tuple[str, ...] = ("done",)
+    figures: Mapping[str, Figure] = field(default_factory=dict)
+    robot: str = ""
+
+
+def read_kind(name: str, data: Data) -> Reading | None:
+    """Reads a result.
+
+    Args:
+        name: of the file.
+        data: its content.
+
+    Returns:
+        What it says; None of a file that is not of this program.
+
+    Raises:
+        KeyError: a key that this version needs is missing.
+        TypeError: a value of another type.
+        ValueError: a value that makes no sense.
+    """
+    form = data.get("format")
+    if form is None and name in BY_NAME:
+        return BY_NAME[name](data)
+    if not isinstance(form, str) or not form.startswith("robot-oed "):
+        return None
+    if form in BY_FORMAT:
+        return BY_FORMAT[form](data)
+    return Reading(
+        kind=form.removeprefix("robot-oed "), verdict="No summary of this kind of file.", codes=(), robot=_robot(data)
+    )
+
+
+def _design(data: Data) -> Reading:
+    margins = data["smallest_margins"]
+    whole = data["quality"][-1]
+    beyond = [m for m in margins if m["slack_fraction"] < 0.0]
+    tightest = min((m["slack_fraction"] for m in margins if m["limit"] is not None), default=None)
+    cond = whole["cond_Y"]
+    codes = ["limit.exceeded"] if beyond else []
+    if cond is None:
+        codes.append("excitation.incomplete")
+    elif NOISE * cond / math.sqrt(whole["samples"]) > 1.0:
+        codes.append("excitation.weak")
+    codes += ["value.assumed"] if data["assumed"] else []
+    retimed = data.get("retiming")
+    if beyond:
+        verdict = f"Do not play this motion: it exceeds {len(beyond)} limits."
+    elif retimed:
+        verdict = retimed["verdict"]
+    elif codes and codes[0].startswith("excitation"):
+        verdict = "This motion does not determine all parameters."
+    else:
+        verdict = f"Determines {len(data['model']['columns'])} base parameters within all limits."
+    figures = {
+        "cond(Y)": cond,
+        "duration [s]": data["duration"],
+        "tightest limit [% left]": None if tightest is None else 100.0 * tightest,
+    }
+    kind = "retimed path" if retimed else "design"
+    return Reading(kind=kind, verdict=verdict, codes=tuple(codes) or ("done",), figures=figures, robot=_robot(data))
+
+
+def _discrimination(data: Data) -> Reading:
+    rivals = " or ".join(f"{r['effect'].replace('_', ' ')} of joint {r['joint']}" for r in data["rivals"])
+    return Reading(
+        kind="separating experiment",
+        verdict=f"Separates {rivals}.",
+        figures={"probability to name the cause [%]": 100.0 * data["resolves"]},
+        robot=_robot(data),
+    )
+
+
+def _model(data: Data) -> Reading:
+    parameters, provenance = data["parameters"], data["provenance"]
+    undetermined = sum(not p.get("determined", True) for p in parameters)
+    extensions = [e["effect"] for e in data.get("extensions", ())]
+    verdict = f"{len(parameters)} parameters, {undetermined} not determined"
+    if extensions:
+        verdict += f"; extended by {', '.join(dict.fromkeys(e.replace('_', ' ') for e in extensions))}"
+    figures: dict[str, Figure] = {
+        "parameters": len(parameters),
+        "not determined": undetermined,
+        "logs": len(provenance.get("logs", ())),
+        "rows": sum(log.get("samples", 0) for log in provenance.get("logs", ())) or None,
+        "method": provenance.get("method"),
+    }
+    errors = provenance.get("unseen_nrmse")
+    if isinstance(errors, Sequence):
+        figures["NRMSE, held-out data [%]"] = _pooled(errors)
+    return Reading(
+        kind="model",
+        verdict=f"{verdict}.",
+        codes=("parameters.undetermined",) if undetermined else ("done",),
+        figures=figures,
+        robot=_robot(data),
+    )
+
+
+def _diagnosis(data: Data) -> Reading:
+    verdict, findings = data["verdict"], data["findings"]
+    known = [f"effect.{f['effect']}" for f in findings if f"effect.{f['effect']}" in LEVELS]
+    codes = [*known, *([f"diagnosis.{verdict}"] if verdict in ("ambiguous", "unexplained") else [])]
+    places = [f["effect"].replace("_", " ") + (f" of joint {f['joint']}" if f["joint"] else "") for f in findings]
+    text = {
+        "none": "No missing effect was found",
+        "named": "Found",
+        "ambiguous": "Several causes fit",
+        "unexplained": "Part of the residual has no known cause",
+    }[verdict]
+    return Reading(
+        kind="diagnosis",
+        verdict=f"{text}{': ' if places else ''}{', '.join(places)}.",
+        codes=tuple(codes) or ("done",),
+        figures={
+            "effects found": len(findings),
+            "NRMSE, base model [%]": _pooled(data["baseline"]["nrmse"]),
+            "NRMSE, held-out data [%]": _pooled(data["extended"]["nrmse"]),
+            "explained [%]": None if data.get("explained") is None else 100.0 * data["explained"],
+        },
+        robot=_robot(data),
+    )
+
+
+def _thermal(data: Data) -> Reading:
+    figures = {"log likelihood": data["log_likelihood"], "BIC": data["bic"], "rows": data["rows"]}
+    open_ = sum(not p.get("determined", True) for p in data["parameters"])
+    return Reading(
+        kind="thermal model",
+        verdict=f"{len(data['parameters'])} parameters, {open_} not determined. {data['status']}.".replace("..", "."),
+        codes=("thermal.undetermined",) if open_ or not data["success"] else ("done",),
+        figures=figures,
+    )
+
+
+def _monitoring(data: Data) -> Reading:
+    return Reading(
+        kind="monitoring",
+        verdict=data["verdict"],
+        codes=(*(f"change.{f['kind']}" for f in data["findings"]), "done"),
+        figures={"changes": len(data["findings"]), "hours": data["hours"]},
+        robot=_robot(data),
+    )
+
+
+def _state(data: Data) -> Reading:
+    return Reading(kind="state of a monitor", verdict="The monitor continues from here.", codes=(), robot=_robot(data))
+
+
+def _fleet(data: Data) -> Reading:
+    counts = data["counts"]
+    return Reading(
+        kind="fleet",
+        verdict=data["verdict"],
+        codes=(f"fleet.{data['light']}",),
+        figures={"robots": len(data["robots"]), **{f"robots, {light}": count for light, count in counts.items()}},
+    )
+
+
+def _comparison(data: Data) -> Reading:
+    different = sum(bool(item["significant"]) for item in data["differences"])
+    return Reading(
+        kind="comparison",
+        verdict=data["verdict"],
+        codes=("difference",) if different else ("done",),
+        figures={"models": len(data["runs"]), "significant differences": different},
+        robot=_robot(data),
+    )
+
+
+def _payload(data: Data) -> Reading:
+    open_ = sum(not item["determined"] for item in data["quantities"])
+    return Reading(
+        kind="payload",
+        verdict=f"Mass {data['mass']:.3g} kg; {open_ or 'no'} quantities not determined.",
+        codes=("payload.uncertain",) if open_ else ("done",),
+        figures={"mass [kg]": data["mass"], "rows": data["rows"]},
+        robot=_robot(data),
+    )
+
+
+def _forces(data: Data) -> Reading:
+    count = len(data["contacts"])
+    return Reading(
+        kind="forces",
+        verdict=f"{count or 'No'} contact{'' if count == 1 else 's'} in {data['duration']:.0f} s.",
+        codes=("contact",) if count else ("done",),
+        figures={"contacts": count, "duration [s]": data["duration"]},
+        robot=_robot(data),
+    )
+
+
+def _campaign(data: Data) -> Reading:
+    return Reading(
+        kind="campaign",
+        verdict=f"{len(data['stages'])} stages, {data['cycles']} cycles, {data['duration'] / 3600.0:.1f} h.",
+        codes=("experiment.note",) if data["notes"] else ("done",),
+        figures={"duration [s]": data["duration"], "stages": len(data["stages"]), "cycles": data["cycles"]},
+        robot=_robot(data),
+    )
+
+
+def _pareto(data: Data) -> Reading:
+    points = data["points"]
+    return Reading(
+        kind="pareto front",
+        verdict=f"{sum(point['efficient'] for point in points)} of {len(points)} designs are not dominated.",
+        figures={"designs": len(points)},
+    )
+
+
+def _limits(data: Data) -> Reading:
+    limits = data["limits"]
+    hidden = sum(limit["detectable"] is None for limit in limits)
+    return Reading(
+        kind="detection limits",
+        verdict=f"{hidden} of {len(limits)} effects cannot be found with this motion.",
+        codes=("detection.limited",) if hidden else ("done",),
+        figures={"effects": len(limits), "cannot be found": hidden},
+        robot=_robot(data),
+    )
+
+
+def _robot(data: Data) -> str:
+    robot = data.get("robot", "")
+    return str(robot.get("name", "") if isinstance(robot, Mapping) else robot or "")
+
+
+def _pooled(errors: Sequence[float | None]) -> float | None:
+    """Root mean square over the joints [%]."""
+    known = [float(error) for error in errors if error is not None]
+    return 100.0 * math.sqrt(sum(error**2 for error in known) / len(known)) if known else None
+
+
+BY_FORMAT: dict[str, Callable[[Data], Reading]] = {
+    "robot-oed design": _design,
+    "robot-oed discriminating experiment": _discrimination,
+    "robot-oed model": _model,
+    "robot-oed thermal model": _thermal,
+    "robot-oed monitoring": _monitoring,
+    "robot-oed monitor": _state,
+    "robot-oed fleet": _fleet,
+    "robot-oed comparison": _comparison,
+    "robot-oed payload": _payload,
+    "robot-oed forces": _forces,
+    "robot-oed campaign": _campaign,
+    "robot-oed pareto front": _pareto,
+}
+BY_NAME: dict[str, Callable[[Data], Reading]] = {"diagnosis.json": _diagnosis, "limits.json": _limits}
+"""Results whose file does not state its format."""

@@ -1,0 +1,1 @@
+"""Pages and sections with the robot in 3-D."""

@@ -1,0 +1,85 @@
+"""What each notebook claims, checked on the names that it leaves, against the truth that it made."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+Names = dict[str, Any]
+
+
+def first_tour(names: Names) -> None:
+    """The model predicts the unseen motion down to the noise of 2 %, and its standard errors are right."""
+    # The noise is coloured, so that single joints may have a little more.
+    assert names["prediction"].nrmse.max() < 0.03
+    # RMS of 12 normal scores: outside 0.4 to 1.8 with a chance below 1e-4 if the standard errors are right.
+    assert np.sqrt(np.mean(names["score"] ** 2)) < 1.8
+
+
+def real_robot(names: Names) -> None:
+    """The model of one part of the recording predicts the other part; 20 % is between model and description."""
+    prediction = names["prediction"]
+    assert np.all(prediction.nrmse < 0.2)
+    assert np.all(prediction.band_coverage > 0.5)
+
+
+def hidden_effect(names: Names) -> None:
+    """The spring of 6 N m/rad at joint 2, as in `worn.yaml`, is found, and the held-out error falls."""
+    diagnosis = names["diagnosis"]
+    assert [(f.effect, f.joint) for f in diagnosis.findings] == [("spring", 2)]
+    stiffness = diagnosis.findings[0].parameters[0]
+    # Four standard errors are missed with a chance of 6e-5; the log is fixed.
+    assert abs(stiffness.value - 6.0) < 4 * stiffness.standard_error
+    assert diagnosis.findings[0].gain.nrmse_after < diagnosis.findings[0].gain.nrmse_before
+
+
+def payload(names: Names) -> None:
+    """Mass within 3 % and centre within 5 mm of the tool that was mounted."""
+    tool, body = names["tool"], names["payload"].quantities
+    assert abs(body[0].value / tool.mass - 1) < 0.03
+    assert np.abs([item.value for item in body[1:4]] - tool.lever).max() < 0.005
+
+
+def mujoco_corrected(names: Names) -> None:
+    """The spring at joint 2 is found with its stiffness, and the corrected model follows the robot."""
+    finding = names["diagnosis"].findings[0]
+    assert (finding.effect, finding.joint) == ("spring", 2)
+    # The spring is stated in MuJoCo's own file. 10 %: inertial parameters share part of its torque.
+    assert abs(finding.parameters[0].value / names["REAL"]["stiffness"] - 1) < 0.1
+    errors = names["torque_errors"]
+    assert np.linalg.norm(errors["corrected"]) < 0.2 * np.linalg.norm(errors["original"])
+
+
+def your_own_robot(names: Names) -> None:
+    """Friction is right within four standard errors, and the 95 % band holds the unseen torque."""
+    values, errors, truth = names["values"], names["errors"], names["truth"]
+    friction = names["names"]
+    assert len(friction) == 6
+    assert all(abs(values[name] - truth[name]) < 4 * errors[name] for name in friction)
+    # 4,600 correlated samples of some hundred independent ones: five points are more than two standard deviations.
+    assert np.abs(names["prediction"].band_coverage - 0.95).max() < 0.05
+
+
+def your_own_effect(names: Names) -> None:
+    """The hose is found alone at its joint, with its stiffness within 10 %, and the held-out error falls."""
+    diagnosis, true = names["diagnosis"], names["TRUE"]
+    assert [(f.effect, f.joint) for f in diagnosis.findings] == [("tight_hose", names["JOINT"])]
+    assert abs(names["found"]["hose_stiffness"] / true["hose_stiffness"] - 1) < 0.1
+    joint = names["JOINT"] - 1
+    assert diagnosis.extended[joint] < diagnosis.baseline[joint]
+
+
+CLAIMS: dict[str, Callable[[Names], None]] = {
+    check.__name__: check
+    for check in (
+        first_tour,
+        real_robot,
+        hidden_effect,
+        payload,
+        mujoco_corrected,
+        your_own_robot,
+        your_own_effect,
+    )
+}
