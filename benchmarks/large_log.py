@@ -28,7 +28,7 @@ from scipy.linalg.blas import dsyrk
 
 from estimation import identify, read_log, write_log
 from estimation.identifications.streams import identify_stream
-from estimation.logs.log_stream import open_stream
+from estimation.logs.parquet_streams import open_stream
 from robots import load_robot, nominal_plant, simulate
 from robots.common.errors import AssumedValueWarning
 from robots.common.parallel import one_blas_thread

@@ -193,8 +193,18 @@ def covariances(
 ) -> tuple[Array, Array, Array | None]:
     """Covariance (b, b) by the noise and by the prior's own scatter.
 
-    Besides it, standard errors (b,) under white noise, and the share (b,) of the variance that the prior makes. `rows` counts the
-    rows of the whole log, where `fitted` are stretches of it.
+    Besides it, standard errors (b,) under white noise, and the share (b,) of the variance that the prior makes.
+
+    Args:
+        regressor: of the model that was fitted.
+        fitted: rows and their errors.
+        scores: sums Y' W e over each chunk (chunks, b).
+        moments: of all rows.
+        solution: parameters and weights.
+        ridge: weight of the prior.
+        averaged: rows that are averaged at a time, in a long log.
+        seed: of the drawn noise.
+        rows: of the whole log, where `fitted` are stretches of it; None where they are all.
     """
     weights = solution.weights
     inverse = moments.inverse(weights, ridge)

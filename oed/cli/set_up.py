@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
-    from estimation.logs.log_stream import LogStream
+    from estimation.logs.parquet_streams import LogStream
     from robots.robot import Robot
     from robots.signals import Log
 

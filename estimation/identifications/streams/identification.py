@@ -20,15 +20,12 @@ from estimation.identifications.fit import (
     second_pass,
     sum_moments,
 )
-from estimation.identifications.identification import (
-    describe_fit,
-    determined_parameters,
-    require_predictable,
-)
+from estimation.identifications.identification import describe_fit
 from estimation.identifications.streams.errors import Errors
 from estimation.identifications.streams.pieces import Pieces
 from estimation.identifications.streams.survey import merged_report, survey
-from estimation.logs.log_stream import LogStream
+from estimation.identifications.verdicts import determined_parameters, require_predictable
+from estimation.logs.parquet_streams import LogStream
 from estimation.models.model import Model
 from estimation.preprocessing import LowPass
 from estimation.regressions.braking_friction import with_braking_friction
@@ -72,7 +69,7 @@ def identify_stream(
 
     Args:
         robot: the robot.
-        stream: the log, see `estimation.logs.log_stream.open_stream`.
+        stream: the log, see `estimation.logs.parquet_streams.open_stream`.
         method: ``wls`` or ``ols``.
         friction: see `identify`.
         position: see `identify`.

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from estimation.identifications.streams.survey import Segment, Survey
-from estimation.logs.log_stream import LogStream
+from estimation.logs.parquet_streams import LogStream
 from estimation.preprocessing import LowPass, smooth
 from estimation.regressions.preparation import OVERLAP, PIECE, TREMBLE, Prepared, Rows, prepare
 from estimation.regressions.torque_meanings import as_joint_torque

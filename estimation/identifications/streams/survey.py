@@ -13,7 +13,7 @@ from estimation.gate import GateReport, check_log
 from estimation.gate.finding import Finding
 from estimation.gate.report import NOT_OF_MOTION, worst_first
 from estimation.identifications.identification import usual_speeds
-from estimation.logs.log_stream import PAUSE, LogStream
+from estimation.logs.parquet_streams import PAUSE, LogStream
 from estimation.regressions.preparation import prepare
 from estimation.regressions.torque_meanings import as_joint_torque
 from robots.common.errors import InputError

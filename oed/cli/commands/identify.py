@@ -30,7 +30,7 @@ from oed.cli.set_up import GravityOption, PayloadOption, TorqueIsOption, with_kn
 
 if TYPE_CHECKING:
     from estimation import Estimate
-    from estimation.logs.log_stream import LogStream
+    from estimation.logs.parquet_streams import LogStream
     from robots.robot import Robot
 
 
@@ -97,7 +97,7 @@ def identify(
         from estimation.exports import build_mjcf, urdf_text
         from estimation.exports import c_code as c_text
         from estimation.identifications.streams import METHODS, identify_stream
-        from estimation.logs.log_stream import is_large
+        from estimation.logs.parquet_streams import is_large
         from estimation.predictions.method_table import compare_methods
         from oed.reports import save_estimate_report
         from robots.common.files import ResultFolder, open_atomic
@@ -173,7 +173,7 @@ def _opened(
     torque_is: str | None,
 ) -> LogStream:
     """Opens the only log, to be read in pieces, with what is known of its setup."""
-    from estimation.logs.log_stream import open_stream
+    from estimation.logs.parquet_streams import open_stream
     from estimation.logs.torque_source import parse_meaning
     from robots.common.errors import InputError
 

@@ -14,7 +14,7 @@ import estimation.regressions.preparation as preparation
 from estimation import identify, read_log, write_log
 from estimation.identifications.choices import Candidates
 from estimation.identifications.streams import identify_stream
-from estimation.logs.log_stream import open_stream
+from estimation.logs.parquet_streams import open_stream
 from robots.common.errors import InputError
 from robots.loading import load_robot
 from robots.plants import nominal_plant, simulate

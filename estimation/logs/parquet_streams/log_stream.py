@@ -13,7 +13,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 from numpy.typing import NDArray
 
-from estimation.logs.parquet_parts import Part, open_part
+from estimation.logs.parquet_streams.parquet_parts import Part, open_part
 from robots.common.errors import InputError
 from robots.common.files import sha256
 from robots.signals import Log
