@@ -89,7 +89,10 @@ def _capsules(robot: Robot) -> tuple[Capsule, ...]:
         try:
             return collision_model(robot).capsules
         except InputError:
-            return segment_capsules(robot.chain, RADIUS_FRACTION)
+            pass
+    if not reach(robot.chain) and not robot.chain.joints[0].translation.any():
+        return ()  # all joints are at one point: there is no link to draw
+    return segment_capsules(robot.chain, RADIUS_FRACTION)
 
 
 def _drawn(robot: Robot) -> tuple[Body, ...]:
