@@ -10,7 +10,7 @@ import numpy as np
 def expected_rounds(changes: Sequence[float], settled: float, most: int) -> float:
     """Estimates how many rounds an iteration takes that converges linearly.
 
-    The logarithm of the change falls by the same amount each round, so two rounds tell how many are left.
+    The logarithm of the change falls by the same amount each round, so two rounds show how many are left.
 
     Args:
         changes: relative change of each round so far; at least one.

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -128,6 +128,33 @@ def robot_from(
             ) from None
     names = [name.strip() for name in joints.split(",")] if joints else None
     return load_robot(spec, tip=tip, joints=names, locked=locked or None, unlimited=unlimited)
+
+
+def robot_of_file(
+    robot: str | None,
+    metadata: Mapping[str, Any],
+    file: Path,
+    tip: str | None = None,
+    joints: str | None = None,
+    lock: list[str] | None = None,
+) -> Robot:
+    """Loads the robot that an option names, else the one that a trajectory file names.
+
+    Args:
+        robot: of the option.
+        metadata: of the file.
+        file: for the message.
+        tip: see `robot_from`.
+        joints: see `robot_from`.
+        lock: see `robot_from`.
+
+    Raises:
+        InputError: neither names one; or see `robot_from`.
+    """
+    named = robot or str(metadata.get("robot") or "")
+    if not named:
+        raise InputError("the file does not name its robot", file=file, remedy="give --robot")
+    return robot_from(named, tip, joints, lock)
 
 
 @contextmanager

@@ -7,7 +7,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
-from oed.reports.pages.design_report import NOISE
+from oed.reports.pages.design_report import excitation_code
 from oed.reports.rendering.severity import LEVELS
 
 Figure = float | str | None
@@ -66,18 +66,16 @@ def _design(data: Data) -> Reading:
     beyond = [m for m in margins if m["slack_fraction"] < 0.0]
     tightest = min((m["slack_fraction"] for m in margins if m["limit"] is not None), default=None)
     cond = whole["cond_Y"]
+    excitation = excitation_code(cond, whole["samples"])
     codes = ["limit.exceeded"] if beyond else []
-    if cond is None:
-        codes.append("excitation.incomplete")
-    elif NOISE * cond / math.sqrt(whole["samples"]) > 1.0:
-        codes.append("excitation.weak")
+    codes += [excitation] if excitation else []
     codes += ["value.assumed"] if data["assumed"] else []
     retimed = data.get("retiming")
     if beyond:
         verdict = f"Do not play this motion: it exceeds {len(beyond)} limits."
     elif retimed:
         verdict = retimed["verdict"]
-    elif codes and codes[0].startswith("excitation"):
+    elif excitation:
         verdict = "This motion does not determine all parameters."
     else:
         verdict = f"Determines {len(data['model']['columns'])} base parameters within all limits."

@@ -90,7 +90,7 @@ class Mean:
     """A mean, with the interval at 95 % of a normal distribution.
 
     Attributes:
-        values: of which it is the mean.
+        values: whose mean it is.
     """
 
     values: tuple[float, ...]

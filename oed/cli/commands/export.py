@@ -18,6 +18,7 @@ from oed.cli.options import (
     QuietOption,
     TipOption,
     robot_from,
+    robot_of_file,
 )
 
 
@@ -105,10 +106,7 @@ def export(
         else:
             from oed.exports import CONTROLLER_FORMS
 
-            named = robot or str(metadata.get("robot") or "")
-            if not named:
-                raise InputError("the file does not name its robot", file=trajectory, remedy="give --robot")
-            described = robot_from(named, tip, joints, lock)
+            described = robot_of_file(robot, metadata, trajectory, tip, joints, lock)
             target = out or trajectory.with_name(f"{trajectory.stem}-export{CONTROLLER_FORMS[to].suffixes[0]}")
             options = ExportOptions(start_tolerance=start_tolerance, name=name)
             motion = export_trajectory(target, motion, described, to, period=period, options=options, force=force)

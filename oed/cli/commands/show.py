@@ -17,7 +17,7 @@ from oed.cli.options import (
     MappingOption,
     QuietOption,
     TipOption,
-    robot_from,
+    robot_of_file,
 )
 
 if TYPE_CHECKING:
@@ -59,7 +59,6 @@ def show(
         from oed.exports import read_trajectory
         from oed.reports import animate, motion_page, render
         from oed.reports.rendering.provenance import recordings_from
-        from robots.common.errors import InputError
         from robots.common.files import existing_file, open_atomic
         from robots.signals import Log, Motion
 
@@ -67,13 +66,12 @@ def show(
         with open_atomic(out, force=force) as page_file:
             existing_file(motion)
             played: Motion | Log
-            if mapping is None and _is_trajectory(motion):
+            stated: dict[str, Any] = {}
+            planned = mapping is None and _is_trajectory(motion)
+            if planned:
                 played, stated = read_trajectory(motion)
-                robot = robot or str(stated.get("robot") or "") or None
-            if robot is None:
-                raise InputError("the file does not name its robot", file=motion, remedy="give --robot")
-            described = robot_from(robot, tip, joints, lock)
-            if mapping is not None or not _is_trajectory(motion):
+            described = robot_of_file(robot, stated, motion, tip, joints, lock)
+            if not planned:
                 played = read_log(
                     motion,
                     n=described.n,

@@ -33,7 +33,7 @@ from oed.cli.options import (
     LockOption,
     QuietOption,
     TipOption,
-    robot_from,
+    robot_of_file,
 )
 
 
@@ -86,7 +86,6 @@ def stream(
         from oed.controllers import stream as play
         from oed.controllers.interrupts import terminate_as_interrupt
         from oed.exports import read_trajectory
-        from robots.common.errors import InputError
 
         place = endpoint(host, transport, motion_port, state_port, byte_order, real_bytes, handshake)
         options = StreamOptions(
@@ -101,10 +100,7 @@ def stream(
             robot_id=robot_id,
         )
         motion, metadata = read_trajectory(trajectory)
-        named = robot or str(metadata.get("robot") or "")
-        if not named:
-            raise InputError("the file does not name its robot", file=trajectory, remedy="give --robot")
-        described = robot_from(named, tip, joints, lock)
+        described = robot_of_file(robot, metadata, trajectory, tip, joints, lock)
         try:
             with terminate_as_interrupt():
                 result = play(

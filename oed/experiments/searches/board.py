@@ -96,7 +96,9 @@ class Board:
         with tempfile.TemporaryDirectory(prefix="oed-") as folder:
             cluster = executor if isinstance(executor, ClusterExecutor) else None
             local, over = Board(Path(folder)), threading.Event()
-            board = Board(local.folder, None if cluster is None else cluster.link(lambda told: local.write(*told)))
+            board = Board(
+                local.folder, None if cluster is None else cluster.link(lambda message: local.write(*message))
+            )
             progress.start(task, float(searches * steps))
 
             def watch() -> None:

@@ -61,7 +61,7 @@ class Animation:
 
     @property
     def quantities(self) -> tuple[str, ...]:
-        """Quantities of which a limit is known."""
+        """Quantities whose limits are known."""
         return tuple(name for name in QUANTITIES if name in self.shares)
 
     def summary(self) -> str:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import warnings
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
@@ -86,13 +87,11 @@ def _capsules(robot: Robot) -> tuple[Capsule, ...]:
     with warnings.catch_warnings():
         # Whether a shape is assumed matters for distances, which a picture does not state.
         warnings.simplefilter("ignore", AssumedValueWarning)
-        try:
+        with suppress(InputError):
             return collision_model(robot).capsules
-        except InputError:
-            pass
-    if not reach(robot.chain) and not robot.chain.joints[0].translation.any():
-        return ()  # all joints are at one point: there is no link to draw
-    return segment_capsules(robot.chain, RADIUS_FRACTION)
+        with suppress(InputError):  # of an arm without extent, which has no link to draw
+            return segment_capsules(robot.chain, RADIUS_FRACTION)
+    return ()
 
 
 def _drawn(robot: Robot) -> tuple[Body, ...]:

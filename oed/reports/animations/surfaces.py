@@ -30,7 +30,7 @@ class Surface:
     closed: bool = True
 
     def moved(self, pose: Array) -> Surface:
-        """Gives the surface in another frame, of which ``pose`` (4, 4) is the pose of its own."""
+        """Gives the surface in another frame. ``pose`` (4, 4) is the pose of its own frame there."""
         return Surface(self.vertices @ pose[:3, :3].T + pose[:3, 3], self.triangles, self.closed)
 
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -9,7 +11,7 @@ from oed.experiments import Design
 from oed.experiments.quality import Quality
 from oed.experiments.safety_checks.margins import missing_limits, nominal_torque
 from oed.reports.animations.building import animate
-from oed.reports.pages.motions.motion_report import animation_section
+from oed.reports.pages.motions.motion_report import animation_section, approach_text, tightest_fact
 from oed.reports.pictures.trajectory_pictures import margins_picture, spectrum_picture, trajectory_picture
 from oed.reports.rendering.page import Cell, Fact, Finding, Page, Section, Table, findings_of
 from oed.reports.rendering.provenance import footer
@@ -162,21 +164,14 @@ def _facts(design: Design) -> tuple[Fact, ...]:
         Fact(label="Duration", value=f"{design.motion.duration:.1f} s"),
     ]
     if tightest is not None:
-        facts.append(
-            Fact(
-                label="Tightest limit",
-                value=f"{100 * tightest.slack_fraction:.2f} % left",
-                note=_name(tightest),
-                status="act" if tightest.violated else "good",
-            )
-        )
+        facts.append(tightest_fact(tightest))
     return tuple(facts)
 
 
 def _verdict(design: Design, findings: tuple[Finding, ...]) -> str:
     codes = {finding.code for finding in findings}
     if "limit.exceeded" in codes:
-        return f"Do not play this motion: it exceeds the limit of {_name(design.violated[0])}."
+        return f"Do not play this motion: it exceeds the limit of {approach_text(design.violated[0])}."
     if codes & {"excitation.incomplete", "excitation.weak"}:
         return "Design the experiment again: this motion does not determine all parameters."
     return (
@@ -191,7 +186,7 @@ def _findings(design: Design) -> tuple[Finding, ...]:
         Finding(
             code="limit.exceeded",
             subject=f"Joint {margin.joint}:",
-            text=f"the motion exceeds the limit of {_name(margin)}.",
+            text=f"the motion exceeds the limit of {approach_text(margin)}.",
             action="Do not play it.",
         )
         for margin in design.violated
@@ -233,24 +228,37 @@ def excitation_findings(quality: Quality) -> tuple[Finding, ...]:
         quality: of the whole motion.
     """
     cond = quality.to_dict()["cond_Y"]
+    code = excitation_code(cond, quality.samples)
+    if not code:
+        return ()
     action = "Give the motion more room or time: --velocity-fraction, --periods or --effort thorough."
     if cond is None:
         text = "The motion does not excite all parameters: the regressor lacks rank."
-        return (Finding(code="excitation.incomplete", text=text, action=action),)
-    error = NOISE * cond / np.sqrt(quality.samples)
-    if error <= 1.0:
-        return ()
+        return (Finding(code=code, text=text, action=action),)
+    error = _worst_error(cond, quality.samples)
     text = (
         f"At least one combination of parameters is not determined: cond(Y) is {significant(cond, digits=2)}. With "
         f"torque noise of {100 * NOISE:g} %, its standard error is about {significant(error, digits=2)} times the "
         "parameters' size."
     )
-    return (Finding(code="excitation.weak", text=text, action=action),)
+    return (Finding(code=code, text=text, action=action),)
 
 
-def _name(margin: Margin) -> str:
-    quantity = "position" if margin.quantity in ("lower", "upper") else margin.quantity
-    return f"{quantity} of joint {margin.joint} at {margin.time:.3f} s"
+def excitation_code(cond: float | None, samples: int) -> str:
+    """Gives the code of a finding about the excitation; empty if the motion determines all parameters.
+
+    Args:
+        cond: condition number of the regressor; None if it lacks rank.
+        samples: number of its samples.
+    """
+    if cond is None:
+        return "excitation.incomplete"
+    return "excitation.weak" if _worst_error(cond, samples) > 1.0 else ""
+
+
+def _worst_error(cond: float, samples: int) -> float:
+    """Standard error of the worst-determined direction over the parameters' size, see `excitation_findings`."""
+    return NOISE * cond / math.sqrt(samples)
 
 
 def _segments(design: Design) -> Table:

@@ -82,7 +82,7 @@ class BaseCompliance(Effect):
         pairs = [_stiffness(situation, f) for f in SCANNED]
         shown = []
         for pair in pairs:
-            X = self.columns(situation, joint, (*pair, 0.0, DAMPING))[:, :, :2]
+            X = _torque(situation, _static(situation)[:, :, :2], (*pair, 0.0, DAMPING))
             explained = np.einsum("njk,nj->k", X, residual)
             shown.append(np.maximum(explained, 0.0) ** 2 / np.maximum(np.einsum("njk,njk->k", X, X), 1e-300))
         score = np.array(shown)  # (resonances, 2)
@@ -106,9 +106,8 @@ class BaseCompliance(Effect):
             inverse = np.array([second, first]) / (first * second - both**2)
             ideal = [float(np.clip(value, *bound)) for value, bound in zip(inverse, ranges, strict=True)]
             stiffness = ((ideal[0], ideal[1]), (None, None))
-        return tuple((*pair, own, damping) for pair, own, damping in product(stiffness, (0.0, None), (DAMPING, None)))[
-            :-1
-        ]
+        combinations = product(stiffness, (0.0, None), (DAMPING, None))
+        return tuple((*pair, own, damping) for pair, own, damping in combinations)[:-1]
 
     def is_plausible(self, robot: Robot, joint: Place, coefficients: Array, shape: tuple[float, ...] = ()) -> bool:
         """Rejects compliances that would give energy: their matrix is not positive."""
@@ -118,24 +117,13 @@ class BaseCompliance(Effect):
     def columns(self, situation: Situation, joint: Place, shape: tuple[float, ...] = ()) -> Array:
         """Evaluates the torque of all joints per compliance (N, n, 3), or per compliance and own angle (N, n, 5)."""
         robot = situation.robot
-        axes = _axes(situation)
-        one, other = _moment(situation).T
-        none = np.zeros_like(one)
-        static = np.stack([[one, none], [none, other], [other, one]]).transpose(2, 1, 0)  # (N, 2, 3)
-        slow = (static, *situation.derivatives(static))
-        beyond = _oscillation(situation, slow[1], slow[2], shape)
-        courses = [a + b for a, b in zip(slow, (beyond, *situation.derivatives(beyond)), strict=True)]
-        tilt = tilted_torque(situation)
-        rate, acceleration = (situation.sensitivity(f"base_{kind}") @ axes.T for kind in ("rate", "acceleration"))
-        torque = sum(X @ course for X, course in zip((tilt, rate, acceleration), courses, strict=True))
+        torque = _torque(situation, _static(situation), shape)
         if not upright(robot):
-            return np.asarray(torque)
-        first = robot.chain.joints[0]
+            return torque
+        axes, first, q = _axes(situation), robot.chain.joints[0], situation.q[:, 0, None, None]
         across = axes @ np.cross(first.rotation @ first.axis, axes).T  # e_i' (d x e_k)
-        turned = (
-            np.cos(situation.q[:, 0])[:, None, None] * np.eye(2) + np.sin(situation.q[:, 0])[:, None, None] * across
-        )
-        return np.concatenate([torque, tilt @ turned], axis=2)
+        turned = np.cos(q) * np.eye(2) + np.sin(q) * across
+        return np.concatenate([torque, tilted_torque(situation) @ turned], axis=2)
 
     def describe(
         self,
@@ -162,6 +150,23 @@ def _axes(situation: Situation) -> Array:
 def _moment(situation: Situation) -> Array:
     """Computes the moment of the robot on its base about the horizontal axes (N, 2) [N m]."""
     return np.asarray(-situation.sensitivity("base_moment")[:, :, 0] @ _axes(situation).T)
+
+
+def _static(situation: Situation) -> Array:
+    """Computes the static tilts about both axes per compliance about axis 1, about axis 2, and of both (N, 2, 3)."""
+    one, other = _moment(situation).T
+    none = np.zeros_like(one)
+    return np.stack([[one, none], [none, other], [other, one]]).transpose(2, 1, 0)
+
+
+def _torque(situation: Situation, static: Array, shape: tuple[float, ...]) -> Array:
+    """Computes the torque of all joints (N, n, k) on a base with static tilts (N, 2, k) that oscillates."""
+    slow = (static, *situation.derivatives(static))
+    beyond = _oscillation(situation, slow[1], slow[2], shape)
+    courses = [a + b for a, b in zip(slow, (beyond, *situation.derivatives(beyond)), strict=True)]
+    rates = (situation.sensitivity(f"base_{kind}") @ _axes(situation).T for kind in ("rate", "acceleration"))
+    parts = (tilted_torque(situation), *rates)
+    return np.asarray(sum(X @ course for X, course in zip(parts, courses, strict=True)))
 
 
 def _inertia(situation: Situation) -> Array:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from functools import lru_cache
+from functools import lru_cache, partial
 
 import casadi
 import numpy as np
@@ -123,7 +123,11 @@ def _rigid_torque_and_moment(
 
 
 def _torque(chain: Chain, q: casadi.SX, dq: casadi.SX, ddq: casadi.SX, pi: casadi.SX, gravity: casadi.SX) -> casadi.SX:
-    return rigid_torque(chain, q, dq, ddq, [pi[10 * i : 10 * i + 10] for i in range(chain.n)], gravity)
+    return rigid_torque(chain, q, dq, ddq, _bodies(chain, pi), gravity)
+
+
+def _bodies(chain: Chain, pi: casadi.SX) -> list[casadi.SX]:
+    return [pi[10 * i : 10 * i + 10] for i in range(chain.n)]
 
 
 def _position(chain: Chain, q: casadi.SX, dq: casadi.SX, ddq: casadi.SX, pi: casadi.SX) -> casadi.SX:
@@ -198,38 +202,18 @@ def _moment(chain: Chain, q: casadi.SX, dq: casadi.SX, ddq: casadi.SX, pi: casad
     return total
 
 
-def _on_base(
-    chain: Chain, q: casadi.SX, dq: casadi.SX, ddq: casadi.SX, pi: casadi.SX, omega: casadi.SX, alpha: casadi.SX
-) -> tuple[casadi.SX, casadi.SX]:
-    bodies = [pi[10 * i : 10 * i + 10] for i in range(chain.n)]
-    return _rigid_torque_and_moment(chain, q, dq, ddq, bodies, casadi.SX(chain.gravity), omega, alpha)
-
-
-def _base_rate(chain: Chain, q: casadi.SX, dq: casadi.SX, ddq: casadi.SX, pi: casadi.SX) -> casadi.SX:
-    omega, still = casadi.SX.sym("omega", 3), casadi.SX.zeros(3)
-    torque, _ = _on_base(chain, q, dq, ddq, pi, omega, still)
-    return casadi.substitute(casadi.jacobian(torque, omega), omega, still)
-
-
-def _base_acceleration(chain: Chain, q: casadi.SX, dq: casadi.SX, ddq: casadi.SX, pi: casadi.SX) -> casadi.SX:
-    alpha = casadi.SX.sym("alpha", 3)
-    return casadi.jacobian(_on_base(chain, q, dq, ddq, pi, casadi.SX(3, 1), alpha)[0], alpha)
+def _by_base_motion(
+    of: int, by: int, chain: Chain, q: casadi.SX, dq: casadi.SX, ddq: casadi.SX, pi: casadi.SX
+) -> casadi.SX:
+    """Builds the slope of the torque (`of` 0) or the base's moment (1) by its velocity (`by` 0) or acceleration (1)."""
+    motion, still = (casadi.SX.sym("omega", 3), casadi.SX.sym("alpha", 3)), casadi.SX.zeros(6)
+    found = _rigid_torque_and_moment(chain, q, dq, ddq, _bodies(chain, pi), casadi.SX(chain.gravity), *motion)
+    return casadi.substitute(casadi.jacobian(found[of], motion[by]), casadi.vertcat(*motion), still)
 
 
 def _base_moment(chain: Chain, q: casadi.SX, dq: casadi.SX, ddq: casadi.SX, pi: casadi.SX) -> casadi.SX:
     still = casadi.SX(3, 1)
-    return _on_base(chain, q, dq, ddq, pi, still, still)[1]
-
-
-def _base_inertia(chain: Chain, q: casadi.SX, dq: casadi.SX, ddq: casadi.SX, pi: casadi.SX) -> casadi.SX:
-    alpha = casadi.SX.sym("alpha", 3)
-    return casadi.jacobian(_on_base(chain, q, dq, ddq, pi, casadi.SX(3, 1), alpha)[1], alpha)
-
-
-def _base_damping(chain: Chain, q: casadi.SX, dq: casadi.SX, ddq: casadi.SX, pi: casadi.SX) -> casadi.SX:
-    omega, still = casadi.SX.sym("omega", 3), casadi.SX.zeros(3)
-    _, moment = _on_base(chain, q, dq, ddq, pi, omega, still)
-    return casadi.substitute(casadi.jacobian(moment, omega), omega, still)
+    return _rigid_torque_and_moment(chain, q, dq, ddq, _bodies(chain, pi), casadi.SX(chain.gravity), still, still)[1]
 
 
 def moved_body(tip: Array) -> Array:
@@ -260,9 +244,9 @@ KINDS: dict[str, Callable[..., casadi.SX]] = {
     "flange": _flange,
     "moment": _moment,
     "links": _links,
-    "base_rate": _base_rate,
-    "base_acceleration": _base_acceleration,
+    "base_rate": partial(_by_base_motion, 0, 0),
+    "base_acceleration": partial(_by_base_motion, 0, 1),
     "base_moment": _base_moment,
-    "base_inertia": _base_inertia,
-    "base_damping": _base_damping,
+    "base_inertia": partial(_by_base_motion, 1, 1),
+    "base_damping": partial(_by_base_motion, 1, 0),
 }

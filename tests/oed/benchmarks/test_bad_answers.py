@@ -18,7 +18,7 @@ from robots.common.files import ResultFolder
 
 
 def effects(**entry: Any) -> dict[str, Any]:
-    """Cases of which the second names one effect."""
+    """Cases; the second one names one effect."""
     return {"case-002": {"verdict": "effects", "effects": [{"effect": "stribeck", "joints": [2]} | entry]}}
 
 

@@ -69,7 +69,7 @@ def test_front_is_saved_with_its_designs(front: ParetoFront, tmp_path: Path) -> 
 
 
 def test_page_says_what_each_extreme_gives_up(front: ParetoFront) -> None:
-    """The report tells the price, and its picture has a point per design."""
+    """The report states the price, and its picture has a point per design."""
     page = pareto_page(front)
     assert "designing for cond alone" in " ".join(page.sections[0].paragraphs).lower()
     (picture,) = page.pictures

@@ -50,7 +50,7 @@ def fail(number: int) -> int:
 
 
 def until_stopped(task: tuple[Link, int]) -> int:
-    """Tells its number, then works until it is asked to end."""
+    """Sends its number, then works until it is asked to end."""
     link, number = task
     link.tell([number, 0.5])
     begin = time.monotonic()

@@ -1,4 +1,4 @@
-"""Work on a real Dask scheduler with workers in processes of their own, one of which is killed."""
+"""Work on a real Dask scheduler with workers in processes of their own; one worker is killed."""
 
 from __future__ import annotations
 
@@ -70,11 +70,11 @@ def test_errors_and_functions_of_scripts(dask_cluster):
 
 def test_messages_and_stop(dask_cluster):
     """Running tasks send messages, and end when they are asked to."""
-    told, enough = [], threading.Event()
+    received, enough = [], threading.Event()
 
     def hear(message):
-        told.append(tuple(message))
-        if len(told) == 2:
+        received.append(tuple(message))
+        if len(received) == 2:
             enough.set()
 
     with cluster(dask_cluster.scheduler_address) as executor:
@@ -84,7 +84,7 @@ def test_messages_and_stop(dask_cluster):
         assert enough.wait(20)
         executor.stop(link)
         assert [future.result(20) for future in futures] == [0, 1]
-    assert sorted(told) == [(0, 0.5), (1, 0.5)]
+    assert sorted(received) == [(0, 0.5), (1, 0.5)]
 
 
 def test_other_versions_are_refused(dask_cluster):

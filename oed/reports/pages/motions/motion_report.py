@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from oed.reports.animations.animation import NEAR, Animation
-from oed.reports.rendering.page import Fact, Finding, Page, Section
+from oed.reports.rendering.page import Fact, Finding, Page, Section, Status
 from oed.reports.rendering.provenance import Recording, footer
 from robots.limits import Margin
 
@@ -38,14 +38,7 @@ def motion_page(animation: Animation, *, logs: Sequence[Recording] = (), finding
         Fact(label="Joints", value=animation.chain.n),
     ]
     if tightest is not None:
-        facts.append(
-            Fact(
-                label="Tightest limit",
-                value=f"{100 * tightest.slack_fraction:.2f} % left",
-                note=approach_text(tightest),
-                status="good" if not tightest.violated else "note" if recorded else "act",
-            )
-        )
+        facts.append(tightest_fact(tightest, exceeded="note" if recorded else "act"))
     return Page(
         title=TITLE,
         robot=animation.robot,
@@ -71,6 +64,21 @@ def animation_section(animation: Animation) -> Section:
     if animation.marks:
         text += " Circles mark joints with a finding."
     return Section(title=TITLE, paragraphs=(text,), animation=animation)
+
+
+def tightest_fact(margin: Margin, *, exceeded: Status = "act") -> Fact:
+    """States the tightest limit among the key figures.
+
+    Args:
+        margin: of that limit.
+        exceeded: how urgent it is if the limit is exceeded.
+    """
+    return Fact(
+        label="Tightest limit",
+        value=f"{100 * margin.slack_fraction:.2f} % left",
+        note=approach_text(margin),
+        status=exceeded if margin.violated else "good",
+    )
 
 
 def approach_text(margin: Margin) -> str:

@@ -29,7 +29,7 @@ def window(noise, resting=()):
 
 
 def test_a_joint_at_rest_has_no_residual():
-    """The residual of a joint that rests is static friction, of which a model knows nothing."""
+    """The residual of a joint that rests is static friction, which no model contains."""
     noise = 0.05 * np.random.default_rng(1).normal(size=(1000, 3))
     found = window(noise, resting=[1])
     np.testing.assert_array_equal(found.moves, [True, False, True])

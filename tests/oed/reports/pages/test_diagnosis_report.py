@@ -138,12 +138,12 @@ def test_no_chance_is_told_that_nobody_knows(view):
     assert "1e-12" in text
 
 
-@pytest.mark.parametrize(("interval", "told"), [((0.03, 0.07), True), ((-0.01, 0.02), False)])
-def test_what_brings_nothing_explains_nothing(interval, told, view):
+@pytest.mark.parametrize(("interval", "stated"), [((0.03, 0.07), True), ((-0.01, 0.02), False)])
+def test_what_brings_nothing_explains_nothing(interval, stated, view):
     """A free function that stands out of the noise and does not surely help elsewhere explains no part of the error."""
     finding = replace(view.findings[0], interval=interval)
     page = diagnosis_page(replace(view, verdict="unexplained", findings=(finding,)))
-    assert ("part of the error has no known cause" in page.verdict) == told
+    assert ("part of the error has no known cause" in page.verdict) == stated
     assert page.level == "act"
     assert any(found.text == finding.sentence for found in page.findings)
 

@@ -131,7 +131,7 @@ def test_page_loads_nothing_from_anywhere(full: str) -> None:
 
 
 def test_page_stays_small(full: str) -> None:
-    """Sixty seconds at 250 Hz of six joints with every picture there is fit in 4 MB, of which plotly takes 1.2."""
+    """Sixty seconds at 250 Hz of six joints with every picture there is fit in 4 MB; plotly takes 1.2 of them."""
     assert len(full.encode()) < 4e6
 
 
