@@ -122,7 +122,7 @@ def _chosen(path: Path, names: Sequence[str], n: int | None) -> list[str]:
                 file=path,
                 column="tau1" if name == "i1" else name,
                 allowed=f"t, q1..q{joints} and tau1..tau{joints} or i1..i{joints}",
-                remedy="rename the columns: a log that is read in pieces takes no mapping",
+                remedy="rename the columns, or read the log whole with --no-stream: in pieces it takes no mapping",
             )
     more = f"q{joints + 1}"
     if more in names:

@@ -118,7 +118,7 @@ def identify(
                 "progress": progress,
             }
             table = None
-            if stream or (stream is None and method in METHODS and is_large(log)):
+            if stream or (stream is None and mapping is None and method in METHODS and is_large(log)):
                 result = identify_stream(
                     described,
                     _opened(described, log, mapping, payload, gravity, torque_is),
