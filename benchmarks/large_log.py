@@ -5,6 +5,9 @@ million samples at 250 Hz); its Parquet log is written once. The whole way from 
 process of its own, for a quarter of the time and for all of it: time must grow with the length, and memory must not
 hold the regressor (10.8 million rows of 70 columns are 6 GB). Beside it stands the time that one thread of this
 machine's BLAS takes for the symmetric product of a dense regressor of that size.
+
+With ``python benchmarks/large_log.py --stream [ROWS ...]`` folders of Parquet parts, of 500,000 rows each, are
+identified in pieces. Memory must not grow with the rows.
 """
 
 from __future__ import annotations
@@ -16,6 +19,7 @@ import sys
 import tempfile
 import time
 import warnings
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -23,6 +27,8 @@ from memory import peak_memory
 from scipy.linalg.blas import dsyrk
 
 from estimation import identify, read_log, write_log
+from estimation.identifications.streams import identify_stream
+from estimation.logs.parquet_streams import open_stream
 from robots import load_robot, nominal_plant, simulate
 from robots.common.errors import AssumedValueWarning
 from robots.common.parallel import one_blas_thread
@@ -32,6 +38,7 @@ from robots.signals import Motion
 HOURS, RATE, ROBOT = 2.0, 250.0, "er3a"
 TONES = 6
 PARAMETERS = 70
+PART = 500_000
 
 
 def motion(robot: Robot, hours: float, seed: int = 0) -> Motion:
@@ -84,7 +91,60 @@ def product_speed(rows: int = 60_000) -> float:
     return rows * PARAMETERS * (PARAMETERS + 1) / best / 1e9
 
 
+def write_part(path: Path, number: int, rows: int) -> None:
+    """Simulates a part of a long log: another motion, a minute after the part before."""
+    plant = nominal_plant(load_robot(ROBOT), spread=0.1, seed=1)
+    moved = motion(plant.robot, rows / RATE / 3600, seed=number)
+    log = simulate(plant, moved, seed=number)
+    write_log(path, replace(log, t=log.t + number * (PART / RATE + 60.0)), force=True)
+
+
+def run_stream(folder: Path) -> dict[str, float]:
+    """Identifies a folder of parts in this process: time of the clock [s], peak memory [GB]."""
+    robot = load_robot(ROBOT)
+    clock = time.perf_counter()
+    stream = open_stream(folder, robot.n)
+    estimate = identify_stream(robot, stream)
+    truth = nominal_plant(robot, spread=0.1, seed=1)
+    moved = motion(robot, 0.02, seed=10_000)
+    torque = truth.model.torque(moved.q, moved.dq, moved.ddq, truth.parameters)
+    error = estimate.model.torque(moved.q, moved.dq, moved.ddq) - torque
+    return {
+        "rows": float(len(stream)),
+        "wall": time.perf_counter() - clock,
+        "memory": peak_memory(),
+        "worst_error": float(np.max(np.sqrt(np.mean(error**2, axis=0) / np.mean(torque**2, axis=0)))),
+    }
+
+
+def streams(sizes: list[int]) -> int:
+    """Measures time and peak memory of logs of some sizes, each a folder that grows into the next."""
+    with tempfile.TemporaryDirectory() as scratch:
+        made = 0
+        for rows in sorted(sizes):
+            for number in range(made, -(-rows // PART)):
+                write_part(Path(scratch) / f"part_{number:04}.parquet", number, PART)
+                made += 1
+            command = [sys.executable, str(Path(__file__).resolve()), "--run-stream", scratch]
+            output = subprocess.run(command, capture_output=True, text=True, check=True, env=dict(os.environ))
+            found = json.loads(output.stdout.splitlines()[-1])
+            print(
+                f"{found['rows']:.0f} rows: {found['wall']:.1f} s by the clock, {found['memory']:.2f} GB; "
+                f"{found['rows'] / found['wall']:.0f} rows per second; on an unseen motion at most "
+                f"{100 * found['worst_error']:.3f} % of a joint's torque from the truth",
+                flush=True,
+            )
+    return 0
+
+
 def main() -> int:
+    if sys.argv[1:2] == ["--run-stream"]:
+        warnings.simplefilter("ignore", AssumedValueWarning)
+        print(json.dumps(run_stream(Path(sys.argv[2]))))
+        return 0
+    if sys.argv[1:2] == ["--stream"]:
+        warnings.simplefilter("ignore", AssumedValueWarning)
+        return streams([int(float(size)) for size in sys.argv[2:]] or [1_000_000, 10_000_000])
     if sys.argv[1:2] == ["--run"]:
         warnings.simplefilter("ignore", AssumedValueWarning)
         print(json.dumps(run(Path(sys.argv[2]))))

@@ -70,6 +70,7 @@ def choose(
     candidates: Candidates,
     *,
     position: bool | None = None,
+    spread: Array | None = None,
 ) -> Choice:
     """Chooses by predicting parts of the logs from others.
 
@@ -82,8 +83,10 @@ def choose(
         estimator: what will fit.
         candidates: what to choose from.
         position: whether a `PositionTorque` of the base stays. None: where it predicts other motions clearly better.
+        spread: standard deviation of the torque (n,), where the logs are parts of a longer one; None for that of the
+            logs.
     """
-    comparison = Comparison(base, logs, estimator, candidates)
+    comparison = Comparison(base, logs, estimator, candidates, spread)
     smoother, low_pass = comparison.smoother()
     averaged, logged = comparison.blocks(smoother), comparison.blocks(smoother, 1)
     transfer = Transfer(comparison, smoother)

@@ -49,15 +49,21 @@ class Comparison:
     """Settings against each other on the same data."""
 
     def __init__(
-        self, base: BaseParameters, logs: Sequence[Prepared], estimator: Estimator, candidates: Candidates
+        self,
+        base: BaseParameters,
+        logs: Sequence[Prepared],
+        estimator: Estimator,
+        candidates: Candidates,
+        spread: Array | None = None,
     ) -> None:
         self.base, self.estimator, self.candidates = base, estimator, candidates
         self.regressor = JointRegressor(base)
         self._latest: tuple[Smoother, list[Rows]] | None = None
         count = sum(len(log.log) for log in logs)
         tau = np.concatenate([log.tau for log in logs]) if len(logs) > 1 else logs[0].tau
-        self.spread = np.maximum(tau.std(axis=0), 1e-9 * np.maximum(1.0, np.abs(tau).max(axis=0)))
-        self.sampled = count > MOST_ROWS
+        deviation = tau.std(axis=0) if spread is None else spread
+        self.spread = np.maximum(deviation, 1e-9 * np.maximum(1.0, np.abs(tau).max(axis=0)))
+        self.sampled = count > MOST_ROWS or spread is not None
         self.logs: list[Prepared] = []
         self.names = [log.log.name or f"log {index}" for index, log in enumerate(logs, start=1)]
         self.source: list[int] = []  # of each stretch, which log it is part of

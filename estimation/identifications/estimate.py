@@ -75,6 +75,8 @@ class Estimate:
         predicted: by the model (N, n).
         dropped_rows: rows of the logs that repeated an old position.
         gates: what the gate found in each log; empty where it was not asked.
+        fitted_rows: number of fitted rows, where the arrays hold evenly spread stretches of a log that was read in
+            pieces; None where they hold all.
     """
 
     model: Model
@@ -87,6 +89,12 @@ class Estimate:
     predicted: Array
     dropped_rows: int
     gates: tuple[GateReport, ...] = ()
+    fitted_rows: int | None = None
+
+    @property
+    def samples(self) -> int:
+        """Number of fitted rows."""
+        return len(self.t) if self.fitted_rows is None else self.fitted_rows
 
     def __repr__(self) -> str:
         errors = ", ".join(f"{100 * joint.nrmse:.3g}" for joint in self.joints)
@@ -141,6 +149,11 @@ class Estimate:
                 f"Residuals are correlated in time; the standard errors allow for it ({self.colour:.1f} times those "
                 f"of white noise)."
             )
+        if self.fitted_rows is not None:
+            found.append(
+                f"The log was read in pieces. Every row was checked and fitted; smoothing and friction were chosen on "
+                f"evenly spread stretches, and figures show {len(self.t)} rows."
+            )
         if self.dropped_rows:
             rows = "row repeats" if self.dropped_rows == 1 else "rows repeat"
             found.append(f"{self.dropped_rows} {rows} an old position (ignored).")
@@ -150,7 +163,7 @@ class Estimate:
         """Lists the torque errors of each joint, and warnings."""
         model = self.model
         lines = [
-            f"{model.robot.name}: {len(model.names)} base parameters from {len(self.t)} samples; "
+            f"{model.robot.name}: {len(model.names)} base parameters from {self.samples} samples; "
             f"{self.choice.smoother.text}",
             (
                 "  joint                 torque RMS   fitted   held out   constant    nominal  noise floor   (errors "

@@ -94,18 +94,18 @@ def fit(base: BaseParameters, logs: Sequence[Prepared], estimator: Estimator, ch
     torque = np.empty((sum(len(part.motion) for part in rows), rows[0].tau.shape[1]))
     predicted = np.split(torque, np.cumsum([len(part.motion) for part in rows])[:-1])
     long = len(torque) > MOST_ROWS
-    passes = [_pass(regressor, part, solution, into, long) for part, into in zip(rows, predicted, strict=True)]
+    passes = [second_pass(regressor, part, solution, into, long) for part, into in zip(rows, predicted, strict=True)]
     scores = np.concatenate([found.scores for found in passes])
-    fitted = [_Fitted(part, torque, None) for part, torque in zip(rows, predicted, strict=True)]
+    fitted = [Fitted(part, torque, None) for part, torque in zip(rows, predicted, strict=True)]
     if solution.row_weights is not None:
         factors = [solution.row_weights(part.tau - torque) for part, torque in zip(rows, predicted, strict=True)]
         weighted = [replace(part, mask=part.mask * factor) for part, factor in zip(rows, factors, strict=True)]
         moments = sum_moments(regressor, weighted).pulled(choice.prior)
         # An M-estimator's scores are its weights times its errors (Huber 1967).
-        fitted = [_Fitted(*some) for some in zip(rows, predicted, factors, strict=True)]
+        fitted = [Fitted(*some) for some in zip(rows, predicted, factors, strict=True)]
         scores = _scores(regressor, fitted, solution.weights) if long else scores
     averaged = round(AVERAGED / float(np.median([log.positions.period for log in logs])))
-    full, white, prior_share = _covariances(regressor, fitted, scores, moments, solution, choice.ridge, averaged, seed)
+    full, white, prior_share = covariances(regressor, fitted, scores, moments, solution, choice.ridge, averaged, seed)
     return Fit(
         base=base,
         choice=choice,
@@ -132,7 +132,7 @@ def sum_moments(regressor: JointRegressor, rows: Sequence[Rows]) -> Moments:
     return reduce(add, threaded(of, ((part, at) for part in rows for at in chunks(len(part.motion)))))
 
 
-class _Fitted(NamedTuple):
+class Fitted(NamedTuple):
     """Rows, the torque (N, n) that a fit predicts of them, and how much each counts (N, n), None for alike."""
 
     rows: Rows
@@ -157,7 +157,7 @@ class _Pass(NamedTuple):
     scores: Array
 
 
-def _pass(regressor: JointRegressor, part: Rows, solution: Solution, torque: Array, scored: bool) -> _Pass:
+def second_pass(regressor: JointRegressor, part: Rows, solution: Solution, torque: Array, scored: bool) -> _Pass:
     """Looks at all rows once more, now that the parameters are known, and writes the predicted torque (N, n)."""
     motion, base = part.motion, regressor.base
     described = base.from_standard(base.model.nominal)
@@ -180,19 +180,31 @@ def _pass(regressor: JointRegressor, part: Rows, solution: Solution, torque: Arr
     return _Pass(np.sum(nominal, axis=0), np.array(scores))
 
 
-def _covariances(
+def covariances(
     regressor: JointRegressor,
-    fitted: Sequence[_Fitted],
+    fitted: Sequence[Fitted],
     scores: Array,
     moments: Moments,
     solution: Solution,
     ridge: float,
     averaged: int,
     seed: int,
+    rows: int | None = None,
 ) -> tuple[Array, Array, Array | None]:
     """Covariance (b, b) by the noise and by the prior's own scatter.
 
     Besides it, standard errors (b,) under white noise, and the share (b,) of the variance that the prior makes.
+
+    Args:
+        regressor: of the model that was fitted.
+        fitted: rows and their errors.
+        scores: sums Y' W e over each chunk (chunks, b).
+        moments: of all rows.
+        solution: parameters and weights.
+        ridge: weight of the prior.
+        averaged: rows that are averaged at a time, in a long log.
+        seed: of the drawn noise.
+        rows: of the whole log, where `fitted` are stretches of it; None where they are all.
     """
     weights = solution.weights
     inverse = moments.inverse(weights, ridge)
@@ -205,7 +217,7 @@ def _covariances(
     if solution.covariance is not None:
         return solution.covariance, white, None
     parts = _parts(regressor, fitted)
-    total = sum(len(some.torque) for some in fitted)
+    total = rows or sum(len(some.torque) for some in fitted)
     seen = sum(part.rows for part in parts)
     share = seen / total
     full = covariance(parts, weights, inverse, seed, share=share, averaged=min(averaged, seen // LEAST_AVERAGES))
@@ -216,7 +228,7 @@ def _covariances(
     return full + scatter, white, np.clip(np.diag(scatter) / total_variance, 0.0, 1.0)
 
 
-def _parts(regressor: JointRegressor, fitted: Sequence[_Fitted]) -> list[Part]:
+def _parts(regressor: JointRegressor, fitted: Sequence[Fitted]) -> list[Part]:
     """The rows as the sandwich wants them, of a long log some stretches."""
     total = sum(len(some.torque) for some in fitted)
     parts = []
@@ -231,7 +243,7 @@ def _parts(regressor: JointRegressor, fitted: Sequence[_Fitted]) -> list[Part]:
     return parts
 
 
-def _part(joints: JointRegressor, fitted: _Fitted, begin: int, end: int) -> Part:
+def _part(joints: JointRegressor, fitted: Fitted, begin: int, end: int) -> Part:
     motion, mask, gravity = fitted.rows.motion, fitted.rows.mask[begin:end], fitted.rows.gravity
 
     def regressor(start: int, stop: int) -> Array:
@@ -249,10 +261,10 @@ def _part(joints: JointRegressor, fitted: _Fitted, begin: int, end: int) -> Part
     return Part(end - begin, regressor, mask, fitted.errors(slice(begin, end)), joints.used, split, sums)
 
 
-def _scores(regressor: JointRegressor, fitted: Sequence[_Fitted], weights: Array) -> Array:
+def _scores(regressor: JointRegressor, fitted: Sequence[Fitted], weights: Array) -> Array:
     """Sums Y' W e over each chunk (chunks, b)."""
 
-    def of(item: tuple[_Fitted, slice]) -> Array:
+    def of(item: tuple[Fitted, slice]) -> Array:
         some, at = item
         motion = some.rows.motion
         error = some.errors(at) * weights

@@ -15,6 +15,7 @@ from estimation.identifications.choices import VELOCITY_SCALES, Candidates, Choi
 from estimation.identifications.estimate import Estimate, JointFit, colour_of
 from estimation.identifications.fit import Fit, fit
 from estimation.identifications.transfer import band_of
+from estimation.identifications.verdicts import determined_parameters, require_predictable
 from estimation.logs.known_setup import gravities_of, require_plain
 from estimation.logs.provenance import describe_logs
 from estimation.models.model import Model
@@ -35,17 +36,8 @@ from robots.version import VERSION
 
 Array = NDArray[np.float64]
 
-# A parameter is determined when its standard error is below this share of it ...
-RELATIVE = 0.5
-# ... or when the torque that its standard error makes is below this share of every joint's torque: it is then known
-# to be too small to matter.
-NEGLIGIBLE = 0.02
-# A joint whose left-out torque is predicted hardly better than by a constant is not identified.
-HOPELESS = 0.95
 # Speeds are measured over so much time [s].
 SPAN = 0.02
-# A torque that varies by less than this share of its size, or of 1 N m, is constant but for rounding.
-ROUNDING = 1e-9
 
 
 @one_blas_thread()
@@ -112,7 +104,7 @@ def identify(
     prepared = prepare_all(robot, usable)
     by_position = friction == "auto" if position is None else position
     if friction == "auto":
-        friction = BendingFriction.within(_usual_speeds(prepared))
+        friction = BendingFriction.within(usual_speeds(prepared))
 
     def model(scales: float | tuple[float, ...], with_position: bool) -> TorqueModel:
         plain = default_model(robot, friction=friction, velocity_scale=scales, rotor=rotor, offset=offset)
@@ -133,11 +125,11 @@ def identify(
         base = replace(base, model=model(choice.velocity_scales, choice.position))
     found = fit(base, prepared, chosen, choice, seed)
     joints = _joint_fits(found, predictable)
-    determined = _determined(found, joints)
+    determined = determined_parameters(found, joints)
     bar.finish()
     colour = colour_of(np.sqrt(np.maximum(np.diag(found.covariance), 0.0)), found.white, determined)
     base, rows = found.base, found.rows
-    provenance = {**_provenance(data, chosen, found.choice, joints, seed), "colour": colour}
+    provenance = {**describe_fit(data, chosen, found.choice, joints, seed), "colour": colour}
     provenance["recorded"] = _recorded(found)
     provenance |= {} if found.prior_share is None else {"prior_share": found.prior_share.tolist()}
     provenance["gravities"] = [list(gravity) for gravity in base.gravities]
@@ -167,7 +159,7 @@ def identify(
     )
 
 
-def _usual_speeds(logs: Sequence[Prepared]) -> Array:
+def usual_speeds(logs: Sequence[Prepared]) -> Array:
     """Speed of each joint (n,) that it exceeds in a thousandth of the time only."""
     found = []
     for log in logs:
@@ -202,19 +194,7 @@ def _predictable(prepared: Sequence[Prepared], choice: Choice) -> NDArray[np.boo
     moves = np.any([np.ptp(log.log.q, axis=0) > 0 for log in prepared], axis=0)
     highest = np.max([log.tau.max(axis=0) for log in prepared], axis=0)
     lowest = np.min([log.tau.min(axis=0) for log in prepared], axis=0)
-    varies = highest - lowest > ROUNDING * np.maximum(1.0, np.maximum(highest, -lowest))
-    follows = choice.held_out < HOPELESS * choice.spread
-    if (moves & varies & follows).any():
-        return np.asarray(moves & varies & follows)
-    if not varies.any():
-        raise NotIdentifiableError(
-            "no joint's torque varies", remedy="record the torque of the moving arm, and check the meaning of tau1.."
-        )
-    raise NotIdentifiableError(
-        "no joint's torque can be predicted from its motion",
-        allowed="held-out torque errors below the torque's standard deviation",
-        remedy="check units and signs of q and tau, and that the arm moves",
-    )
+    return require_predictable(moves, lowest, highest, choice)
 
 
 def _joint_fits(found: Fit, predictable: NDArray[np.bool_]) -> tuple[JointFit, ...]:
@@ -264,21 +244,10 @@ def _noise_floor(found: Fit) -> Array:
     return fast_noise(residuals)
 
 
-def _determined(found: Fit, joints: Sequence[JointFit]) -> NDArray[np.bool_]:
-    values, moments, columns = found.solution.values, found.moments, found.base.columns
-    errors = np.sqrt(np.maximum(np.diag(found.covariance), 0.0))
-    excited = np.einsum("jpp->jp", moments.gram) / np.maximum(moments.count, 1)[:, None]  # mean square of each column
-    torque = np.array([joint.torque_rms for joint in joints])
-    share = (errors * np.sqrt(excited) / np.maximum(torque, np.finfo(float).tiny)[:, None]).max(axis=0)
-    known = (errors <= RELATIVE * np.abs(values)) | (share <= NEGLIGIBLE)
-    own = np.array([column.term != "rigid_body" for column in columns])
-    lost = np.array([not joints[column.joint - 1].identified for column in columns])
-    return known & (excited.sum(axis=0) > 0) & ~(own & lost)
-
-
-def _provenance(
+def describe_fit(
     logs: Sequence[Log], method: Estimator, choice: Choice, joints: Sequence[JointFit], seed: int
 ) -> dict[str, object]:
+    """Lists logs, method, choices and errors of a fit, for `model.json`."""
     return {
         "logs": describe_logs(logs),
         "method": method.name,

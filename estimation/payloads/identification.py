@@ -139,7 +139,7 @@ def _arm_of_logs(estimate: Estimate) -> Arm:
         values=model.values,
         precision=choice.prior.precision,
         target=choice.prior.target - model.values,
-        weight=choice.ridge * len(estimate.t) * float(np.sum(shares)),
+        weight=choice.ridge * estimate.samples * float(np.sum(shares)),
     )
 
 

@@ -148,18 +148,25 @@ class Prepared:
         """
         total = sum(len(motion) for motion, _ in parts)
         speed = np.sqrt(sum(np.einsum("tj,tj->j", motion.dq, motion.dq) for motion, _ in parts) / total)
+        return [self.counted(motion, tau, speed) for motion, tau in parts]
+
+    def counted(self, motion: Motion, tau: Array, speed: Array) -> Rows:
+        """Gives smoothed rows (N, n) with those that count, and without the torque of a known payload.
+
+        Args:
+            motion: smoothed.
+            tau: torque (N, n).
+            speed: each joint's RMS speed (n,) in the whole log.
+        """
         none = np.zeros(len(speed), dtype=bool)
         still, held = (none if joints is None else joints for joints in (self.still, self.held))
         moves = (speed >= STANDING) & ~still
-        rows = []
-        for motion, tau in parts:
-            if not moves.all():
-                motion = Motion(motion.t, motion.q, motion.dq * moves, motion.ddq * moves)
-            fast = np.abs(motion.dq) >= SLOW * speed
-            if self.load is not None:
-                tau = tau - self.load.torque(motion)
-            rows.append(Rows(motion, tau, ((fast | ~moves) & ~held).astype(float), self.log.gravity, self.held))
-        return rows
+        if not moves.all():
+            motion = Motion(motion.t, motion.q, motion.dq * moves, motion.ddq * moves)
+        fast = np.abs(motion.dq) >= SLOW * speed
+        if self.load is not None:
+            tau = tau - self.load.torque(motion)
+        return Rows(motion, tau, ((fast | ~moves) & ~held).astype(float), self.log.gravity, self.held)
 
 
 def prepare(robot: Robot, log: Log) -> Prepared:

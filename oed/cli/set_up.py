@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, TypeVar
 
 import typer
 
@@ -12,8 +12,11 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
+    from estimation.logs.parquet_streams import LogStream
     from robots.robot import Robot
     from robots.signals import Log
+
+Recorded = TypeVar("Recorded", "Log", "LogStream")
 
 PayloadOption = Annotated[
     list[str] | None,
@@ -80,7 +83,9 @@ def with_torque_meaning(robot: Robot, logs: Sequence[Log], torque_is: str | None
     return [log if log.tau is None and log.current is None else as_joint_torque(robot, log, torque_is) for log in logs]
 
 
-def with_known_setup(logs: Sequence[Log], payloads: list[str] | None, gravities: list[str] | None) -> list[Log]:
+def with_known_setup(
+    logs: Sequence[Recorded], payloads: list[str] | None, gravities: list[str] | None
+) -> list[Recorded]:
     """Adds known payloads and gravity vectors to logs.
 
     Args:

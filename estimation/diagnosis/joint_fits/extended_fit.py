@@ -23,7 +23,7 @@ from estimation.diagnosis.joint_fits.shape_errors import (
     with_value,
 )
 from estimation.diagnosis.joint_fits.shrinkage import effects_prior
-from estimation.identifications.identification import NEGLIGIBLE, RELATIVE
+from estimation.identifications.verdicts import NEGLIGIBLE, RELATIVE
 from estimation.models.extension import Extension
 from estimation.models.model import Model
 from estimation.regressions.parameter_priors import GaussianPrior

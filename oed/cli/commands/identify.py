@@ -30,6 +30,8 @@ from oed.cli.set_up import GravityOption, PayloadOption, TorqueIsOption, with_kn
 
 if TYPE_CHECKING:
     from estimation import Estimate
+    from estimation.logs.parquet_streams import LogStream
+    from robots.robot import Robot
 
 
 def identify(
@@ -57,6 +59,15 @@ def identify(
     ] = None,
     rotor: Annotated[bool, typer.Option(help="Include rotor inertias in the model.")] = True,
     offset: Annotated[bool, typer.Option(help="Include a constant torque offset per joint in the model.")] = True,
+    stream: Annotated[
+        bool | None,
+        typer.Option(
+            "--stream/--no-stream",
+            help="Read a Parquet file, or a folder of parts, in pieces with bounded memory. By default above 5 million "
+            "rows.",
+            show_default=False,
+        ),
+    ] = None,
     seed: SeedOption = 0,
     out: OutOption = Path("identified"),
     urdf: Annotated[
@@ -85,6 +96,8 @@ def identify(
         from estimation import read_logs
         from estimation.exports import build_mjcf, urdf_text
         from estimation.exports import c_code as c_text
+        from estimation.identifications.streams import METHODS, identify_stream
+        from estimation.logs.parquet_streams import is_large
         from estimation.predictions.method_table import compare_methods
         from oed.reports import save_estimate_report
         from robots.common.files import ResultFolder, open_atomic
@@ -96,10 +109,6 @@ def identify(
                 path: files.enter_context(open_atomic(path, force=force)) for path in (urdf, mjcf, c_code) if path
             }
             described = robot_from(robot, tip, joints, lock)
-            read = read_logs(
-                log, n=described.n, mapping=mapping, joints=described.joint_names, kinds=described.chain.kinds
-            )
-            logs = with_torque_meaning(described, with_known_setup(read, payload, gravity), torque_is)
             options: dict[str, Any] = {
                 "friction": friction,
                 "position": position,
@@ -108,9 +117,21 @@ def identify(
                 "seed": seed,
                 "progress": progress,
             }
-            table = compare_methods(described, logs, **options) if method == "all" else None
-            chosen = method if table is None else table.rows[0].method
-            result = run(described, logs, method=chosen, **options)
+            table = None
+            if stream or (stream is None and mapping is None and method in METHODS and is_large(log)):
+                result = identify_stream(
+                    described,
+                    _opened(described, log, mapping, payload, gravity, torque_is),
+                    method=method,
+                    **options,
+                )
+            else:
+                read = read_logs(
+                    log, n=described.n, mapping=mapping, joints=described.joint_names, kinds=described.chain.kinds
+                )
+                logs = with_torque_meaning(described, with_known_setup(read, payload, gravity), torque_is)
+                table = compare_methods(described, logs, **options) if method == "all" else None
+                result = run(described, logs, method=method if table is None else table.rows[0].method, **options)
             result.save(folder.path("model.json").parent)
             save_estimate_report(result, folder, png=png, methods=table)
             if urdf is not None:
@@ -141,6 +162,34 @@ def identify(
             "mjcf": None if written is None else {"stated": list(written.stated), "remarks": list(written.remarks)},
         },
     )
+
+
+def _opened(
+    robot: Robot,
+    logs: list[Path],
+    mapping: Path | None,
+    payload: list[str] | None,
+    gravity: list[str] | None,
+    torque_is: str | None,
+) -> LogStream:
+    """Opens the only log, to be read in pieces, with what is known of its setup."""
+    from estimation.logs.parquet_streams import open_stream
+    from estimation.logs.torque_source import parse_meaning
+    from robots.common.errors import InputError
+
+    if len(logs) != 1:
+        raise InputError(
+            f"--stream with {len(logs)} logs", allowed="one Parquet file or folder", remedy="put the parts in a folder"
+        )
+    if mapping is not None:
+        raise InputError(
+            "--stream with --mapping", allowed="columns t, q1.. and tau1.. or i1..", remedy="rename the columns"
+        )
+    if torque_is is not None:
+        parse_meaning(torque_is, robot.n)
+    opened = open_stream(logs[0], robot.n, kinds=robot.chain.kinds, torque_is=torque_is)
+    (known,) = with_known_setup([opened], payload, gravity)
+    return known
 
 
 def _undetermined(result: Estimate) -> list[str]:

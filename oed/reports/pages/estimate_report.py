@@ -103,7 +103,7 @@ def estimate_page(estimate: Estimate, methods: MethodTable | None = None) -> Pag
         facts=(
             Fact(label="Parameters determined", value=f"{known} of {len(model.names)}"),
             Fact(label="Worst joint, held-out data", value=f"{100 * max(joint.nrmse for joint in joints):.1f} %"),
-            Fact(label="Samples", value=len(estimate.t)),
+            Fact(label="Samples", value=estimate.samples),
             Fact(
                 label="Residual correlation factor",
                 value=f"{estimate.colour:.1f}",

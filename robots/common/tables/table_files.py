@@ -168,7 +168,7 @@ def read_parquet(path: Path, wanted: Callable[[str], bool]) -> Table:
         raise _no_parquet(path, error) from error
     if content.num_rows == 0:
         raise InputError("no rows", file=path, remedy="record the data again")
-    stored, units = _stored(schema.metadata or {})
+    stored, units = stored_in(schema.metadata or {})
     return Table(
         columns=arrays,
         metadata=stored,
@@ -187,7 +187,7 @@ def _no_parquet(path: Path, error: Exception) -> InputError:
     )
 
 
-def _stored(metadata: Mapping[bytes, bytes]) -> tuple[dict[str, Any], dict[str, str]]:
+def stored_in(metadata: Mapping[bytes, bytes]) -> tuple[dict[str, Any], dict[str, str]]:
     """Returns metadata and units of a Parquet schema; of a file written by others, its plain key-value pairs."""
     if _KEY in metadata:
         try:
