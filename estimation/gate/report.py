@@ -33,6 +33,8 @@ OF_TORQUE = frozenset(
         "unit_of_torque",
     }
 )
+# Findings on a log without a fault that rests, or is too short, so that others are fitted without it.
+NO_MOTION = frozenset({"no_motion", "short", "static_poses"})
 # Findings on a log without a fault whose motion does not determine the parameters.
 NO_INFORMATION = frozenset({"badly_excited"})
 
@@ -91,6 +93,11 @@ class GateReport:
         """Whether the log may be fitted."""
         return not self.refused
 
+    @property
+    def without_motion(self) -> bool:
+        """Whether the log is refused only because it rests, or is too short."""
+        return self.refused and all(finding.name in NO_MOTION for finding in self.of("refuse"))
+
     def of(self, severity: Severity) -> tuple[Finding, ...]:
         """Gives the findings of one severity."""
         return tuple(finding for finding in self.findings if finding.severity == severity)
@@ -124,13 +131,15 @@ class GateReport:
             log: the log that was checked.
 
         Returns:
-            Its parts of 20 samples or more; the log itself if it has no fault.
+            Its parts of 20 samples or more; the log itself if it has no fault; nothing if the log is left out.
 
         Raises:
             InputError: another log, or nothing is left.
         """
         if len(log) != self.samples:
             raise InputError(f"{len(log)} rows", allowed=f"{self.samples} rows, as in the checked log")
+        if not self.parts:
+            return ()
         log = self.corrected(log)
         if self.parts == ((0, len(log)),) and not len(self.spikes) and not len(self.stale):
             return (log,)
@@ -148,6 +157,16 @@ class GateReport:
         if same_times and same_angles:
             return log
         return replace(log, t=log.t if same_times else self.t, q=log.q if same_angles else self.q)
+
+    def left_out(self) -> GateReport:
+        """Gives the report for a log that is left out of a fit to several logs: nothing is refused or usable."""
+        findings = [
+            replace(finding, severity="warning", text=f"{finding.text}: this log is left out")
+            if finding.severity == "refuse"
+            else finding
+            for finding in self.findings
+        ]
+        return replace(self, findings=worst_first(findings), parts=())
 
     def for_motion(self) -> GateReport:
         """Gives the report for a log of which only the motion is used: findings on torques are warnings at most."""

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from estimation.estimators import Estimator
 from estimation.estimators import estimator as choose_estimator
-from estimation.gate import GateReport, check_log
+from estimation.gate import check_logs
 from estimation.identifications.choices import VELOCITY_SCALES, Candidates, Choice, choose
 from estimation.identifications.estimate import Estimate, JointFit, colour_of
 from estimation.identifications.fit import Fit, fit
@@ -74,7 +74,8 @@ def identify(
         rotor: with rotor inertias.
         offset: with a torque offset per joint.
         candidates: settings that the data choose from.
-        check: whether each log passes the gate first, which refuses what would be fitted wrongly and cuts at gaps.
+        check: whether each log passes the gate first, which refuses what would be fitted wrongly, cuts at gaps, and
+            leaves out logs that rest beside others that move.
         seed: of the noise drawn to correct the standard errors.
         progress: receives the progress.
 
@@ -95,12 +96,10 @@ def identify(
     bar = progress or SILENT
     bar.start("identifying", 3.0)
     _require_motion(data)
-    gates: list[GateReport] = []
-    for log in data if check else ():
-        bar.update(0.0, "checking the logs")
-        gates.append(check_log(robot, log))
-        gates[-1].raise_if_refused()
-    usable = [part for log, gate in zip(data, gates, strict=True) for part in gate.usable(log)] if gates else data
+    gates = check_logs(robot, data, lambda: bar.update(0.0, "checking the logs")) if check else ()
+    parts = [gate.usable(log) for log, gate in zip(data, gates, strict=True)] if gates else [(log,) for log in data]
+    data = [log for log, own in zip(data, parts, strict=True) if own]
+    usable = [part for own in parts for part in own]
     prepared = prepare_all(robot, usable)
     by_position = friction == "auto" if position is None else position
     if friction == "auto":
@@ -155,7 +154,7 @@ def identify(
         measured=np.concatenate([part.tau for part in rows]),
         predicted=found.torque,
         dropped_rows=sum(log.positions.dropped for log in prepared),
-        gates=tuple(gates),
+        gates=gates,
     )
 
 

@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from estimation.gate import check_log
+from estimation.gate import check_logs
 from estimation.identifications.estimate import Estimate
 from estimation.identifications.identification import identify
 from estimation.logs.known_setup import require_known
@@ -111,12 +111,8 @@ def identify_payload(
 
 
 def _usable(robot: Robot, logs: Sequence[Log]) -> list[Log]:
-    parts: list[Log] = []
-    for log in logs:
-        report = check_log(robot, log)
-        report.raise_if_refused()
-        parts += report.usable(log)
-    return parts
+    reports = check_logs(robot, logs) if logs else ()
+    return [part for log, report in zip(logs, reports, strict=True) for part in report.usable(log)]
 
 
 def _prepared(robot: Robot, loaded: Sequence[Log], free: Sequence[Log], model: Model) -> list[Prepared]:

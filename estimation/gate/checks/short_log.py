@@ -7,6 +7,7 @@ from typing import ClassVar
 from estimation.gate.check import Check
 from estimation.gate.context import Context, Stage
 from estimation.gate.finding import Finding
+from estimation.gate.measurements.motion import HARDLY, travel_shares
 from estimation.gate.measurements.timing import FEWEST
 
 # Parameters of a joint: ten of its link, and rotor inertia, Coulomb and viscous friction, and offset.
@@ -52,6 +53,17 @@ class TooFewSmoothedRows(Check):
         can_be_fitted = context.smoothed.rows is not None
         if can_be_fitted or not (cleaned.columns.varies.any() and cleaned.columns.travel.any()):
             return []
+        if (travel_shares(context.robot, cleaned.columns) < HARDLY).all():
+            return [
+                Finding(
+                    name="no_motion",
+                    severity="refuse",
+                    text=f"no joint moves by {100 * HARDLY:g} % of its range: nothing to fit a model to",
+                    action="record a log in which the arm moves",
+                    value=float(cleaned.columns.travel.max()),
+                    unit="rad or m",
+                )
+            ]
         longest = max(stop - first for first, stop in cleaned.timing.parts)
         return [
             Finding(

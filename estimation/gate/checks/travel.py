@@ -9,10 +9,7 @@ import numpy as np
 from estimation.gate.check import Check
 from estimation.gate.context import Context, Stage
 from estimation.gate.finding import Finding
-from estimation.gate.measurements.motion import travel_shares
-
-# Share of a joint's range, or of a turn, below which it hardly moves.
-HARDLY = 0.01
+from estimation.gate.measurements.motion import HARDLY, travel_shares
 
 
 class Travel(Check):

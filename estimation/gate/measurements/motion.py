@@ -14,6 +14,8 @@ Array = NDArray[np.float64]
 
 # A row is in motion if a joint changes within this time before and after it [s], by this share of its travel.
 AROUND, CHANGE = 0.05, 1e-3
+# Share of a joint's range, or of a turn, below which it hardly moves.
+HARDLY = 0.01
 
 
 def moving_rows(log: Log, columns: Columns, steps: float = 0.0) -> NDArray[np.bool_]:
