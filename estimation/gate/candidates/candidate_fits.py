@@ -35,6 +35,7 @@ class Meaning:
         q_factor: of the positions (n,), after the columns are put in order.
         tau_factor: of the torques (n,).
         gravity: (3,) [m/s2].
+        compensated: whether the controller has subtracted the gravity of the robot's description.
     """
 
     q_from: NDArray[np.intp] | None = None
@@ -42,6 +43,7 @@ class Meaning:
     q_factor: Array | None = None
     tau_factor: Array | None = None
     gravity: Array | None = None
+    compensated: bool = False
 
 
 class CandidateFits:
@@ -67,14 +69,20 @@ class CandidateFits:
         unexplained = fit_all(moments, spread, (RIDGE,) if few else RIDGES).unexplained[joints]
         return float(np.mean(np.log(np.clip(unexplained, 1e-9, 1.0))))
 
+    @property
+    def described(self) -> bool:
+        """Whether the robot's description has links with mass."""
+        inertia = np.asarray(self.robot.inertia, dtype=float)
+        return bool(np.isfinite(inertia).all() and inertia.any())
+
     def described_gravity(self) -> Array | None:
         """Estimates gravity (3,) [m/s2] from the described links, with free friction, offset and rotor inertia.
 
         None without described links.
         """
-        described = np.asarray(self.robot.inertia, dtype=float).ravel()
-        if not np.isfinite(described).all() or not described.any():
+        if not self.described:
             return None
+        described = np.asarray(self.robot.inertia, dtype=float).ravel()
         rows = self._meant(Meaning(), FEW_ROWS)
         heavy = gravity_rows(self.robot, rows.q) @ described
         normal, right = np.zeros((3, 3)), np.zeros(3)
@@ -111,17 +119,23 @@ class CandidateFits:
 
     def _meant(self, meaning: Meaning, most: int) -> Rows:
         rows = self._moved(meaning, most)
-        if meaning.tau_from is None and meaning.tau_factor is None:
+        if meaning.tau_from is None and meaning.tau_factor is None and not meaning.compensated:
             return rows
         excerpts = []
         for part in rows.excerpts:
             assert part.raw is not None
             raw = part.raw if meaning.tau_from is None else part.raw[:, meaning.tau_from]
-            excerpts.append(replace(part, raw=raw if meaning.tau_factor is None else raw * meaning.tau_factor))
+            raw = raw if meaning.tau_factor is None else raw * meaning.tau_factor
+            excerpts.append(replace(part, raw=raw + self._weight(part.q) if meaning.compensated else raw))
         # The regressor does not depend on the torques, nor do its products.
         changed = replace(rows, excerpts=tuple(excerpts))
         changed.__dict__["_grams"] = rows._grams
         return changed
+
+    def _weight(self, q: Array) -> Array:
+        """Torque (M, n) of the described gravity at positions (M, n)."""
+        described = np.asarray(self.robot.inertia, dtype=float).ravel()
+        return (gravity_rows(self.robot, q) @ described @ np.asarray(self.robot.chain.gravity)).T
 
     def _moved(self, meaning: Meaning, most: int) -> Rows:
         """Gives the rows with other positions or another gravity; the last ones are kept."""

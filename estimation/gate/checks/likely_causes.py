@@ -87,7 +87,7 @@ class LikelyCauses(Check):
 
 
 def _gravities(fits: CandidateFits) -> list[_Cause]:
-    """Lists other directions of gravity, and none."""
+    """Lists other directions of gravity, none, and the described one that a controller has subtracted."""
     described = np.asarray(fits.robot.chain.gravity, dtype=float)
     size = float(np.linalg.norm(described))
     if not size > 0:
@@ -100,6 +100,7 @@ def _gravities(fits: CandidateFits) -> list[_Cause]:
     return [
         *(_Cause("gravity", Meaning(gravity=direction)) for direction in others),
         _Cause("weightless", Meaning(gravity=np.zeros(3))),
+        *([_Cause("weightless", Meaning(compensated=True))] if fits.described else []),
     ]
 
 
@@ -187,9 +188,9 @@ def _best(fits: CandidateFits, causes: list[_Cause], before: float) -> tuple[_Ca
     weightless = [cause for cause in causes if cause.kind == "weightless"]
     # Gravity along the axes of a planar arm acts on no joint.
     if found is not None and found[0].kind == "gravity" and weightless:
-        after = fits.cost(weightless[0].meaning)
-        if after < found[1] + SNAP:
-            found = weightless[0], after
+        costs = [fits.cost(cause.meaning) for cause in weightless]
+        if min(costs) < found[1] + SNAP:
+            found = weightless[int(np.argmin(costs))], min(costs)
     return found
 
 
