@@ -44,7 +44,7 @@ MASSES = (0.5, 1.0, 3.0)
 DURATION = 60.0
 # Stribeck torque over Coulomb torque.
 STRIBECK = (0.02, 0.15)
-# What the issue asks for: within these, or the interval holds the truth.
+# What counts as good: within these, or the interval holds the truth.
 MASS_SHARE, CENTRE = 0.03, 0.005
 
 
@@ -155,7 +155,7 @@ def main(words: Sequence[str]) -> None:
 
 
 def table(outcomes: Iterable[Outcome]) -> str:
-    """Lists median errors, the share within the issue's bounds or intervals, and the coverage."""
+    """Lists median errors, the share within these bounds or intervals, and the coverage."""
     everything = list(outcomes)
     head = "| robot | way | mass | error of mass, median (worst) | error of centre, median (worst) "
     head += "| half-width: mass, centre | good | coverage: mass and centre | inertia |"

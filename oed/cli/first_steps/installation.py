@@ -18,7 +18,6 @@ EXTRAS = {
     "cluster": "work on a Dask cluster (`--cluster`)",
     "monitor": "change points of monitored logs",
     "xacro": "robot descriptions in xacro",
-    "collision": "collision checks on meshes",
 }
 """What the extras bring to users; those that are not listed are for developers."""
 
