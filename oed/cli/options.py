@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
@@ -9,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from robots.common.errors import InputError
+from robots.common.errors import InputError, OtherRobotWarning
 
 if TYPE_CHECKING:
     from concurrent.futures import Executor
@@ -140,6 +141,8 @@ def robot_of_file(
 ) -> Robot:
     """Loads the robot that an option names, else the one that a trajectory file names.
 
+    A note says when both name one, and not the same.
+
     Args:
         robot: of the option.
         metadata: of the file.
@@ -151,10 +154,14 @@ def robot_of_file(
     Raises:
         InputError: neither names one; or see `robot_from`.
     """
-    named = robot or str(metadata.get("robot") or "")
-    if not named:
+    stated = str(metadata.get("robot") or "")
+    if not robot and not stated:
         raise InputError("the file does not name its robot", file=file, remedy="give --robot")
-    return robot_from(named, tip, joints, lock)
+    found = robot_from(robot or stated, tip, joints, lock)
+    if robot and stated and Path(stated).stem not in (found.name, Path(robot).stem):
+        text = f"{file.name} was made for {stated}; {found.name} is used (--robot)"
+        warnings.warn(OtherRobotWarning(text), stacklevel=2)
+    return found
 
 
 @contextmanager

@@ -77,5 +77,9 @@ class SolverError(OedError):
     """A numerical solver ended without a usable result."""
 
 
+class OtherRobotWarning(UserWarning):
+    """A file was made for another robot than the one that is used."""
+
+
 class AssumedValueWarning(UserWarning):
     """A robot description contains values without a source; results that depend on them are uncertain."""
