@@ -20,6 +20,7 @@ from robots.geometry.dh import DhRow, chain_from_dh, dh_frames
 from robots.geometry.inertia import SIZE, check_body, inertial_parameters, symmetric
 from robots.geometry.urdf import read_urdf
 from robots.limits import Limits
+from robots.mujoco_models import robot_from_mjcf
 from robots.per_joint import PerJoint
 from robots.robot import Robot
 
@@ -96,6 +97,10 @@ def robot_from_yaml(
     text = read_config(path, RobotDescription)
     content = path.read_bytes()
     chosen = tip is not None or joints is not None or bool(locked)
+    notes: tuple[str, ...] = ()
+    links: tuple[LinkPlace, ...] = ()
+    urdf, mjcf = "", ""
+    rotor: Array = np.zeros(())
     if text.geometry is not None:
         if chosen:
             problem = "the robot is a Denavit-Hartenberg table, so tip, joints and locked do not apply"
@@ -103,18 +108,23 @@ def robot_from_yaml(
         chain = _chain(text, text.geometry)
         entries = PerJoint(str(path), chain, chain.names)
         inertia, friction, limits = _inertia(text, text.geometry, str(path)), None, None
-        notes: tuple[str, ...] = ()
-        links: tuple[LinkPlace, ...] = ()
-        urdf = ""
         digest = _digest(content)
-    else:
-        tree = read_urdf(path.parent / (text.urdf or ""))
+    elif text.mjcf is not None:
         own: Choice = (text.tip, text.joints, text.locked)
         choice = _override(text, tip, joints, locked) if chosen else own
+        file, free = path.parent / text.mjcf, unlimited or text.limits.position is not None
+        found = robot_from_mjcf(file, *choice, free, alone=False)
+        chain, limits, inertia = _at_gravity(found.chain, text), found.limits, found.inertia
+        friction, rotor = found.friction, found.rotor_inertia
+        names = robot_from_mjcf(file, *own, free, alone=False).joint_names if chosen else found.joint_names
+        entries = PerJoint(str(path), chain, names)
+        notes, links, mjcf, digest = found.notes, found.links, found.mjcf, _digest(content, found.digest)
+    else:
+        tree = read_urdf(path.parent / (text.urdf or ""))
+        own = (text.tip, text.joints, text.locked)
+        choice = _override(text, tip, joints, locked) if chosen else own
         taken = tree.chain(*choice)
-        chain, limits, inertia, names = taken.chain, taken.limits, taken.inertia, taken.names
-        if text.gravity is not None:
-            chain = Chain(chain.joints, np.array(text.gravity), chain.tip)
+        chain, limits, inertia, names = _at_gravity(taken.chain, text), taken.limits, taken.inertia, taken.names
         entries = PerJoint(str(path), chain, tree.chain(*own).names if chosen else names)
         friction = tree.friction(names)
         digest = _digest(content, tree.digest, *([choice] if chosen else []))
@@ -122,7 +132,7 @@ def robot_from_yaml(
         taken = taken._replace(unlimited=tuple(name for name in taken.unlimited if name not in known))
         require_stops(taken.unlimited, unlimited, tree.file)
         notes, links, urdf = urdf_notes(taken, tree.unused), taken.links, tree.file
-    ratio, rotor, constant, speed = _drives(text, entries)
+    ratio, rotor, constant, speed = _drives(text, entries, rotor)
     return Robot(
         name=text.name,
         title=text.title,
@@ -139,6 +149,7 @@ def robot_from_yaml(
         notes=notes,
         origin=origin,
         urdf=urdf,
+        mjcf=mjcf,
         links=links,
         digest=digest,
         payload=None if text.payload is None else text.payload.value,
@@ -169,6 +180,10 @@ def _override(
     # Locking a joint that the file lists as moving takes it off that list.
     kept = None if text.joints is None else [name for name in text.joints if name not in (locked or {})]
     return text.tip, kept, both
+
+
+def _at_gravity(chain: Chain, text: RobotDescription) -> Chain:
+    return chain if text.gravity is None else Chain(chain.joints, np.array(text.gravity), chain.tip)
 
 
 def _pose(pose: Pose | None) -> Array | None:
@@ -249,8 +264,11 @@ def _values(stated: Values | None, entries: PerJoint, key: str, default: ArrayLi
     return entries.place(stated.values, f"{key}.values", default)
 
 
-def _drives(text: RobotDescription, entries: PerJoint) -> tuple[Array, Array, Array, Array]:
-    """Gear ratio, then rotor inertia and torque constant as felt at the joint, then the motor's highest speed."""
+def _drives(text: RobotDescription, entries: PerJoint, known: Array) -> tuple[Array, Array, Array, Array]:
+    """Gear ratio, then rotor inertia and torque constant as felt at the joint, then the motor's highest speed.
+
+    Rotor inertias that the file does not state are the known ones at the joint.
+    """
     drives = text.dynamics.drives
     at_motor = [name for name in ("rotor_inertia", "torque_constant", "motor_speed") if getattr(drives, name)]
     if drives.gear_ratio is None and at_motor:
@@ -258,13 +276,13 @@ def _drives(text: RobotDescription, entries: PerJoint) -> tuple[Array, Array, Ar
         raise InputError(problem, file=entries.file, column="dynamics.drives", remedy="state gear_ratio")
     key = "dynamics.drives"
     ratio = _values(drives.gear_ratio, entries, f"{key}.gear_ratio", 1.0)
-    rotor = _values(drives.rotor_inertia, entries, f"{key}.rotor_inertia", 0.0)
+    rotor = _values(drives.rotor_inertia, entries, f"{key}.rotor_inertia", np.nan)
     constant = _values(drives.torque_constant, entries, f"{key}.torque_constant", np.nan)
     speed = np.full(entries.chain.n, np.inf)
     if drives.motor_speed is not None:
         unit = MOTOR_UNITS[drives.motor_speed.unit]
         speed = entries.place(drives.motor_speed.values, f"{key}.motor_speed.values", np.inf, unit)
-    return ratio, ratio**2 * rotor, ratio * constant, speed
+    return ratio, np.where(np.isnan(rotor), known, ratio**2 * rotor), ratio * constant, speed
 
 
 def _friction(text: RobotDescription, entries: PerJoint, known: Array | None) -> Array:

@@ -214,7 +214,7 @@ class CollisionDescription(Config):
 
 
 class RobotDescription(Config):
-    """A robot's YAML file: a Denavit-Hartenberg table or a URDF, then limits and nominal dynamics."""
+    """A robot's YAML file: a Denavit-Hartenberg table, a URDF or an MJCF, then limits and nominal dynamics."""
 
     name: str
     title: str = ""
@@ -222,6 +222,7 @@ class RobotDescription(Config):
     licence: str | None = None
     geometry: Geometry | None = None
     urdf: str | None = None
+    mjcf: str | None = None
     tip: str | None = None
     joints: list[str] | None = None
     locked: dict[str, Finite] | None = None
@@ -238,12 +239,12 @@ class RobotDescription(Config):
 
     @model_validator(mode="after")
     def _one_geometry(self) -> RobotDescription:
-        if (self.geometry is None) == (self.urdf is None):
-            raise ValueError("a robot has either 'geometry' or 'urdf'")
+        if sum(source is not None for source in (self.geometry, self.urdf, self.mjcf)) != 1:
+            raise ValueError("a robot has one of 'geometry', 'urdf' and 'mjcf'")
         if self.geometry is not None and (self.tip or self.joints or self.locked):
-            raise ValueError("'tip', 'joints' and 'locked' select joints of a URDF; they do not apply to 'geometry'")
-        if self.urdf is not None and (self.base or self.flange or self.dynamics.links):
-            raise ValueError("'base', 'flange' and 'dynamics.links' belong to 'geometry'; a URDF contains them")
+            raise ValueError("'tip', 'joints' and 'locked' select joints of a file; they do not apply to 'geometry'")
+        if self.geometry is None and (self.base or self.flange or self.dynamics.links):
+            raise ValueError("'base', 'flange' and 'dynamics.links' belong to 'geometry'; a URDF or MJCF contains them")
         return self
 
     def assumed(self) -> Iterator[str]:

@@ -39,6 +39,7 @@ class Robot:
         origin: the catalogue name, or the file it was read from.
         digest: SHA-256 of what defines the robot; empty for a robot made in memory.
         urdf: the URDF or xacro file it was read from, with the file's path and arguments; empty without one.
+        mjcf: the MJCF file it was read from; empty without one.
         links: the links of that file and the bodies that carry them.
         title: full name, for reports.
         payload: rated payload [kg].
@@ -63,6 +64,7 @@ class Robot:
     notes: tuple[str, ...] = ()
     origin: str = ""
     urdf: str = ""
+    mjcf: str = ""
     links: tuple[LinkPlace, ...] = ()
     digest: str = ""
     title: str = ""

@@ -41,7 +41,7 @@ def finite_limits(limits: Limits) -> Limits:
         raise InputError(
             "has no velocity limit",
             joint=int(np.argmin(np.isfinite(limits.velocity))) + 1,
-            remedy="state one in the robot file",
+            remedy="state one under limits in a robot YAML, which may name a URDF or MJCF",
         )
     acceleration = np.where(
         np.isfinite(limits.acceleration), limits.acceleration, ACCELERATION_PER_VELOCITY * limits.velocity

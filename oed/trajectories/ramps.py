@@ -140,7 +140,11 @@ def joint_bounds(limits: Limits, joint: int, *, reserve: float = HAIR) -> JointB
     rates = {name: float(getattr(limits, name)[joint - 1]) for name in ("velocity", "acceleration", "jerk")}
     for name, value in rates.items():
         if not np.isfinite(value):
-            raise InputError(f"has no {name} limit", joint=joint, remedy="state one in the robot file")
+            raise InputError(
+                f"has no {name} limit",
+                joint=joint,
+                remedy="state one under limits in a robot YAML, which may name a URDF or MJCF",
+            )
         if value <= 0.0:
             raise InfeasibleError(
                 f"its {name} limit is {value:g}: it cannot move", joint=joint, allowed=f"a {name} limit above zero"

@@ -29,6 +29,8 @@ def robot_from_mjcf(
     joints: Sequence[str] | None = None,
     locked: Mapping[str, float] | None = None,
     unlimited: bool = False,
+    *,
+    alone: bool = True,
 ) -> Robot:
     """Makes a robot of an MJCF file.
 
@@ -41,6 +43,7 @@ def robot_from_mjcf(
         joints: the moving joints, in the chain's order.
         locked: positions of locked joints [rad or m]; ``ref`` where not stated.
         unlimited: whether slide joints may lack a range.
+        alone: whether no other file states what this one does not.
 
     Returns:
         The robot; what the file does not state is unlimited or unknown, and its `notes` name it.
@@ -76,8 +79,9 @@ def robot_from_mjcf(
         inertia=taken.inertia,
         rotor_inertia=armature,
         friction=friction,
-        notes=tuple(_notes(taken, unused, friction)),
+        notes=tuple(_notes(taken, unused, friction, alone)),
         origin=str(path),
+        mjcf=str(path),
         links=taken.links,
         digest=_digest(xml.digest, tip, joints, locked) if chosen else xml.digest,
     )
@@ -100,10 +104,12 @@ def _drives(model: Any, numbers: Sequence[int], file: str, names: Sequence[str])
     return friction, armature
 
 
-def _notes(taken: UrdfChain, unused: Sequence[str], friction: Array) -> list[str]:
+def _notes(taken: UrdfChain, unused: Sequence[str], friction: Array, alone: bool) -> list[str]:
     notes = list(taken.notes)
     if unused:
         notes.append(f"not used from the MJCF: {'; '.join(unused)}")
+    if not alone:
+        return notes
     parts = ["no velocity, acceleration and jerk limits", "a controller period of 4 ms"]
     still = [name for name, row in zip(taken.names, friction, strict=True) if not row.any()]
     if still:

@@ -79,7 +79,7 @@ def test_a_file_of_another_kind_is_refused(tmp_path):
             "1 links",
         ),
         ("name: pair", "name: pair\ntip: hand", None, "do not apply to 'geometry'"),
-        ("name: pair", "name: pair\nurdf: a.urdf", None, "either 'geometry' or 'urdf'"),
+        ("name: pair", "name: pair\nurdf: a.urdf", None, "one of 'geometry', 'urdf' and 'mjcf'"),
         ("name: pair", "name: pair\nperiod: 0", "period", "greater than 0"),
         ("name: pair", "name: pair\nperiod: true", "period", "found True"),
         ("name: pair", "name: pair\nname: two", "name", "row 2: the key appears twice"),
@@ -104,7 +104,7 @@ def test_a_choice_of_joints_needs_a_urdf(write):
 
 def test_a_urdf_states_its_own_links(urdf, write):
     """A file that names a URDF may not state links beside it, and the URDF must exist."""
-    with pytest.raises(InputError, match="a URDF contains them"):
+    with pytest.raises(InputError, match="a URDF or MJCF contains them"):
         load_robot(write("name: x\nurdf: two.urdf\nbase: {xyz: [0, 0, 1]}\n"))
     with pytest.raises(InputError, match=r"three\.urdf: no such file"):
         load_robot(write("name: x\nurdf: three.urdf\n"))

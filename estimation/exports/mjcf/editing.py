@@ -77,7 +77,7 @@ def edited(contents: Contents, robot: Robot, folder: Path) -> Element:
 
 
 def _read(robot: Robot) -> _Source:
-    path = Path(robot.origin)
+    path = Path(robot.mjcf)
     xml = read_xml(path)
     model = compile_mjcf(path, warn=False)
     names = MujocoNames(mujoco_library(path), model)

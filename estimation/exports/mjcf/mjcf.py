@@ -115,7 +115,7 @@ def build_mjcf(
     if recorded is not None:
         model = replace(model, provenance={**model.provenance, "recorded": recorded})
     contents = contents_of(model, known)
-    source = Path(known.origin)
+    source = Path(known.mjcf)
     from_file = bool(known.links) and source.is_file() and is_mjcf(source)
     place = folder or (source.parent if from_file else Path())
     root = edited(contents, known, place) if from_file else new_model(contents, known)
