@@ -166,7 +166,7 @@ def test_two_processes_may_build_the_same(fresh, needs_compiler, monkeypatch, tm
     assert [path.suffix for path in fresh.iterdir()] == [".so"]
 
 
-def test_a_function_that_is_built_again_is_not_written_again(monkeypatch, tmp_path: Path) -> None:
+def test_a_function_that_is_built_again_is_not_written_again(needs_compiler, monkeypatch, tmp_path: Path) -> None:
     """An equal function takes the source of the first; one that differs by a constant has its own."""
     monkeypatch.setenv("ROBOT_OED_CACHE", str(tmp_path))
     written = []
