@@ -284,10 +284,8 @@ def warmed(model: Model, before: Sequence[Log], log: Log, later: float) -> tuple
     """
     if not model.keeps_heat:
         if before:
-            raise InputError(
-                "the model has no thermal part",
-                remedy="use a model of oed thermal, or remove the earlier logs (--before)",
-            )
+            remedy = "use a model of oed thermal, or remove the earlier logs (--before)"
+            raise InputError("the model has no thermal part", remedy=remedy)
         return [], ""
     if not before:
         return [], COLD
