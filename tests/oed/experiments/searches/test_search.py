@@ -19,6 +19,7 @@ from oed.experiments import Design, Effort
 from robots.common.errors import InputError
 from robots.loading import load_robot
 from tests.oed import flat
+from tests.oed.cli.conftest import ROBOT
 
 pytestmark = pytest.mark.slow
 
@@ -31,13 +32,13 @@ def file_of(design: Design, folder: Path) -> bytes:
     return (folder / "trajectory.csv").read_bytes()
 
 
-def test_same_seed_same_file(robot_named, tiny, brief, tmp_path: Path) -> None:
+def test_same_seed_same_file(make_robot, tiny, brief, tmp_path: Path) -> None:
     """The same seed gives the same file byte for byte, in this process and in two others; another seed does not."""
-    effort = replace(tiny, islands=2)
+    robot, effort = make_robot("RRR", "three"), replace(tiny, islands=2)
 
     def run(name: str, **options: object) -> bytes:
         chosen = {"friction": "coulomb-viscous", "effort": effort, "solver": brief, "periods": 1, **options}
-        return file_of(flat.design(robot_named("er3a"), **chosen), tmp_path / name)
+        return file_of(flat.design(robot, **chosen), tmp_path / name)
 
     here = run("here", workers=1)
     assert run("again", workers=1) == here
@@ -165,7 +166,18 @@ def test_interrupt_keeps_the_best(make_robot) -> None:
 
 def test_interrupt(tmp_path: Path) -> None:
     """Ctrl-C during the search ends the command with code 130, one line, and the files of the best design so far."""
-    command = [sys.executable, "-W", "ignore", "-c", "from oed.cli import main; main()", "design", "--robot", "er3a"]
+    robot = tmp_path / "two.yaml"
+    robot.write_text(ROBOT.replace("VELOCITY", "2"))
+    command = [
+        sys.executable,
+        "-W",
+        "ignore",
+        "-c",
+        "from oed.cli import main; main()",
+        "design",
+        "--robot",
+        str(robot),
+    ]
     (tmp_path / "scratch").mkdir()
     running = subprocess.Popen(
         [*command, "--effort", "thorough", "--workers", "1", "--quiet", "--out", str(tmp_path / "out")],
