@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+import os
 import pickle
 import re
 from dataclasses import replace
@@ -27,6 +28,9 @@ TILTED = (3.0, 2.0, -9.0)
 def uncompiled(monkeypatch):
     """Most robots here are used once: compiling would take most of the time."""
     monkeypatch.setenv("ROBOT_OED_BACKEND", "vectorised")
+
+
+MANY = settings(max_examples=60 if os.environ.get("LONGER") else 25)
 
 
 def rigid(robot):
@@ -91,7 +95,7 @@ def test_regrouping_keeps_the_torque(name, catalogue_robot, states):
 
 
 @pytest.mark.slow
-@settings(max_examples=60, deadline=None, derandomize=True, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(MANY, deadline=None, derandomize=True, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(seed=st.integers(0, 10_000), n=st.integers(1, 6))
 def test_any_chain(seed, n, random_robot, twin, states):
     """On any chain the number is the rank, regrouping keeps the torque, and the classes are those of the nullspace."""

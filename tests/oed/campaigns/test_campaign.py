@@ -192,13 +192,11 @@ def test_a_changed_file_is_refused(saved: Path, tmp_path: Path) -> None:
 def test_a_design_is_read_from_its_folder(er3a: Robot, er3a_design: Design, tmp_path: Path) -> None:
     """A saved design is the excitation stage; one for another robot is refused, one for another description noted."""
     er3a_design.save(tmp_path)
-    made = oed.campaign(er3a, design=tmp_path, programme=Programme(cycles=1), collision=False)
+    options = {"design": tmp_path, "programme": Programme(cycles=1), "collision": False}
+    made = oed.campaign(er3a, **options)
     np.testing.assert_array_equal(made.stages_by_name["excitation"].motion.q, er3a_design.motion.q)
     other = dataclasses.replace(er3a, digest="0" * 64)
-    assert any(
-        "another description" in n
-        for n in oed.campaign(other, design=tmp_path, programme=Programme(cycles=1), collision=False).notes
-    )
+    assert any("another description" in n for n in oed.campaign(other, **options).notes)
     with pytest.raises(InputError, match="for er3a, not for ur10"):
         oed.campaign(dataclasses.replace(er3a, name="ur10"), design=tmp_path)
     with pytest.raises(InputError, match=r"design\.json"):
