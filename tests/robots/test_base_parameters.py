@@ -22,15 +22,13 @@ from robots.terms import RigidBody, RotorInertia, TorqueOffset
 ROBOTS = ["er3a", "ur10", "panda"]
 EYE = np.eye(3)
 TILTED = (3.0, 2.0, -9.0)
+MANY = settings(max_examples=60 if os.environ.get("LONGER") else 25)
 
 
 @pytest.fixture(autouse=True)
 def uncompiled(monkeypatch):
     """Most robots here are used once: compiling would take most of the time."""
     monkeypatch.setenv("ROBOT_OED_BACKEND", "vectorised")
-
-
-MANY = settings(max_examples=60 if os.environ.get("LONGER") else 25)
 
 
 def rigid(robot):
