@@ -42,6 +42,20 @@ def payload(names: Names) -> None:
     assert np.abs([item.value for item in body[1:4]] - tool.lever).max() < 0.005
 
 
+def thermal_friction(names: Names) -> None:
+    """The unseen motion is predicted cold and warm, and the fitted friction lies between the plant's own two parts."""
+    errors = names["errors"]
+    # Noise of about 2 %, and 2 % for one factor of two parts that fall differently.
+    assert errors["cold", "with heat"].max() < 0.05
+    assert errors["warm", "with heat"].max() < 0.05
+    assert np.all(errors["warm", "without heat"] > 4 * errors["warm", "with heat"])
+    coulomb, viscous = names["truth"][:, 0], names["truth"][:, 1]
+    for joint, curve in enumerate(names["curves"].T):
+        fitted = np.interp(names["elapsed"], names["minutes"], curve)
+        # 2 %: a log averages over 10 s, in which the cold robot heats up.
+        assert np.all((viscous[:, joint] - 0.02 < fitted) & (fitted < coulomb[:, joint] + 0.02))
+
+
 def mujoco_corrected(names: Names) -> None:
     """The spring at joint 2 is found with its stiffness, and the corrected model follows the robot."""
     finding = names["diagnosis"].findings[0]
@@ -78,6 +92,7 @@ CLAIMS: dict[str, Callable[[Names], None]] = {
         real_robot,
         hidden_effect,
         payload,
+        thermal_friction,
         mujoco_corrected,
         your_own_robot,
         your_own_effect,
