@@ -1,4 +1,4 @@
-"""What the diagnosis says of logs of real robots, nothing being told in advance, and the gain on what it has not seen.
+"""What the diagnosis says of logs of real robots without hints, and the gain on what it has not seen.
 
 Run it with ``python benchmarks/diagnosis_real.py FOLDER``, where FOLDER holds the published logs as ``tests`` read
 them. No figure here has a truth beside it but what the sources tell of their machines.

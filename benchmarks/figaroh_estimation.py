@@ -12,7 +12,7 @@ cut-offs of its low-pass the one that predicts the unseen half best is taken for
 with one BLAS thread; the 100,000 samples by turns, and the fastest of each counts. What either imports is collected
 before its clock starts.
 
-On the 100,000 samples FIGAROH is told its cut-off, and trusts the log. Ours is measured twice: doing the same, with
+On the 100,000 samples FIGAROH is given its cut-off, and trusts the log. Ours is measured twice: doing the same, with
 that cut-off and no gate, which the goal of the time is held against; and as a user calls it, when it looks through the
 log first and tries eleven smoothings by cross-validation. Both include standard errors that survive coloured noise.
 """

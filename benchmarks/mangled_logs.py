@@ -5,7 +5,7 @@ seven formats, and goes through reader, gate and identification. Result of a cas
 
 - ``message``: one of our errors, and nothing else;
 - ``right``: each parameter within five standard errors of the truth, or wrong by less than matters;
-- ``told``: a result that is not right, with a warning of the gate or marked parameters that say so;
+- ``reported``: a result that is not right, with a warning of the gate or marked parameters that say so;
 - ``silent``: a wrong result without a word; ``traceback``: any other exception. Neither may happen.
 
     python benchmarks/mangled_logs.py --cases 10000 --seed 0 --workers 2 --out mangled.jsonl
@@ -167,7 +167,7 @@ def judge(path: Path) -> tuple[str, str]:
     said = [str(finding) for finding in report.of("warning")]
     lost = [joint.name for joint in estimate.joints if not joint.identified]
     if said or lost:
-        return "told", "; ".join([*said, *(f"{name} not identified" for name in lost)])[:300]
+        return "reported", "; ".join([*said, *(f"{name} not identified" for name in lost)])[:300]
     return "silent", f"{wrong}; unexplained {np.round(report.unexplained, 3).tolist()}"
 
 

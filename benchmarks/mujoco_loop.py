@@ -182,15 +182,15 @@ def trial(seed: int, hidden: str, folder: Path) -> dict[str, Any]:
     done = subprocess.run(command, capture_output=True, text=True, check=False)
     if done.returncode:
         raise RuntimeError(done.stderr)
-    told = json.loads(done.stdout)
+    result = json.loads(done.stdout)
     unseen = reference(100 * seed + 99)
     truth = play(loaded, folder / "real.xml", unseen)
     before, after = (errors(play_file(folder / f"{n}.xml", unseen), truth) for n in ("original", "corrected"))
     return {
         "seed": seed,
         "hidden": hidden,
-        "found": [(f["effect"], f["joint"]) for f in told["findings"]],
-        "mjcf": told["mjcf"],
+        "found": [(f["effect"], f["joint"]) for f in result["findings"]],
+        "mjcf": result["mjcf"],
         "position": [float(np.linalg.norm(e[0])) for e in (before, after)],
         "torque": [float(np.linalg.norm(e[1])) for e in (before, after)],
         "seconds": time.perf_counter() - begun,

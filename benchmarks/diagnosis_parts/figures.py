@@ -97,7 +97,7 @@ def _gains(rows: Sequence[Row]) -> list[str]:
             lines.append(f"  {text:58} median {median:.2f}, lowest tenth {low:.2f}   wanted .97 and .85")
     files = file_over_told(rows)
     if len(files):
-        text = f"the model's file over what is told of it, {len(files)} joints"
+        text = f"the model's file over what is reported of it, {len(files)} joints"
         low, middle, high = (np.quantile(files, share) for share in (0.05, 0.5, 0.95))
         lines.append(f"  {text:58} median {middle:.2f}, nine tenths {low:.2f} to {high:.2f}, largest {files.max():.2f}")
     other = f"error left there over that of the true effect's own, {len(left)}"
@@ -110,7 +110,9 @@ def _parameters(rows: Sequence[Row]) -> list[str]:
     stated = [e for e in shapes + times if e["stated"]]
     return [
         share("change times within .2 s", times, lambda e: e["absolute"] <= CHANGE_TIME, "all"),
-        share("  within .2 s or told as less sure", times, lambda e: e["absolute"] <= CHANGE_TIME or e["marked"], ""),
+        share(
+            "  within .2 s or reported as less sure", times, lambda e: e["absolute"] <= CHANGE_TIME or e["marked"], ""
+        ),
         share("nonlinear parameters within 20 %, if determined", well, lambda e: e["relative"] <= NONLINEAR, "all"),
         share(
             "  within 20 % or marked as not determined", shapes, lambda e: e["relative"] <= NONLINEAR or e["marked"], ""

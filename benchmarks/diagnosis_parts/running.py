@@ -41,8 +41,8 @@ def run(task: Task) -> dict[str, Any]:
     row |= truth_of(case)
     with described(case, STRATA[task.stratum].drives) as robot:
         try:
-            diagnosis, told = diagnose_case(case, robot)
-            row |= told
+            diagnosis, reported = diagnose_case(case, robot)
+            row |= reported
             if row["verdict"] == "ambiguous" and row["stratum"] in ("half", "one", "brief"):
                 row["after"] = follow(case, robot, diagnosis)
         except OedError as error:
@@ -138,8 +138,8 @@ def diagnose_case(case: Case, robot: Robot) -> tuple[Any, dict[str, Any]]:
         size = np.sum(squares, axis=0) / np.sum([counts.sum(axis=0) for counts in counted], axis=0)
         for name in ("before", "after", "as_measured"):
             row[f"oracle_{name}"] = (getattr(oracle, name) / size).tolist()
-        told = [np.square(np.array(said[name]["nrmse"], dtype=float)) for name in ("baseline", "extended")]
-        row["before"], row["after_extension"] = told[0].tolist(), told[1].tolist()
+        reported = [np.square(np.array(said[name]["nrmse"], dtype=float)) for name in ("baseline", "extended")]
+        row["before"], row["after_extension"] = reported[0].tolist(), reported[1].tolist()
         row["by_file"] = _by_file(diagnosis, logs, unseen)
     return diagnosis, row
 

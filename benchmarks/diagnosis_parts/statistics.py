@@ -112,10 +112,10 @@ def gain_ratios(rows: Iterable[Row], oracle: str = "oracle_after") -> np.ndarray
     for row in rows:
         if not detected(row) or row.get(oracle) is None or not all(e["lasting"] for e in row["truth"]):
             continue
-        told, start = np.array(row["before"]), np.minimum(row["before"], row["oracle_before"])
+        reported, start = np.array(row["before"]), np.minimum(row["before"], row["oracle_before"])
         possible = float(np.maximum(start - row[oracle], 0.0).sum())
         if possible > LEAST_GAIN * float(start.sum()):
-            ratios.append(min(float((told - row["after_extension"]).sum()) / possible, 1.0))
+            ratios.append(min(float((reported - row["after_extension"]).sum()) / possible, 1.0))
     return np.array(ratios)
 
 
@@ -130,10 +130,10 @@ def file_over_told(rows: Iterable[Row]) -> np.ndarray:
     able = (row for row in rows if row["findings"] and row.get("by_file") is not None)
     return np.array(
         [
-            np.sqrt(file / told)
+            np.sqrt(file / reported)
             for row in able
-            for file, told in zip(row["by_file"], row["after_extension"], strict=True)
-            if np.isfinite(told) and told > 0
+            for file, reported in zip(row["by_file"], row["after_extension"], strict=True)
+            if np.isfinite(reported) and reported > 0
         ]
     )
 
@@ -146,9 +146,9 @@ def parameter_errors(rows: Iterable[Row], wanted: dict[str, tuple[str, ...]]) ->
             for finding in row["findings"]:
                 if _pair(finding) != _pair(effect):
                     continue
-                told = {p["name"]: p for p in finding["parameters"] or ()}
+                reported = {p["name"]: p for p in finding["parameters"] or ()}
                 for name, value in effect["parameters"].items():
-                    match = next((told[n] for n in wanted.get(name, ()) if n in told), None)
+                    match = next((reported[n] for n in wanted.get(name, ()) if n in reported), None)
                     if match is None:
                         continue
                     low, high = match.get("ci95") or (None, None)

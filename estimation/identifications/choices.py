@@ -38,7 +38,7 @@ class Choice:
         prior: of the base parameters.
         position: whether the model has a torque by each joint's position.
         held_out: RMS of the torque error on blocks left out of the fit (n,) [N m or N], joints at rest and the logs'
-            ends besides: what a prediction is judged on.
+            ends left out: what a prediction is judged on.
         spread: standard deviation of the torque (n,): the error of a constant.
         band: of the prediction of other motions.
         contradiction: a log that one model does not fit together with the others; None where they agree.
@@ -75,7 +75,7 @@ def choose(
     """Chooses by predicting parts of the logs from others.
 
     The smoothing is the one that predicts contiguous blocks best, the low-pass unless another is clearly better. What
-    the model has besides is judged on parts that are other motions (`Transfer`).
+    the model has in addition is judged on parts that are other motions (`Transfer`).
 
     Args:
         base: base parameters of the model whose friction uses the first of `VELOCITY_SCALES`.

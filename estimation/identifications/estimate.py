@@ -34,7 +34,7 @@ class JointFit:
         name: the joint's name.
         torque_rms: of the measured torque [N m or N].
         torque_spread: its standard deviation: the error of the best constant.
-        residual_rms: error on the fitted logs, rows besides in which the joint is at rest, which no fit counts.
+        residual_rms: error on the fitted logs, without rows in which the joint is at rest, which no fit counts.
         held_out_rms: error on all rows of blocks that were left out of the fit: what to expect of a prediction.
         nominal_rms: error of the robot description's own parameters; NaN where it has none.
         noise_floor: what no model of the motion can predict: what differs from period to period where the motion is

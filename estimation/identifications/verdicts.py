@@ -53,7 +53,7 @@ def require_predictable(moves: NDArray[np.bool_], lowest: Array, highest: Array,
 
 
 def determined_parameters(found: Fit, joints: Sequence[JointFit]) -> NDArray[np.bool_]:
-    """Tells which parameters (b,) the data determine: by their standard errors, or because they hardly matter."""
+    """Finds which parameters (b,) the data determine: by their standard errors, or because they hardly matter."""
     values, moments, columns = found.solution.values, found.moments, found.base.columns
     errors = np.sqrt(np.maximum(np.diag(found.covariance), 0.0))
     excited = np.einsum("jpp->jp", moments.gram) / np.maximum(moments.count, 1)[:, None]  # mean square of each column

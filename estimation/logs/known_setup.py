@@ -96,7 +96,7 @@ def require_known(model: TorqueModel, columns: Sequence[int], known: Sequence[Ar
         gravity: another (3,) [m/s2].
 
     Raises:
-        InputError: naming parameters that the gravity asks for besides.
+        InputError: naming parameters that the gravity needs in addition.
     """
     from robots.base_parameters import find_base_parameters
 

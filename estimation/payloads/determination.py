@@ -28,7 +28,7 @@ POSES = 300
 
 
 def determined(found: Sequence[Quantity]) -> tuple[bool, ...]:
-    """Tells which quantities of a payload a log determines by itself."""
+    """Finds which quantities of a payload a log determines by itself."""
     values = {item.name: item.value for item in found}
     moment = (values["Ixx"] + values["Iyy"] + values["Izz"]) / 3
     limits = {"kg": MASS_SHARE * abs(values["mass"]), "m": CENTRE, "kg m2": INERTIA_SHARE * moment}

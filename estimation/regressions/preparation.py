@@ -189,7 +189,7 @@ def prepare(robot: Robot, log: Log) -> Prepared:
 def prepare_all(robot: Robot, logs: Sequence[Log]) -> list[Prepared]:
     """Prepares several logs, and marks joints that rest in one log but move in another.
 
-    The rows of those do not count where some log moves all joints. Without, they are all that tells how joints feel
+    The rows of those do not count where some log moves all joints. Without, they are all that shows how joints feel
     each other's accelerations, friction or not.
     """
     prepared = [prepare(robot, log) for log in logs]
@@ -202,7 +202,7 @@ def prepare_all(robot: Robot, logs: Sequence[Log]) -> list[Prepared]:
 
 
 def still_joints(positions: Sequence[Array], travel: Array | float = 0.0) -> NDArray[np.bool_]:
-    """Tells which joints stand in each of several logs, but for a tremble, while they move in another (logs, n).
+    """Finds which joints stand in each of several logs, but for a tremble, while they move in another (logs, n).
 
     Args:
         positions: of each log (N, n).

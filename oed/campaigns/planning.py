@@ -180,7 +180,7 @@ class Planner:
         return {}
 
     def _ranges(self, fraction: float) -> list[float]:
-        """Tells which part of each joint's range a warm-up drives (n,)."""
+        """Gives which part of each joint's range a warm-up drives (n,)."""
         if self.free_ranges is None:
             return [fraction] * self.robot.n
         box, span = self._box(self.limits, fraction), self.limits.upper - self.limits.lower

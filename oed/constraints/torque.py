@@ -63,14 +63,14 @@ class TorqueLimit(PointwiseLimit):
         symbolic = model.symbolic()
         symbols = [casadi.SX.sym(name, model.robot.n) for name in ("q", "dq", "ddq")]
         total = symbolic(*symbols) @ casadi.SX(pi)
-        borne = casadi.SX.zeros(model.robot.n)
+        gear_load = casadi.SX.zeros(model.robot.n)
         for effect in self.effects:
             if effect.term.loads_gear:
-                borne += effect.expression(model, pi, *symbols)
+                gear_load += effect.expression(model, pi, *symbols)
         for effect in self.effects:
             if not effect.term.loads_gear:
-                total += effect.expression(model, pi, *symbols, borne=borne)
-        total += borne
+                total += effect.expression(model, pi, *symbols, gear_load=gear_load)
+        total += gear_load
         torque = total[limited.tolist()] / casadi.SX((1 - margin) * bound[limited])
         torque = casadi.densify(torque)
         slope = casadi.densify(casadi.jacobian(torque, casadi.vertcat(*symbols)))

@@ -64,7 +64,7 @@ class PlantEffect:
         dq: casadi.SX,
         ddq: casadi.SX,
         *,
-        borne: casadi.SX | None = None,
+        gear_load: casadi.SX | None = None,
     ) -> casadi.SX:
         """Builds the torque (n,) of a static effect beside a model, symbolic.
 
@@ -74,7 +74,7 @@ class PlantEffect:
             q: positions (n,).
             dq: velocities (n,).
             ddq: accelerations (n,).
-            borne: torque of other effects (n,) that the gears bear; None for none.
+            gear_load: torque of other effects (n,) that the gears bear; None for none.
 
         Raises:
             InputError: an effect that depends on the past.
@@ -91,7 +91,7 @@ class PlantEffect:
         width = np.broadcast_to(np.asarray(widths[0] if widths else 0.0, dtype=float), (model.robot.n,))
         rigid = Y @ casadi.SX(np.where(inert, pi, 0.0))
         load = rigid - ddq * casadi.SX(rotor_inertias(model, pi).sum(axis=0))
-        load = load if borne is None else load + borne
+        load = load if gear_load is None else load + gear_load
         at = [q, dq, ddq, rigid, load, Y @ casadi.SX(pi)]
         at += [casadi.tanh(dq / casadi.SX(np.where(width > 0, width, SHARP))), casadi.SX(list(self.shape))]
         return term.function(model.robot, self.joint)(*at) @ casadi.SX(list(self.coefficients))

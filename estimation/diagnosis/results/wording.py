@@ -153,7 +153,7 @@ def _parameters(
             )
         )
     idle = _perhaps_unused(effect, extension.shape, {parameter.name: parameter.ci95 for parameter in result})
-    return tuple(_opened(told) if told.name in idle else told for told in result)
+    return tuple(_opened(one) if one.name in idle else one for one in result)
 
 
 def _stopped(shape: Shape, value: float) -> bool:

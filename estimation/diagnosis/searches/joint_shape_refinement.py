@@ -15,7 +15,7 @@ from robots.terms.effect_bases.capabilities import Reading
 
 ROUNDS = 8  # largest number of rounds
 # Gain of chi2 by a round below which the refinement stops.
-TOLD = 1.0
+LEAST_GAIN = 1.0
 # Multiples of the step of a round that are tried, as long as the gain increases.
 FACTORS = (1.0, 2.0, 4.0, 8.0, 16.0)
 
@@ -52,7 +52,7 @@ def _along(problem: Problem, members: list[FittedEffect], own: Sequence[int]) ->
             members[i] = refine(problem, members[i].hypothesis, members[i].shape, beside)
         more = _explained(problem, members) - gain
         # The last step must be a refinement, because it determines which shape parameters are free.
-        if more < TOLD or not left:
+        if more < LEAST_GAIN or not left:
             break
         gain += more
         after = [members[i] for i in own]

@@ -190,7 +190,7 @@ def simulate_both(
 def _driven(
     plant: FittedRobot, whole: Recording, rows: slice, reference: Reference, inertia: Array, loop: Loop
 ) -> tuple[Driven, bool]:
-    """Simulates one robot; the flag tells whether its effects were evaluated along the simulated motion."""
+    """Simulates one robot; the flag says whether its effects were evaluated along the simulated motion."""
     part = cut_recording(whole, rows)
     measured = plant.at(part, (part.q, part.dq, part.ddq))
     plant, torque = plant.unmeasured_torque(plant.felt_at(part, (part.q, part.dq, part.ddq)), reference.torque)

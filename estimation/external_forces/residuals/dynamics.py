@@ -1,4 +1,4 @@
-"""Generalised momentum of an identified model, and what changes it besides the drives and a contact."""
+"""Generalised momentum of an identified model, and what changes it apart from the drives and a contact."""
 
 from __future__ import annotations
 

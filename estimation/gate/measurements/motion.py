@@ -50,7 +50,7 @@ def standing_joints(robot: Robot, columns: Columns) -> NDArray[np.bool_]:
     """Finds the joints (n,) that stand still.
 
     A position that changes by some encoder steps only is the error of the position loop. Neither such a motion nor its
-    torque tells anything about the joint: friction may have any value that holds it.
+    torque says anything about the joint: friction may have any value that holds it.
 
     Args:
         robot: with n joints.

@@ -51,7 +51,7 @@ class KnownChange(Effect):
     turn: np.ndarray
 
     name = "known change"
-    borne = True
+    loads_gears = True
 
     def torque(self, ride: Ride) -> np.ndarray:
         rows = (ride.t >= self.start) & (ride.t <= self.end)

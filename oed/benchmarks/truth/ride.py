@@ -57,9 +57,9 @@ class Ride:
     @property
     def load(self) -> np.ndarray:
         """The gear load (N, n) [N m]."""
-        return self.borne(self.rigid)
+        return self.with_gear_loads(self.rigid)
 
-    def borne(self, rigid: np.ndarray) -> np.ndarray:
+    def with_gear_loads(self, rigid: np.ndarray) -> np.ndarray:
         """Adds the additional gear load to a rigid-body torque (N, n) [N m]."""
         return rigid if self.carried is None else rigid + self.carried
 

@@ -59,7 +59,7 @@ def discriminate(
     Args:
         robot: the robot, its nominal dynamics known.
         rivals: two effects, such as ``stribeck:2,load_dependent_friction:2``. A joint left out is that of the other;
-            left out of both, the one where the reference alone tells least.
+            left out of both, the one where the reference alone shows least.
         noise: standard deviation of the torque noise (n,) [N m or N]; by default 2 % of each joint's torque RMS.
         size: of what the effect shows beyond the base model, as a share of the joint's torque RMS in the reference.
         friction: of the base model, ``polynomial`` or ``coulomb-viscous``.
@@ -70,7 +70,7 @@ def discriminate(
 
     Raises:
         InputError: an effect or joint that there is not, values out of range, dynamics that are not known.
-        NotIdentifiableError: effects that no experiment of the catalogue tells apart.
+        NotIdentifiableError: effects that no experiment of the catalogue separates.
         InfeasibleError: no motion keeps the limits.
     """
     places = parse_rivals(rivals, robot)

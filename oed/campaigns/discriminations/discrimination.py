@@ -59,7 +59,7 @@ class DiscriminationScore:
         return self.runs == 1 and self.energy >= resolving_energy(), self.energy
 
     def smallest(self, size: float) -> float | None:
-        """The size at which it tells the causes apart with 95 % chance, of one judged at a `size`; None for none."""
+        """The size at which it separates the causes with 95 % chance, of one judged at a `size`; None for none."""
         return size * float(np.sqrt(resolving_energy() / self.energy)) if self.energy > 0 else None
 
     def to_dict(self, size: float) -> dict[str, Any]:

@@ -53,7 +53,7 @@ class LoopResult:
         }
 
     def summary(self) -> str:
-        """Tells the story in a few lines."""
+        """Gives the course in a few lines."""
         lines = [f"{self.robot.name}: {self.ended}"]
         for number, experiment in enumerate(self.experiments, start=1):
             seen = experiment.diagnosis

@@ -143,6 +143,6 @@ def stopped_by_interrupt(board: Board, *, wanted: bool) -> Iterator[None]:
 
 
 def outlive_interrupts() -> None:
-    """Makes a worker process deaf to Ctrl-C, which a terminal sends to the whole group: the board tells it to stop."""
+    """Makes a worker process deaf to Ctrl-C, which a terminal sends to the whole group: the board asks it to stop."""
     if multiprocessing.parent_process() is not None and threading.current_thread() is threading.main_thread():
         signal.signal(signal.SIGINT, signal.SIG_IGN)

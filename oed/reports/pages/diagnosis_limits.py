@@ -109,11 +109,11 @@ def _notes(limits: Sequence[Limit]) -> list[str]:
         names: dict[tuple[int, ...], list[str]] = {}
         for title, on in joints.items():
             names.setdefault(tuple(sorted(on)), []).append(title)
-        told = [
+        parts = [
             "; ".join(titles) + (f" on joint{'s' if len(on) > 1 else ''} {', '.join(map(str, on))}" if on else "")
             for on, titles in names.items()
         ]
-        result.append(f"{' / '.join(told)}: {note}.")
+        result.append(f"{' / '.join(parts)}: {note}.")
     return result
 
 

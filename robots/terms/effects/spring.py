@@ -24,7 +24,7 @@ LINEAR = (0.0, 0.0, 1.0)
 
 # Lever ratios and dead centres [rad] of the scan; a joint that moves less than the third value [rad] does not
 # determine them.
-RATIOS, CENTRES, TOLD = (0.35,), tuple(float(x) for x in np.arange(-np.pi, np.pi, np.pi / 4)), 1.0
+RATIOS, CENTRES, NARROW = (0.35,), tuple(float(x) for x in np.arange(-np.pi, np.pi, np.pi / 4)), 1.0
 # Least length of the shorter lever, as a fraction of the other; below it the spring counts as one without levers.
 SHORTEST = 0.1
 # Ratio above which the levers' ends nearly meet at the dead centre; no spring is as short as their distance there.
@@ -91,7 +91,7 @@ class Spring(StaticJointEffect):
     def grid(self, situation: Situation, joint: Place) -> tuple[tuple[float, ...], ...]:
         """Lists springs without levers, and levers if the joint moves far enough to determine them."""
         assert joint is not None
-        return (LINEAR, PLAIN) if np.ptp(situation.q[:, joint - 1]) < TOLD else self.forms(situation, joint)
+        return (LINEAR, PLAIN) if np.ptp(situation.q[:, joint - 1]) < NARROW else self.forms(situation, joint)
 
     def forms(self, situation: Situation, joint: Place) -> tuple[tuple[float, ...], ...]:
         """Lists springs without levers, and for a revolute joint those with levers."""

@@ -117,15 +117,15 @@ def test_interrupted_answers_go_on(blind, tmp_path: Path, monkeypatch: pytest.Mo
 
     monkeypatch.setitem(solving.METHODS, "threshold", method)
     with pytest.raises(KeyboardInterrupt):
-        answer_benchmark(blind.folder, by="threshold", out=tmp_path / "out")
+        answer_benchmark(blind.folder, by="threshold", out=tmp_path / "out", workers=1)
     assert not (tmp_path / "out" / "answers.json").exists()
-    done = answer_benchmark(blind.folder, by="threshold", out=tmp_path / "out")
+    done = answer_benchmark(blind.folder, by="threshold", out=tmp_path / "out", workers=1)
     assert asked == ["case-001", "case-002", "case-003", "case-003", "case-004"]
     assert done.resumed == 2
     assert set(read_answers(tmp_path / "out", blind).cases) == set(blind.cases)
     assert sorted(path.name for path in (tmp_path / "out").iterdir()) == ["answers.json", "predictions"]
     with pytest.raises(InputError, match="the file exists"):
-        answer_benchmark(blind.folder, by="threshold", out=tmp_path / "out")
+        answer_benchmark(blind.folder, by="threshold", out=tmp_path / "out", workers=1)
     with pytest.raises(InputError, match="no method is called 'best'; allowed: oed, residual-fit, threshold"):
         answer_benchmark(blind.folder, by="best", out=tmp_path / "other")
 

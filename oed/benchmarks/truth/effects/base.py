@@ -27,7 +27,7 @@ class Effect:
     power = 1.0
     lasting = True
     # Whether its torque loads the gears, like a payload or an external force.
-    borne = False
+    loads_gears = False
 
     @classmethod
     def draw(cls: type[Kind], machine: Machine, rng: np.random.Generator, joint: int | None, span: float) -> Kind:
@@ -52,7 +52,7 @@ class Effect:
 
     def load(self, ride: Ride) -> np.ndarray | None:
         """Computes the additional gear load (N, n) [N m], None for none."""
-        return self.torque(ride) if self.borne else None
+        return self.torque(ride) if self.loads_gears else None
 
     def signal(self, ride: Ride, torque: np.ndarray) -> np.ndarray:
         """Returns the logged torque (N, n) for a true torque (N, n), without noise."""

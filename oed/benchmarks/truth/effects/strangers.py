@@ -179,8 +179,8 @@ class SlippedZero(Effect):
 
     def torque(self, ride: Ride) -> np.ndarray:
         model, q = ride.machine.model, ride.link_q + self.on_joint(ride, np.full(len(ride.t), self.amount))
-        there, told = (rigid_torque(model, x, ride.link_v, ride.link_a) for x in (q, ride.link_q))
-        return (ride.t >= self.moment)[:, None] * (there - told)
+        there, logged = (rigid_torque(model, x, ride.link_v, ride.link_a) for x in (q, ride.link_q))
+        return (ride.t >= self.moment)[:, None] * (there - logged)
 
     def truths(self) -> dict[str, float]:
         return {"change_time": self.moment}

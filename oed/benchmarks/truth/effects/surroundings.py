@@ -22,7 +22,7 @@ class Payload(Effect):
     size: tuple[float, float, float] = (0.1, 0.1, 0.1)
 
     name = "payload_change"
-    borne = True
+    loads_gears = True
     largest = 150.0
 
     @classmethod
@@ -57,7 +57,7 @@ class Tilt(Effect):
     heading: float = 0.0
 
     name = "base_tilt"
-    borne = True
+    loads_gears = True
     largest = 0.2
 
     @classmethod
@@ -95,7 +95,7 @@ class Contact(Effect):
     form: str = "half-sine"
 
     name = "external_contact"
-    borne = True
+    loads_gears = True
     largest = 3000.0
     lasting = False
 

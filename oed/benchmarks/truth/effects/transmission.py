@@ -66,7 +66,7 @@ class Elastic(Effect):
 
     def part(self, ride: Ride) -> None:
         through = rigid_torque(ride.machine.model, ride.link_q, ride.link_v, ride.link_a)
-        through = ride.smooth(ride.borne(through), 0.004)[:, self.j]
+        through = ride.smooth(ride.with_gear_loads(through), 0.004)[:, self.j]
         level = np.sqrt((through[ride.runs[0]] ** 2).mean())
         twist = self.amount * (through + self.soft * level * np.tanh(through / level))
         rate = ride.derivative(twist)
@@ -99,7 +99,7 @@ class Backlash(Effect):
         return cls(joint=joint, swing=log_uniform(rng, 15.0, 60.0), damping=rng.uniform(0.2, 0.7))
 
     def part(self, ride: Ride) -> None:
-        through = ride.borne(rigid_torque(ride.machine.model, ride.q, ride.v, ride.a))[:, self.j]
+        through = ride.with_gear_loads(rigid_torque(ride.machine.model, ride.q, ride.v, ride.a))[:, self.j]
         behind = np.zeros((3, len(through)))  # position of the motor minus that of the link, and two derivatives
         for run in ride.runs:
             behind[:, run] = self._floating(ride, run, through[run])
@@ -183,7 +183,7 @@ class Balancer(Effect):
     gas: float = 0.0
 
     name = "spring"
-    borne = True
+    loads_gears = True
 
     @classmethod
     def joints(cls, machine: Machine) -> tuple[int | None, ...]:
@@ -219,7 +219,7 @@ class Cable(Effect):
     cubic: float = 0.5
 
     name = "spring"
-    borne = True
+    loads_gears = True
 
     @classmethod
     def joints(cls, machine: Machine) -> tuple[int | None, ...]:
