@@ -66,6 +66,21 @@ def mujoco_corrected(names: Names) -> None:
     assert np.linalg.norm(errors["corrected"]) < 0.2 * np.linalg.norm(errors["original"])
 
 
+def two_robots(names: Names) -> None:
+    """Inertial parameters repeat, and the damage is found on the right robot, dated between two logs and sized."""
+    # 5 %: the thesis' own figure between cold and warm.
+    assert all(change < 0.05 for change in names["changes"].values())
+    assert names["cold_over_warm"] > 1.3
+    day, first, starts, true = names["day"], names["first"], names["STARTS"], 100 * names["DAMAGE"]
+    assert day == 1
+    assert starts[first - 1] < 60 <= starts[first]
+    assert all(len(names["alarms"][1, d]) == 0 for d in range(names["DAYS"]))
+    assert len(names["alarms"][2, 0]) == 0
+    assert abs(100 * names["sizes"].mean() - true) < 5.0
+    # The level alone does not show the damage on that day.
+    assert names["levels"][2, 1][first:].max() < names["levels"][1, 0][0]
+
+
 def your_own_robot(names: Names) -> None:
     """Friction is right within four standard errors, and the 95 % band holds the unseen torque."""
     values, errors, truth = names["values"], names["errors"], names["truth"]
@@ -94,6 +109,7 @@ CLAIMS: dict[str, Callable[[Names], None]] = {
         payload,
         thermal_friction,
         mujoco_corrected,
+        two_robots,
         your_own_robot,
         your_own_effect,
     )
