@@ -27,7 +27,7 @@ def er3a():
 @pytest.fixture(scope="module")
 def moving(er3a):
     """Its motion of 20 s, about the middle of its ranges."""
-    t = 0.02 * np.arange(1000)
+    t = 0.004 * np.arange(5000)
     w = 2 * np.pi * (0.3 + 0.07 * np.arange(er3a.n))
     # From the end of a range to its middle and beyond: springs bend, load and friction turn round.
     middle, reach = (er3a.limits.upper + er3a.limits.lower) / 2, (er3a.limits.upper - er3a.limits.lower) / 4
@@ -74,14 +74,19 @@ def test_an_extended_model_says_the_same_once_loaded(name, base, moving, tmp_pat
     whole[list(base.columns)] = base.values
     tried = list(_extensions(EFFECTS[name], base, situation(base.torque_model, whole, t, *states)))
     assert tried
-    alone = base.torque(*states, t)
-    # One file for all of them: most of the time is spent on building the loaded robot's regressor.
     replace(base, extensions=tuple(tried)).save(tmp_path / "model.json")
     loaded = load_model(tmp_path / "model.json")
+    assert len(loaded.extensions) == len(tried)
+    alone, alone_loaded = base.torque(*states, t), replace(loaded, extensions=()).torque(*states, t)
+    np.testing.assert_allclose(alone_loaded, alone, rtol=0, atol=1e-8 * max(np.abs(alone).max(), 1.0))
     for extension, again in zip(tried, loaded.extensions, strict=True):
         expected = replace(base, extensions=(extension,)).torque(*states, t) - alone
-        found = replace(loaded, extensions=(again,)).torque(*states, t) - alone
-        np.testing.assert_allclose(found, expected, rtol=0, atol=1e-8 * max(np.abs(alone).max(), 1.0))
+        np.testing.assert_allclose(
+            replace(loaded, extensions=(again,)).torque(*states, t) - alone,
+            expected,
+            rtol=0,
+            atol=1e-8 * max(np.abs(alone).max(), 1.0),
+        )
 
 
 def test_the_robot_of_a_file_is_that_of_the_model(base, tmp_path):
