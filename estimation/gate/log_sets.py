@@ -61,7 +61,7 @@ def _repeated_share(log: Log, other: Log) -> float:
         return 0.0
     # Rows at rest are alike in any log.
     keys = [np.unique(values.view(np.dtype((np.void, values.itemsize * values.shape[1]))).ravel()) for values in rows]
-    return float(len(np.intersect1d(*keys, assume_unique=True)) / max(len(keys[0]), 1))
+    return float(len(np.intersect1d(keys[0], keys[1], assume_unique=True)) / max(len(keys[0]), 1))
 
 
 def _repeated(other: Log, number: int, share: float) -> Finding:
