@@ -68,7 +68,7 @@ LABELLED = (
     Hide(seed=7002, effects=(friction.FrictionStep,), joint=3, periodic=False),
     Hide(seed=7031),
 )
-NOTHING = Hide(seed=7032, periodic=False, duration=20.0)
+NOTHING = Hide(seed=7032, periodic=False)
 PAIR = Hide(seed=7011, effects=(friction.PositionDependent, surroundings.Payload), joint=1)
 STRANGE = Hide(seed=7021, effects=(strangers.CrossWave,), joint=2, size=0.05)
 SWINGING = Hide(seed=7041, effects=(whole_strangers.Slosh,), size=0.01, duration=60.0)
