@@ -6,7 +6,7 @@ parameters lie within 1.96 and within 3 standard errors. With honest standard er
 
 Of 200 draws a share of 95 % is known to 1.5 % only, and the worst of 70 parameters lies 3 % below it by chance.
 The noise is ours, so that the fit's exact standard errors are known, too: Y'W Gamma W Y with the autocovariance that
-the plant's noise has, sigma^2 (1 - s + s rho^k). Stated over exact errors tell a parameter's true coverage to a
+the plant's noise has, sigma^2 (1 - s + s rho^k). Stated over exact errors show a parameter's true coverage to a
 thousandth, and the share within 1.96 exact errors shows what is luck of the draws.
 """
 

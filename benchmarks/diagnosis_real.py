@@ -1,7 +1,7 @@
 """What the diagnosis says of logs of real robots without hints, and the gain on what it has not seen.
 
 Run it with ``python benchmarks/diagnosis_real.py FOLDER``, where FOLDER holds the published logs as ``tests`` read
-them. No figure here has a truth beside it but what the sources tell of their machines.
+them. No figure here has a truth beside it but what the sources show of their machines.
 """
 
 from __future__ import annotations

@@ -3,9 +3,9 @@
 Run it with ``python benchmarks/thermal_campaign.py [cycles]``. A quick design becomes a campaign of 24 cycles of 5 min,
 which a virtual er3a with the published thermal models plays at 4 ms. Rigid body, friction and heat are fitted to it;
 another excitation, which no fit has seen, is then predicted on the cold robot and right after the campaign. The noise
-floor is what the virtual robot's sensors added; errors are torque RMS over that. "Perfect" is the virtual robot itself,
-told the positions of the log instead of its motion: what it misses beyond the noise is lost in the log, at reversals of
-a joint. All samples, and those in which the joint moves faster than 0.8 % of its RMS speed, as in the fit.
+floor is what the virtual robot's sensors added; errors are torque RMS over that. "Perfect" is the virtual robot itself
+on the positions of the log instead of its motion: what it misses beyond the noise is lost in the log, at reversals of a
+joint. All samples, and those in which the joint moves faster than 0.8 % of its RMS speed, as in the fit.
 """
 
 from __future__ import annotations

@@ -16,7 +16,7 @@ from benchmarks.diagnosis_parts.statistics import (
     both,
     detected,
     errors_left,
-    file_over_told,
+    file_over_reported,
     first_is_right,
     gain_ratios,
     in_the_set,
@@ -95,7 +95,7 @@ def _gains(rows: Sequence[Row]) -> list[str]:
             text = f"gain over the true effect's own, motion {known}, {len(ratios[name])} cases"
             median, low = np.median(ratios[name]), np.quantile(ratios[name], 0.1)
             lines.append(f"  {text:58} median {median:.2f}, lowest tenth {low:.2f}   wanted .97 and .85")
-    files = file_over_told(rows)
+    files = file_over_reported(rows)
     if len(files):
         text = f"the model's file over what is reported of it, {len(files)} joints"
         low, middle, high = (np.quantile(files, share) for share in (0.05, 0.5, 0.95))

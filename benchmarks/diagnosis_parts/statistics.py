@@ -125,7 +125,7 @@ def errors_left(rows: Iterable[Row]) -> np.ndarray:
     return np.array([np.sum(row["after_extension"]) / np.sum(row["oracle_after"]) for row in able])
 
 
-def file_over_told(rows: Iterable[Row]) -> np.ndarray:
+def file_over_reported(rows: Iterable[Row]) -> np.ndarray:
     """Unseen error of each joint by the model's file over what the diagnosis says of it, where something was found."""
     able = (row for row in rows if row["findings"] and row.get("by_file") is not None)
     return np.array(

@@ -67,14 +67,14 @@ def _parameters(truth: Truth, said: dict[str, Any]) -> list[str]:
         for finding in said["findings"]:
             if (finding["effect"], finding["joint"]) != (effect.name, effect.joint):
                 continue
-            told = {parameter["name"]: parameter for parameter in finding["parameters"]}
+            reported = {parameter["name"]: parameter for parameter in finding["parameters"]}
             for name, value in effect.truths().items():
                 theirs, allowed = {**TIMES, **SHARES}.get(name, (None, 0.0))
-                if theirs not in told:
+                if theirs not in reported:
                     continue
-                error = abs(told[theirs]["value"] - value) / (1.0 if name in TIMES else abs(value))
-                low, high = told[theirs].get("ci95") or (None, None)
+                error = abs(reported[theirs]["value"] - value) / (1.0 if name in TIMES else abs(value))
+                low, high = reported[theirs].get("ci95") or (None, None)
                 unsure = low is None or high is None or (low <= value <= high)
                 if error > allowed and not unsure:
-                    wrong.append(f"{theirs} of {told[theirs]['value']:.4g}, in truth {value:.4g}")
+                    wrong.append(f"{theirs} of {reported[theirs]['value']:.4g}, in truth {value:.4g}")
     return wrong

@@ -63,7 +63,7 @@ class Hide:
 # Noise that wanders for half a second to a second is noise, too.
 SLOW = (0.99, 0.995)
 LABELLED = (
-    # Much of what Stribeck friction does is beside reversals, where a log does not tell the velocity well.
+    # Much of what Stribeck friction does is beside reversals, where a log does not show the velocity well.
     Hide(seed=7001, effects=(friction.Stribeck,), joint=2, ratio=0.6),
     Hide(seed=7002, effects=(friction.FrictionStep,), joint=3, periodic=False),
     Hide(seed=7031),
@@ -76,9 +76,9 @@ MORE = (
     Hide(seed=7004, effects=(surroundings.Payload,), kind="heavy"),
     Hide(seed=7033, kind="ur10"),
     Hide(seed=7034, memory=SLOW, duration=60.0),
-    # 0.43 ms: all of it is in the rows beside reversals, whose direction encoders of the motors tell.
+    # 0.43 ms: all of it is in the rows beside reversals, whose direction encoders of the motors show.
     Hide(seed=7054, effects=(actuator.Delay,), size=0.01, kind="panda", ratio=0.6),
-    # When the load changes sign only one knows who knows the rotor, told roughly or not at all.
+    # When the load changes sign only one knows who knows the rotor, reported roughly or not at all.
     # And a blow that a model has a sample too early takes as much as it brings.
     Hide(seed=7062, effects=(transmission.Backlash,), size=0.015, kind="panda", joint=1, ratio=0.05),
     Hide(seed=7060, effects=(transmission.Backlash,), size=0.015, kind="panda", joint=1, drives=False),
@@ -118,8 +118,10 @@ def truth_of(case: Case) -> Truth:
     if not case.unseen or not all(effect.lasting for effect in case.effects):
         return Truth(effects=case.effects)
     size = np.mean(np.concatenate([record.tau for record in case.unseen]) ** 2, axis=0)
-    told = ask_oracle(case)
-    return Truth(effects=case.effects, before=float((told.before / size).sum()), after=float((told.after / size).sum()))
+    reported = ask_oracle(case)
+    return Truth(
+        effects=case.effects, before=float((reported.before / size).sum()), after=float((reported.after / size).sum())
+    )
 
 
 @pytest.mark.longer
@@ -167,8 +169,8 @@ def test_what_no_catalogue_has_is_not_named(hide: Hide) -> None:
 
 
 @pytest.mark.longer
-def test_what_swings_at_the_flange_is_told_with_its_frequency() -> None:
-    """Liquid in a tank is ``unexplained`` on the whole robot, told by its frequency, and mends unseen data."""
+def test_what_swings_at_the_flange_is_reported_with_its_frequency() -> None:
+    """Liquid in a tank is ``unexplained`` on the whole robot, reported by its frequency, and mends unseen data."""
     truth, said = examined(SWINGING)
     (hidden,) = truth.effects
     assert isinstance(hidden, whole_strangers.Slosh)
@@ -176,16 +178,16 @@ def test_what_swings_at_the_flange_is_told_with_its_frequency() -> None:
     (finding,) = said["findings"]
     assert (finding["effect"], finding["joint"]) == ("unexplained", None)
     assert finding["pattern"] == "pattern:swinging:0:even"
-    told = {parameter["name"]: parameter["value"] for parameter in finding["parameters"]}
-    assert told["frequency"] == pytest.approx(hidden.frequency, rel=0.1)
-    assert told["mass_level"] > 0
+    reported = {parameter["name"]: parameter["value"] for parameter in finding["parameters"]}
+    assert reported["frequency"] == pytest.approx(hidden.frequency, rel=0.1)
+    assert reported["mass_level"] > 0
     assert finding["gain"]["ci95"][0] > 0
     assert "swings at" in finding["sentence"]
 
 
 @pytest.mark.longer
 def test_swapped_labels_break_the_score() -> None:
-    """A step of friction, Stribeck friction and nothing are told; were labels swapped, each would be judged wrong."""
+    """A friction step, Stribeck friction and nothing are reported; with swapped labels each would be judged wrong."""
     cases = [(*examined(hide), hide.ratio) for hide in LABELLED]
     for i, (truth, said, ratio) in enumerate(cases):
         assert complaints(truth, said, ratio=ratio) == []

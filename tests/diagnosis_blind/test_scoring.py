@@ -13,7 +13,7 @@ from benchmarks.diagnosis_parts.statistics import (
     both,
     detected,
     errors_left,
-    file_over_told,
+    file_over_reported,
     first_is_right,
     gain_ratios,
     interval,
@@ -79,17 +79,17 @@ def test_a_worse_base_model_keeps_its_gain_and_makes_none(before: float, after: 
     assert gain_ratios([seen]) == pytest.approx([ratio])
 
 
-def test_the_file_of_a_model_is_held_to_what_was_told_of_it() -> None:
+def test_the_file_of_a_model_is_held_to_what_was_reported_of_it() -> None:
     """Joint by joint where something was found; what a diagnosis says of an unseen log, its model must predict."""
     errors = {"before": [4e-3, 1e-3], "after_extension": [1e-4, 4e-4], "by_file": [1e-4, 9e-4]}
     seen = row([("stribeck", 2)], [("stribeck", 2)], **AFTER | errors)
-    assert file_over_told([seen]) == pytest.approx([1.0, 1.5])
+    assert file_over_reported([seen]) == pytest.approx([1.0, 1.5])
     assert "largest 1.50" in figures([seen])
-    assert not len(file_over_told([row([], [("stribeck", 2)], **AFTER | errors)]))
+    assert not len(file_over_reported([row([], [("stribeck", 2)], **AFTER | errors)]))
 
 
 def test_a_gain_is_held_to_formulas_and_logged_positions_too() -> None:
-    """What the logged positions do not tell is not to be gained by any model of the effect."""
+    """What the logged positions do not show is not to be gained by any model of the effect."""
     seen = row([("backlash", 2)], [("backlash", 2)], **AFTER, before=4.5e-3, oracle_as_measured=[3.2e-3])
     assert gain_ratios([seen]) == pytest.approx([1.3 / 1.5])
     assert gain_ratios([seen], "oracle_as_measured") == pytest.approx([1.0])
@@ -124,7 +124,7 @@ def test_what_is_below_the_stated_limit_is_no_miss_of_it() -> None:
 
 
 @pytest.mark.parametrize(
-    ("name", "true", "told", "ci95", "inside", "determined"),
+    ("name", "true", "reported", "ci95", "inside", "determined"),
     [
         ("change_time", 40.0, 40.3, [39.9, 40.7], True, False),
         ("change_time", 40.0, 40.3, [40.15, 40.45], False, True),
@@ -133,15 +133,15 @@ def test_what_is_below_the_stated_limit_is_no_miss_of_it() -> None:
     ],
 )
 def test_errors_of_parameters(
-    name: str, true: float, told: float, ci95: list[float | None], inside: bool, determined: bool
+    name: str, true: float, reported: float, ci95: list[float | None], inside: bool, determined: bool
 ) -> None:
     """A parameter is marked as less sure where the diagnosis does not call it determined."""
     seen = row([("stribeck", 2)], [("stribeck", 2)])
     seen["truth"][0]["parameters"] = {name: true}
-    seen["findings"][0]["parameters"] = [{"name": name, "value": told, "ci95": ci95, "determined": determined}]
+    seen["findings"][0]["parameters"] = [{"name": name, "value": reported, "ci95": ci95, "determined": determined}]
     (error,) = parameter_errors([seen], TIMES | SHAPES)
-    assert error["absolute"] == pytest.approx(told - true)
-    assert error["relative"] == pytest.approx((told - true) / true)
+    assert error["absolute"] == pytest.approx(reported - true)
+    assert error["relative"] == pytest.approx((reported - true) / true)
     assert (error["inside"], error["marked"]) == (inside, not determined)
 
 

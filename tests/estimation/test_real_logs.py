@@ -37,7 +37,7 @@ def test_ur10_half_to_half(data):
     assert spread.mean() < 0.8 * table.mean(), spread
     assert (spread <= 1.1 * table).all(), spread
     assert all(joint.identified for joint in estimate.joints)
-    # Filtered by its authors, the log has coloured residuals, and more parameters than it can tell.
+    # Filtered by its authors, the log has coloured residuals, and more parameters than it can show.
     assert estimate.colour > 2
     assert not estimate.model.determined.all()
 
@@ -53,7 +53,7 @@ def test_lwr4_run_to_run(data):
 
 
 @pytest.mark.slow
-def test_tiago_is_told_to_be_badly_excited(data):
+def test_tiago_is_reported_to_be_badly_excited(data):
     """A badly excited log is not fitted in silence: its last arm joints are named, and their parameters marked."""
     folder = data("tiago_figaroh")
     names = ["torso_lift_joint", *(f"arm_{number}_joint" for number in range(1, 8))]

@@ -1,4 +1,4 @@
-"""Logs of one joint's motion, the others held by friction: they add what they tell, and nothing else."""
+"""Logs of one joint's motion, the others held by friction: they add what they show, and nothing else."""
 
 from __future__ import annotations
 
@@ -43,8 +43,10 @@ def _errors(arm: Robot, logs: list[Log], arm_plant: Callable, fourier_motion: Ca
     return np.asarray(np.sqrt(np.mean((predicted - unseen.tau) ** 2, axis=0) / np.mean(unseen.tau**2, axis=0)))
 
 
-def test_joints_that_stand_are_told_by_their_range(arm_log: Callable[..., Log], alone: Callable[[int], Log]) -> None:
-    """Below 3e-4 of that in another log; a joint that stands in all of them is not told from one that moves."""
+def test_joints_that_stand_are_reported_by_their_range(
+    arm_log: Callable[..., Log], alone: Callable[[int], Log]
+) -> None:
+    """Below 3e-4 of that in another log; a joint that stands in all of them is like one that moves."""
     logs = [arm_log(), alone(0), alone(1)]
     np.testing.assert_array_equal(still_joints([log.q for log in logs]), [[0, 0], [0, 1], [1, 0]])
     assert not still_joints([logs[1].q]).any()
@@ -54,7 +56,7 @@ def test_joints_that_stand_are_told_by_their_range(arm_log: Callable[..., Log], 
 def test_their_rows_do_not_count_beside_a_log_of_all_joints(
     arm: Robot, arm_log: Callable[..., Log], alone: Callable[[int], Log]
 ) -> None:
-    """And its encoder's steps are no motion; without such a log their rows tell what joints feel of each other."""
+    """And its encoder's steps are no motion; without such a log their rows show what joints feel of each other."""
     whole, own = (part.rows(10.0) for part in prepare_all(arm, [arm_log(), alone(0)]))
     assert whole.held is None
     assert not own.mask[:, 1].any()

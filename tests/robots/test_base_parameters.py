@@ -1,4 +1,4 @@
-"""Which parameters a robot's torques can tell."""
+"""Which parameters a robot's torques can show."""
 
 from __future__ import annotations
 

@@ -138,7 +138,7 @@ def test_a_robot_crosses_process_borders(urdf):
     np.testing.assert_array_equal(copy.chain.flange([0.1, 0.2]), robot.chain.flange([0.1, 0.2]))
 
 
-def test_assumed_values_are_told_once(write, monkeypatch):
+def test_assumed_values_are_reported_once(write, monkeypatch):
     """A robot with values that no source backs warns in one line the first time it is loaded, and then no more."""
     monkeypatch.setattr(loading, "_warned", set())
     path = write(TABLE.replace("cubic: {values: [3, 4]}", "cubic: {values: [3, 4], source: assumed}"))

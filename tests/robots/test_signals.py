@@ -242,7 +242,7 @@ def test_concatenation_keeps_times_or_shifts_them():
 
 
 def test_concatenation_refuses_what_does_not_join():
-    """No motion, other joints, overlapping times, and a step that nothing tells are refused."""
+    """No motion, other joints, overlapping times, and a step that nothing shows are refused."""
     whole = motion()
     with pytest.raises(InputError, match="no motion"):
         Motion.concatenate([])

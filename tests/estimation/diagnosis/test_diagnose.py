@@ -205,18 +205,18 @@ def test_unseen_motion_that_is_faster_than_friction_was_fitted_for_is_said(
     plant = arm_plant(torque_noise=0.02)
     log, unseen = simulate(plant, motion, seed=0), simulate(plant, replace(fast, t=half + 100.0), seed=1)
 
-    def told(friction: str, held_out: Log) -> list[str]:
+    def reported(friction: str, held_out: Log) -> list[str]:
         result = diagnose(arm, log, held_out=held_out, candidates=("payload_change",), friction=friction)
         return [note for note in result.notes if "times as fast" in note]
 
-    (note,) = told("polynomial", unseen)
+    (note,) = reported("polynomial", unseen)
     assert note.startswith("Joints 1, 2: up to 2.0 times")
-    assert told(SIMPLE, unseen) == []
-    assert told("polynomial", simulate(plant, replace(motion, t=2 * half + 100.0), seed=2)) == []
+    assert reported(SIMPLE, unseen) == []
+    assert reported("polynomial", simulate(plant, replace(motion, t=2 * half + 100.0), seed=2)) == []
     # A log with a gap counts as two stretches.
     kept = np.abs(unseen.t - unseen.t.mean()) > 0.5
     torn = replace(unseen, t=unseen.t[kept], q=unseen.q[kept], tau=unseen.tau[kept])
-    (note,) = told("polynomial", torn)
+    (note,) = reported("polynomial", torn)
     assert note.startswith("Joints 1, 2: up to 2.0 times")
 
 

@@ -9,7 +9,7 @@ from estimation.diagnosis.findings import MOST_LISTED, Parameter, list_parameter
 
 
 @pytest.mark.parametrize(
-    ("value", "ci95", "unit", "told"),
+    ("value", "ci95", "unit", "reported"),
     [
         (0.5, (0.4, 0.6), "N m", "size (0.4 to 0.6 N m)"),
         (320.0, (319.967, 320.033), "periods per turn", "size (319.97 to 320.03 periods per turn)"),
@@ -20,10 +20,10 @@ from estimation.diagnosis.findings import MOST_LISTED, Parameter, list_parameter
         (3.0, (-np.inf, np.inf), "N m", "size"),
     ],
 )
-def test_both_ends_of_an_interval_are_told_apart(value: float, ci95: tuple, unit: str, told: str) -> None:
+def test_both_ends_of_an_interval_are_distinguished(value: float, ci95: tuple, unit: str, reported: str) -> None:
     """An interval has enough digits to distinguish its ends; choices and undetermined values have no interval."""
     parameter = Parameter(name="size", value=value, unit=unit, standard_error=1.0, ci95=ci95, determined=True)
-    assert parameter.text == told
+    assert parameter.text == reported
 
 
 def test_a_summary_lists_no_more_parameters_than_a_line_holds() -> None:

@@ -113,7 +113,9 @@ def gained(upright: Robot, build: Build) -> tuple[Diagnosis, tuple[Log, Log]]:
     return diagnose(upright, logs, candidates=SOME, friction=SIMPLE), logs
 
 
-def test_a_wrong_torque_constant_is_told_from_a_tilt_and_a_mass(gained: tuple[Diagnosis, tuple[Log, Log]]) -> None:
+def test_a_wrong_torque_constant_is_distinguished_from_a_tilt_and_a_mass(
+    gained: tuple[Diagnosis, tuple[Log, Log]],
+) -> None:
     """With logs under two gravities, a wrong torque constant is named with joint and size."""
     result, _ = gained
     assert result.verdict == "named"
@@ -140,23 +142,23 @@ def test_the_extended_model_predicts_on_the_base_as_described_and_as_tilted(
 
 
 @pytest.mark.longer
-def test_a_tilt_that_was_not_told_is_not_taken_for_nothing(upright: Robot, build: Build) -> None:
+def test_a_tilt_that_was_not_stated_is_not_taken_for_nothing(upright: Robot, build: Build) -> None:
     """With the known tilt, logs predict each other to the noise; without it, the gate states the gravity that fits.
 
     Without the gate, errors are large.
     """
     logs = (build(0), build(1, TILTED))
-    told = diagnose(upright, logs, candidates=SOME, friction=SIMPLE)
-    assert told.verdict == "none"
+    reported = diagnose(upright, logs, candidates=SOME, friction=SIMPLE)
+    assert reported.verdict == "none"
     unstated = [logs[0], replace(logs[1], gravity=None)]
     with pytest.raises(InputError, match="--gravity") as refused:
         diagnose(upright, unstated, candidates=SOME, friction=SIMPLE)
     stated = [float(v) for v in re.search(r"--gravity K=([-.0-9,]+) ", str(refused.value))[1].split(",")]
     # The arm's own parameters are 20 % off, so the direction is known to some degrees.
     assert stated == pytest.approx(TILTED, abs=0.7)
-    untold = diagnose(upright, unstated, candidates=SOME, friction=SIMPLE, check=False)
-    assert np.all(np.array(told.baseline) < 0.05)
-    assert max(untold.baseline) > 0.3
+    unmarked = diagnose(upright, unstated, candidates=SOME, friction=SIMPLE, check=False)
+    assert np.all(np.array(reported.baseline) < 0.05)
+    assert max(unmarked.baseline) > 0.3
 
 
 def test_a_base_askew_on_its_mount_is_found_under_two_gravities(upright: Robot, build: Build) -> None:
@@ -178,10 +180,10 @@ def test_what_only_a_tilt_shows_of_an_upright_axis_is_no_spring(upright: Robot, 
     result = diagnose(upright, build(0, askew=askew), candidates=candidates, friction=SIMPLE)
     (finding,) = result.findings
     assert finding.effect == "base_tilt"
-    told = {parameter.name: parameter.value for parameter in finding.parameters}
-    assert (told["tilt_1"], told["tilt_2"]) == pytest.approx(askew[:2], abs=3e-3)
+    reported = {parameter.name: parameter.value for parameter in finding.parameters}
+    assert (reported["tilt_1"], reported["tilt_2"]) == pytest.approx(askew[:2], abs=3e-3)
     # The first moments of the waist, and those of 6 kg on its lever.
-    assert (told["own_moment_1"], told["own_moment_2"]) == pytest.approx((0.3 + 0.1 * 6, 0.2), abs=0.15)
+    assert (reported["own_moment_1"], reported["own_moment_2"]) == pytest.approx((0.3 + 0.1 * 6, 0.2), abs=0.15)
 
 
 def test_unseen_logs_may_stand_as_none_before(upright: Robot, build: Build) -> None:

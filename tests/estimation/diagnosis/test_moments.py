@@ -137,7 +137,7 @@ def test_an_interval_is_no_narrower_than_the_profile(recording: Recording, posed
 
 @pytest.mark.slow
 @pytest.mark.parametrize("moment", [0.0, 3e-3])
-def test_a_lag_of_one_joint_is_told_no_better_than_its_reversals(
+def test_a_lag_of_one_joint_is_reported_no_better_than_its_reversals(
     recording: Recording, posed: Callable, moment: float
 ) -> None:
     """The local gain of a lag d is bounded by (d / m)^2 for reversal times with an error m."""
@@ -164,7 +164,7 @@ def test_a_lag_of_one_joint_is_told_no_better_than_its_reversals(
 
 
 @pytest.mark.slow
-def test_friction_that_turns_round_over_microns_is_told_no_better_than_the_moments(
+def test_friction_that_turns_round_over_microns_is_reported_no_better_than_the_moments(
     recording: Recording, pose_arm: Callable[..., Problem]
 ) -> None:
     """The doubtful part of a presliding gain grows with the error of reversal times."""

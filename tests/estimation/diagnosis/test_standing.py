@@ -41,7 +41,9 @@ def alone(arm: Robot, arm_plant: Callable, fourier_motion: Callable) -> Callable
 
 @pytest.mark.slow
 @pytest.mark.parametrize("flicker", [False, True])
-def test_a_joint_that_never_moves_is_told(arm: Robot, alone: Callable[..., Log], flicker: bool, tmp_path: Path) -> None:
+def test_a_joint_that_never_moves_is_reported(
+    arm: Robot, alone: Callable[..., Log], flicker: bool, tmp_path: Path
+) -> None:
     """A joint that never moves gives a note, and the result can be saved."""
     log = alone(0, 0.0)
     q = np.array(log.q)
@@ -119,5 +121,5 @@ def test_limits_say_that_a_push_in_a_rest_is_not_seen(arm: Robot, arm_log: Calla
     stopped = replace(log, q=log.q[at], tau=log.tau[at], dq=None, ddq=None)
     for logs, rests in ((log, False), (stopped, True)):
         limits = diagnose(arm, logs, candidates=("external_contact", "stribeck"), check=False).limits
-        told = {limit.effect for limit in limits if "at rest" in limit.note}
-        assert told == ({"external_contact"} if rests else set())
+        reported = {limit.effect for limit in limits if "at rest" in limit.note}
+        assert reported == ({"external_contact"} if rests else set())

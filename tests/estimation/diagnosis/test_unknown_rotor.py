@@ -34,11 +34,11 @@ def test_friction_by_the_load_tells_the_rotor_that_loads_no_gear(
     result = diagnose(bare, replace(log, tau=tau), candidates=candidates, friction="coulomb-viscous")
     (finding,) = result.findings
     assert (finding.effect, finding.joint) == ("load_dependent_friction", 1)
-    told = {parameter.name: parameter for parameter in finding.parameters}
+    reported = {parameter.name: parameter for parameter in finding.parameters}
     for name, truth in (("coulomb_per_load", SHARE), ("rotor_inertia", arm.rotor_inertia[0])):
-        low, high = told[name].ci95
+        low, high = reported[name].ci95
         assert low < truth < high
-    assert told["rotor_inertia"].value == pytest.approx(0.2, rel=0.2)
+    assert reported["rotor_inertia"].value == pytest.approx(0.2, rel=0.2)
     # A described rotor counts as known.
     known = diagnose(arm, replace(log, tau=tau), candidates=candidates, friction="coulomb-viscous").findings
     assert [(f.effect, f.joint) for f in known] == [("load_dependent_friction", 1)]

@@ -23,7 +23,7 @@ ALL = [
 ]
 IDS = [f"{member.name}-{index}" for index, member in enumerate(ALL)]
 # Conic solvers stop at a relative accuracy of 1e-8 in the cost; torque goes with its root. The consistent fit leans on
-# the description besides, by what cannot be told from rounding.
+# the description besides, by what cannot be distinguished from rounding.
 # A simulation has the error of its integration, of the second order in steps of 10 ms.
 INEXACT = {"constrained": 2e-4, "consistent": 2e-3, "didim": 5e-4}
 # Those that simulate need the samples in order.

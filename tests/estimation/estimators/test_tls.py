@@ -112,7 +112,7 @@ def test_what_the_smoothing_passes_is_its_response():
 
 
 def test_noise_of_a_whole_fit_is_per_joint(problem_named):
-    """Each joint's positions tell its own noise; without records it is zero."""
+    """Each joint's positions show its own noise; without records it is zero."""
     problem = problem_named("two joints")
     data = problem.data()
     assert (smoothed_noise(data) == 0).all()

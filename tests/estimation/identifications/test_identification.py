@@ -131,7 +131,7 @@ def test_an_estimator_of_ones_own_is_used(arm, arm_log):
     assert by_name.model.provenance["method"] == "ols"
 
 
-def test_a_joint_that_stands_is_told(arm, arm_log):
+def test_a_joint_that_stands_is_reported(arm, arm_log):
     """A joint that is held still is reported as badly excited, and its friction and rotor are marked."""
     log = arm_log()
     rng = np.random.default_rng(0)
@@ -159,7 +159,7 @@ class TestRefusals:
             identify(er3a, arm_log())
 
     def test_a_log_without_torque(self, arm, arm_log):
-        """Positions alone tell nothing of torques."""
+        """Positions alone show nothing of torques."""
         log = arm_log()
         with pytest.raises(InputError, match="neither torque nor current"):
             identify(arm, Log(t=log.t, q=log.q))
@@ -186,7 +186,7 @@ class TestRefusals:
             identify(arm, replace(log, tau=np.full_like(log.tau, 2.0)), check=False)
 
     def test_torque_that_has_nothing_to_do_with_the_motion(self, arm, arm_log):
-        """Random torque is told apart from a robot's."""
+        """Random torque is distinguished from a robot's."""
         log = arm_log()
         tau = np.random.default_rng(0).normal(size=log.tau.shape)
         with pytest.raises(NotIdentifiableError, match="check units and signs"):

@@ -64,7 +64,7 @@ def test_every_pattern_is_read_from_its_name_and_has_as_many_columns_as_it_says(
 
 
 def test_what_repeats_along_a_linear_axis_does_so_by_millimetres() -> None:
-    """A wave number is told as a length; of a joint that turns it stays a number per turn."""
+    """A wave number is reported as a length; of a joint that turns it stays a number per turn."""
     turns = build_pattern("pattern:turns:0:even")
     assert turns is not None
     shape = (2 * np.pi / 0.04,)
@@ -126,8 +126,8 @@ def test_what_is_late_is_all_that_comes_before_a_cut(arm: Robot, state: Situatio
     plain = spring.torque(state)
     before = np.interp(state.t - delay, state.t, plain[:, 0])
     for order in ([late, spring], [spring, late]):
-        told = extension_torque(order, state)[:, 0]
-        assert told[1:] == pytest.approx((late.torque(state)[:, 0] + before)[1:])
+        reported = extension_torque(order, state)[:, 0]
+        assert reported[1:] == pytest.approx((late.torque(state)[:, 0] + before)[1:])
     assert np.abs(before - plain[:, 0]).max() > 0.01
     all_of_it = extension_torque([cut, late, spring], state) + state.torque
     assert np.abs(all_of_it[:, 0]).max() == pytest.approx(level)

@@ -16,7 +16,7 @@ from robots.terms.situations.flange_body import point_mass
 from tests.estimation.payloads.conftest import CENTRE, INERTIA, MASS, Experiment
 
 pytestmark = pytest.mark.slow
-# Two logs of 20 s tell the mass to some 1 %, the centre to some 2 mm: four standard errors of eleven quantities are
+# Two logs of 20 s show the mass to some 1 %, the centre to some 2 mm: four standard errors of eleven quantities are
 # missed by chance once in 1000 draws, and the draw is fixed.
 SIGMAS = 4.0
 
@@ -111,7 +111,7 @@ def test_a_log_without_wrist_motion_is_refused_with_the_motion_that_it_lacks(exp
 
 @pytest.mark.parametrize("options", [{}, {"model": None, "without": ()}])
 def test_one_log_alone_is_refused(experiment: Experiment, options: dict) -> None:
-    """Without a model and without a second log nothing tells the payload from the arm."""
+    """Without a model and without a second log nothing separates the payload from the arm."""
     with pytest.raises(InputError, match="no reference for the payload"):
         identify_payload(experiment.loaded, robot=experiment.robot, **options)
 

@@ -23,7 +23,7 @@ def log():
 
 
 def test_the_period_is_found_in_the_log(log):
-    """A motion that repeats itself tells its period, to a part in ten thousand."""
+    """A motion that repeats itself shows its period, to a part in ten thousand."""
     t, q, _ = log
     assert period_of(resample(t, q)) == pytest.approx(PERIOD, rel=1e-4)
 

@@ -99,7 +99,7 @@ def test_a_thermometer_ties_them_down(stages: Callable[..., tuple[np.ndarray, ..
 
 
 def test_a_run_that_starts_warm_is_recognised(heated: Callable[..., ThermalRun]) -> None:
-    """A joint that was warm at first is told, its temperatures are found, and the rest is right."""
+    """A joint that was warm at first is reported, its temperatures are found, and the rest is right."""
     cold, warm = heated(1.0, 1), heated(0.4, 2, start=(24.0, 18.0))
     found = fit_thermal([cold, warm], alpha=TRUTH["alpha"], starts=1)
     assert any(note.startswith("duty 0.4 does not start at ambient") for note in found.notes)
@@ -135,7 +135,7 @@ def test_surroundings_that_were_not_measured_are_estimated(heated: Callable[...,
     assert all(run.ambient == pytest.approx(20.0, abs=3.0) for run in found.runs)
 
 
-def test_motor_heat_is_told_from_friction_heat(stages: Callable[..., tuple[np.ndarray, ...]]) -> None:
+def test_motor_heat_is_distinguished_from_friction_heat(stages: Callable[..., tuple[np.ndarray, ...]]) -> None:
     """From starts with the drives off and after hours of power without motion, W_e comes out within 5 %."""
     rng, runs, motor = np.random.default_rng(6), [], 15.0
     for duty, rest in ((1.0, 0.0), (0.2, 0.0), (1.0, 7200.0), (0.6, 7200.0)):
@@ -175,7 +175,7 @@ def test_temperatures_alone_are_enough(stages: Callable[..., tuple[np.ndarray, .
     reading = 20.0 + T[:, 0] + rng.normal(0.0, 0.05, len(t))
     run = ThermalRun(t=t, power=None, temperatures={"motor": reading}, ambient=20.0)
     found = fit_thermal(run, starts=2)
-    # The slow root of eq. 126 without power: 2,165 s. Where the second zone started is unknown: heat is not told.
+    # The slow root of eq. 126 without power: 2,165 s. Where the second zone started is unknown: heat is not stated.
     slow = found["slow time constant"]
     assert abs(slow.value - 2165.0) < 3.0 * slow.standard_error
     assert slow.standard_error < 0.1 * slow.value
@@ -212,7 +212,7 @@ def test_a_result_is_written_and_read(estimate: ThermalEstimate, tmp_path: Path)
 
 
 def test_bad_input_is_named(heated: Callable[..., ThermalRun]) -> None:
-    """Wrong units, no motion, and options that make no sense are told, with what is allowed."""
+    """Wrong units, no motion, and options that make no sense are reported, with what is allowed."""
     run = heated(1.0, heating=600.0, cooling=0.0)
     common = {"t": run.t, "power": run.power, "friction": run.friction, "cold_friction": 18.0}
     with pytest.raises(InputError, match=r"kelvin.*degrees Celsius"):
@@ -250,10 +250,10 @@ def test_bad_input_is_named(heated: Callable[..., ThermalRun]) -> None:
 def test_a_rest_between_measurements_counts_as_cooling() -> None:
     """Friction measured after a rest of ten minutes shows cooling; a pause of a minute does not."""
     t = np.arange(0.0, 3600.0, 20.0)
-    for rest, told in ((600.0, False), (60.0, True)):
+    for rest, reported in ((600.0, False), (60.0, True)):
         power = np.where((t > 1800.0) & (t <= 1800.0 + rest), 0.0, 60.0)
         under = np.append(True, power[:-1] > 0.0) & (power > 0.0)
         friction = np.where(under, 1.0 - 0.3 * (1.0 - np.exp(-t / 900.0)), np.nan)
         run = ThermalRun(t=t, power=power, friction=friction, cold_friction=1.0)
         notes = find_structure(SecondOrder, [run], None, {}).notes
-        assert any(note.startswith("No cooling phase") for note in notes) == told
+        assert any(note.startswith("No cooling phase") for note in notes) == reported

@@ -5,7 +5,7 @@ from estimation.uncertainty import batch_factors, fast_noise, period_noise
 
 
 def test_white_noise_on_a_slow_residual_is_found():
-    """The fastest part of a residual tells the level of white noise under what a model leaves slowly."""
+    """The fastest part of a residual shows the level of white noise under what a model leaves slowly."""
     rng = np.random.default_rng(0)
     t = 0.004 * np.arange(20_000)
     slow = 3.0 * np.sin(2 * np.pi * 0.5 * t)[:, None] * np.ones(2)

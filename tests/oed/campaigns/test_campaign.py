@@ -82,10 +82,10 @@ def test_then_the_warm_up_gives_way(two: Robot, two_design: Design) -> None:
 
 def test_a_cycle_without_room_is_infeasible(two: Robot, two_design: Design) -> None:
     """A cycle in which not half of the warm-up is left is refused with the time that would do."""
-    with pytest.raises(InfeasibleError, match="too short") as told:
+    with pytest.raises(InfeasibleError, match="too short") as reported:
         oed.campaign(two, design=two_design, programme=Programme(cycle_time=40.0, warm_up=39.0))
-    assert told.value.allowed is not None
-    needed = float(told.value.allowed.split()[0])
+    assert reported.value.allowed is not None
+    needed = float(reported.value.allowed.split()[0])
     assert oed.campaign(
         two, design=two_design, programme=Programme(cycles=1, cycle_time=np.ceil(needed), warm_up=39.0)
     ).success
@@ -246,9 +246,9 @@ def test_bad_options_are_refused(two: Robot) -> None:
         with pytest.raises(InputError, match=r"margin|ambient|cold_friction|velocity_fraction"):
             oed.campaign(two, programme=cooling, **option)
     stuck = dataclasses.replace(two, limits=dataclasses.replace(two.limits, velocity=np.array([2.0, 0.0])))
-    with pytest.raises(InfeasibleError) as told:
+    with pytest.raises(InfeasibleError) as reported:
         oed.campaign(stuck, programme=cooling)
-    assert told.value.joint == 2
+    assert reported.value.joint == 2
 
 
 @pytest.mark.slow

@@ -79,7 +79,7 @@ def test_ways_lead_from_pose_to_pose() -> None:
 
 @pytest.mark.slow
 def test_planned_stages_are_proved_free(thesis_campaign: Campaign) -> None:
-    """Friction sweeps, warm-up and moves of the er3a meet nothing at any time; the note tells what that cost."""
+    """Friction sweeps, warm-up and moves of the er3a meet nothing at any time; the note shows what that cost."""
     model = collision_model(thesis_campaign.robot)
     for stage in thesis_campaign.stages:
         if stage.kind != "excitation":

@@ -134,6 +134,6 @@ def test_torque_limits_soften_the_accelerations(two: Robot) -> None:
 def test_a_torque_limit_that_no_motion_keeps_is_infeasible(two: Robot) -> None:
     """A joint that cannot even overcome its friction at full speed is named."""
     weak = dataclasses.replace(two, limits=dataclasses.replace(two.limits, torque=np.array([5.0, 60.0])))
-    with pytest.raises(InfeasibleError, match="even with low accelerations") as told:
+    with pytest.raises(InfeasibleError, match="even with low accelerations") as reported:
         oed.campaign(weak, programme=Programme(cycles=0, cooling=1))
-    assert told.value.joint == 1
+    assert reported.value.joint == 1

@@ -50,7 +50,7 @@ def test_several_values_are_the_option_given_again(words: list[str]) -> None:
 
 
 def test_values_of_other_options_stay_single() -> None:
-    """A word too many after an option of one value, or after a flag, is told."""
+    """A word too many after an option of one value, or after a flag, is reported."""
     for words in (["--out", "o", "p"], ["--log", "a", "--flag", "b"], ["b", "--log", "a"]):
         with pytest.raises(Exception, match="unexpected extra argument"):
             _parsed(words)

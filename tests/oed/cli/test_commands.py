@@ -143,7 +143,7 @@ def test_notes_go_to_standard_error(run, arguments) -> None:
 
 
 def test_version(run) -> None:
-    """The version is told."""
+    """The version is reported."""
     done = run("--version")
     assert (done.code, done.out.strip()) == (0, f"robot-oed {VERSION}")
 

@@ -49,8 +49,8 @@ def trajectory(tmp_path):
 def test_export_leaves_metres(run, scara, trajectory, tmp_path):
     """A file without units is exported in degrees with a note, and with the robot without one and rightly."""
     path, motion = trajectory
-    told = run("export", path, "--degrees", "--bare", "--out", tmp_path / "a.csv")
-    assert "states no units: all joints are taken as revolute" in told.err
+    reported = run("export", path, "--degrees", "--bare", "--out", tmp_path / "a.csv")
+    assert "states no units: all joints are taken as revolute" in reported.err
     done = run("export", path, "--degrees", "--bare", "--robot", scara, "--out", tmp_path / "b.csv")
     assert done.code == 0
     assert "states no units" not in done.err

@@ -1,4 +1,4 @@
-"""What the command line tells of logs, one text for all commands: payloads, and bases that stood otherwise."""
+"""What the command line shows of logs, one text for all commands: payloads, and bases that stood otherwise."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ def three() -> list[Log]:
     return [Log(t=np.arange(3.0), q=np.zeros((3, 2))) for _ in range(3)]
 
 
-def test_logs_are_told_by_their_number(three: list[Log]) -> None:
+def test_logs_are_reported_by_their_number(three: list[Log]) -> None:
     """A point mass and a field of gravity, each on its log; the others stay as they were."""
     first, second, third = with_known_setup(three, ["2=5,0,0,0.1"], ["2=0,-2.54,-9.48", "3=1,2,3"])
     assert first.payload is None
@@ -66,13 +66,13 @@ def test_another_form_is_refused_with_an_example(three: list[Log], option: str, 
 def test_a_log_that_is_not_there_or_a_value_that_is_none_is_refused(
     three: list[Log], gravities: list[str], words: str
 ) -> None:
-    """A number beyond the logs, a log told twice, a number that is not finite."""
+    """A number beyond the logs, a log reported twice, a number that is not finite."""
     with pytest.raises(InputError, match=words):
         with_known_setup(three, None, gravities)
 
 
 @pytest.mark.slow
-def test_commands_count_what_they_are_told(run, robot: Path, experiment: Path, tmp_path: Path) -> None:
+def test_commands_count_what_they_are_reported(run, robot: Path, experiment: Path, tmp_path: Path) -> None:
     """Identify notes the gravity in its model, predict uses it, and a wrong one ends with code 2 and one line."""
     log, out = experiment / "log.csv", tmp_path / "out"
     plain = ("identify", "--robot", robot, "--log", log)

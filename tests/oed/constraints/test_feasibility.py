@@ -69,13 +69,13 @@ def test_the_floor_that_would_do_is_stated(robot):
 
 
 def test_a_floor_above_the_first_joint_is_named(robot):
-    """A floor above the foot is told as such, with the height of the first joint."""
+    """A floor above the foot is reported as such, with the height of the first joint."""
     with pytest.raises(InfeasibleError, match=r"'floor' at 0.4 m is above the first joint, which is at 0.3215 m"):
         check_feasible(robot, _limits(robot, obstacles=(floor(0.4),)), HOME)
 
 
 @pytest.mark.slow
-def test_less_than_the_margin_is_told_apart_from_an_overlap(robot):
+def test_less_than_the_margin_is_distinguished_from_an_overlap(robot):
     """A start pose that is free but nearer than the margin says both."""
     model = collision_model(robot)
     least = model.clearance(HOME).min()

@@ -199,7 +199,7 @@ def test_obstacle(arm: Robot, free: Design) -> None:
     ],
 )
 def test_space_without_room(arm: Robot, space: GeometricLimit, message: str) -> None:
-    """A box that the tool cannot enter, and a plane that no pose can keep, are told before any search."""
+    """A box that the tool cannot enter, and a plane that no pose can keep, are reported before any search."""
     with pytest.raises(InfeasibleError, match=message):
         design(arm, space=[space])
 

@@ -254,7 +254,7 @@ def test_bad_options(options: dict, message: str, make_robot, tiny) -> None:
 
 
 def test_home_and_no_strokes(make_robot, tiny, brief) -> None:
-    """The experiment starts and ends where it is told, and leaves the strokes out on request."""
+    """The experiment starts and ends where it should, and leaves the strokes out on request."""
     home = [0.3, -0.4]
     robot = make_robot("RR", "two")
     design = flat.design(robot, home=home, strokes=False, periods=2, effort=tiny, solver=brief, workers=1)

@@ -86,7 +86,7 @@ def test_weights_cover_all_mixtures() -> None:
 
 
 @pytest.mark.parametrize(
-    ("options", "told"),
+    ("options", "reported"),
     [
         ({"criteria": ("cond",)}, "two or three"),
         ({"criteria": ("cond", "cond")}, "two or three"),
@@ -96,9 +96,9 @@ def test_weights_cover_all_mixtures() -> None:
         ({"criteria": ("cond", "beauty")}, "criterion"),
     ],
 )
-def test_nonsense_is_refused(options: dict, told: str) -> None:
+def test_nonsense_is_refused(options: dict, reported: str) -> None:
     """Fewer than two criteria, one twice, one that judges other directions, or one point: refused before any work."""
-    with pytest.raises(InputError, match=told):
+    with pytest.raises(InputError, match=reported):
         oed.pareto(load_robot("er3a"), **grouped(**options))
 
 

@@ -87,7 +87,7 @@ def test_errors_name_the_key_and_the_line(text, column, row, message):
 
 
 def test_several_errors_are_counted():
-    """Of several errors the first is told, a misspelt key before its consequences, and the others are counted."""
+    """Of several errors the first is reported, a misspelt key before its consequences, and the others are counted."""
     with pytest.raises(InputError, match=r"found 'x'; .*2 more problem"):
         parse("rate: x\ncount: y\nflag: z")
 

@@ -133,7 +133,7 @@ def test_missing_files_and_arguments_of_others(tmp_path):
         load_robot(f"{tmp_path / 'a.urdf'} size:=1")
 
 
-def test_arguments_are_told_from_the_path():
+def test_arguments_are_distinguished_from_the_path():
     """A path may have blanks and colons; what looks like xacro's own arguments at its end are arguments."""
     assert split_arguments("my arm.xacro a:=1 b_c:=x/y") == (
         split_arguments("my arm.xacro")[0],

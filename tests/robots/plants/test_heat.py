@@ -121,8 +121,8 @@ def test_thermometers_are_logged_where_the_plant_has_them(er3a: Robot) -> None:
         ),
     ],
 )
-def test_a_wrong_section_is_told(er3a: Robot, tmp_path: Path, text: str, message: str) -> None:
-    """Unknown joints, models and parameters, values out of range and heat told twice are refused with the file."""
+def test_a_wrong_section_is_reported(er3a: Robot, tmp_path: Path, text: str, message: str) -> None:
+    """Unknown joints, models and parameters, values out of range and heat reported twice are refused with the file."""
     path = tmp_path / "plant.yaml"
     path.write_text(text)
     with pytest.raises(InputError, match=message) as caught:
@@ -142,7 +142,7 @@ def test_a_plant_file_states_heat(er3a: Robot, tmp_path: Path) -> None:
     assert heat.start == 30.0
 
 
-def test_a_robot_without_published_models_is_told(tmp_path: Path) -> None:
+def test_a_robot_without_published_models_is_reported(tmp_path: Path) -> None:
     """known: true needs a robot for which something is published."""
     path = tmp_path / "plant.yaml"
     path.write_text("thermal: {known: true}")

@@ -184,7 +184,7 @@ def test_each_log_begins_at_rest_under_its_own_gravity(robot: Robot) -> None:
     assert both[500:] == pytest.approx(later, abs=1e-9)
 
 
-def test_it_is_told_in_words_and_read_from_its_name(robot: Robot, state: Situation) -> None:
+def test_it_is_reported_in_words_and_read_from_its_name(robot: Robot, state: Situation) -> None:
     """The effect is found by its name, has four masses and a frequency within bounds, and describes both."""
     effect = find_effect("pattern:swinging:0:even")
     assert isinstance(effect, FlangeOscillator)

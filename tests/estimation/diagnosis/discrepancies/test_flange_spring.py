@@ -64,7 +64,7 @@ def test_the_columns_are_the_torque_against_springs_at_the_flange(robot: Robot, 
     assert FlangeSpring().columns(state, None) @ coefficients == pytest.approx(expected, abs=1e-9)
 
 
-def test_it_is_told_in_words_and_read_from_its_name(robot: Robot) -> None:
+def test_it_is_reported_in_words_and_read_from_its_name(robot: Robot) -> None:
     """The effect is found by its name, has three forces and nine stiffnesses, and describes the largest stiffness."""
     effect = find_effect("pattern:pulling:0:even")
     assert isinstance(effect, FlangeSpring)

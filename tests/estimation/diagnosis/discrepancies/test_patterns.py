@@ -93,7 +93,7 @@ def _lag_of_gauge(motion: Motion, size: float, tau: np.ndarray) -> np.ndarray:
         pytest.param(_lag_of_gauge, 0.1, "pattern:hysteresis:0:even", marks=pytest.mark.longer),
     ],
 )
-def test_a_stranger_is_told_by_what_it_depends_on(
+def test_a_stranger_is_reported_by_what_it_depends_on(
     stranger: Callable[[Motion, float, np.ndarray], np.ndarray],
     share: float,
     pattern: str,
@@ -143,7 +143,7 @@ def test_a_line_is_proposed_at_its_top(
 
 
 @pytest.mark.longer
-def test_what_a_joint_feels_when_it_goes_is_told(arm: Robot, arm_plant: Callable) -> None:
+def test_what_a_joint_feels_when_it_goes_is_reported(arm: Robot, arm_plant: Callable) -> None:
     """A brake that opens late, and drags in the first 0.25 s of each move, gives the pattern of a standstill."""
     step, moves = 0.004, 16
     rise = np.concatenate([np.zeros(150), 0.5 - 0.5 * np.cos(np.pi * np.arange(350) / 350), np.ones(100)])

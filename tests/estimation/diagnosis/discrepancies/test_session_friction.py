@@ -54,7 +54,7 @@ def test_logs_whose_pauses_nobody_noted_may_be_of_several_days(swept: Situation)
 
 
 @pytest.mark.slow
-def test_colder_gears_on_the_second_day_are_told_once(arm: Robot, arm_log: Callable[..., Log]) -> None:
+def test_colder_gears_on_the_second_day_are_reported_once(arm: Robot, arm_log: Callable[..., Log]) -> None:
     """Friction that is 15 % higher on both joints in a second session is one unexplained finding of the robot."""
     first, second = arm_log(torque_noise=0.02), arm_log(seed=1, motion_seed=1, torque_noise=0.02)
     logs = [first, replace(second, t=second.t + DAY, tau=second.tau + 0.15 * _friction(arm, second))]
@@ -63,9 +63,9 @@ def test_colder_gears_on_the_second_day_are_told_once(arm: Robot, arm_log: Calla
     finding = found.findings[0]
     assert (finding.pattern, finding.joint) == (SessionFriction.name, None)
     assert "% more than in the first" in finding.sentence
-    told = {p.name: p.value for p in finding.parameters}
-    assert told["share_2_of_joint_1"] == pytest.approx(0.15, abs=0.05)
-    assert told["share_2_of_joint_2"] == pytest.approx(0.15, abs=0.05)
+    reported = {p.name: p.value for p in finding.parameters}
+    assert reported["share_2_of_joint_1"] == pytest.approx(0.15, abs=0.05)
+    assert reported["share_2_of_joint_2"] == pytest.approx(0.15, abs=0.05)
 
 
 def _friction(arm: Robot, log: Log) -> np.ndarray:

@@ -135,7 +135,7 @@ def test_limits_grow_as_the_root_of_the_time(ur10):
 
 
 @pytest.mark.slow
-def test_a_joint_at_rest_is_told(ur10):
+def test_a_joint_at_rest_is_reported(ur10):
     """Friction of a joint that does not move has a note and no limit; the limits of other joints are finite."""
     model = default_model(ur10, velocity_scale=2e-3)
     problem = planned_problem(model, model.nominal, [_motion(2000, still=3)], noise=Sensors())
@@ -157,7 +157,7 @@ def test_unknown_dynamics_are_refused():
 
 
 @pytest.mark.slow
-def test_a_log_shorter_than_the_slowest_heat_is_told(ur10):
+def test_a_log_shorter_than_the_slowest_heat_is_reported(ur10):
     """For a short log the limit of a thermal effect notes that longer time constants cannot be distinguished."""
     model = default_model(ur10, velocity_scale=2e-3)
     problem = planned_problem(model, model.nominal, [_motion(2000)], noise=Sensors())

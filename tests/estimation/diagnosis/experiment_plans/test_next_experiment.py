@@ -115,7 +115,7 @@ def test_a_payload_tells_a_torque_constant(payload_plan):
 
 
 @pytest.mark.slow
-def test_heat_is_not_told_by_going_on_at_once(problem):
+def test_heat_is_not_stated_by_going_on_at_once(problem):
     """Repeating the motion at once does not separate heat from a friction step, because the joint has not cooled."""
     end = float(problem.recording.t[-1])
     step = _guess(problem, "friction_step", 2, (0.5 * end,), 0.015)
@@ -167,7 +167,7 @@ def test_the_least_trouble_is_proposed_where_several_would_do(problem):
 
 
 @pytest.mark.slow
-def test_what_to_play_is_told(payload_plan):
+def test_what_to_play_is_reported(payload_plan):
     """For an experiment with a payload the runs are the logged motion, first without and then with the payload."""
     plan = payload_plan
     assert len(plan.motions) == 1
@@ -230,7 +230,7 @@ def test_a_payload_is_mounted_once_however_often_the_motion_is_made(problem):
 
 
 @pytest.mark.slow
-def test_where_two_causes_stay_alike_the_others_are_told_apart(problem):
+def test_where_two_causes_stay_alike_the_others_are_distinguished(problem):
     """If two causes cannot be separated, the plan separates the others as well as possible and states this."""
     error = _guess(problem, "torque_constant_error", 2, (), 0.01)
     other = _guess(problem, "torque_constant_error", 3, (), 0.01)
@@ -284,7 +284,7 @@ def test_the_experiment_starts_from_the_arm_itself(problem):
     body = point_mass(6.0, (0.0, 0.1, 0.2))
     carried = replace(problem.recording, payloads=(body,))
     now = build_situation(carried, problem.situation.model, problem.situation.parameters)
-    laden = replace(problem, recording=carried, situation=now)
+    loaded = replace(problem, recording=carried, situation=now)
     assert np.abs(now.rigid - problem.situation.rigid).max() > 10.0
     causes = [
         _guess(problem, "load_dependent_friction", 4, (1.0, 0.0), 0.02),
@@ -292,7 +292,7 @@ def test_the_experiment_starts_from_the_arm_itself(problem):
     ]
     room = motion_range(problem.situation.robot, problem.recording)
     stages = MAKERS["payload"](room, 3, 0)
-    expected, found = (Grams(some, causes).of(stages) for some in (problem, laden))
+    expected, found = (Grams(some, causes).of(stages) for some in (problem, loaded))
     # The payload's parameters were added and subtracted, so sums are rounded.
     np.testing.assert_allclose(found, expected, atol=1e-9 * np.abs(expected).max())
 

@@ -56,13 +56,13 @@ def test_the_chance_is_that_of_the_form_that_imitates_best(problem: Problem) -> 
         for exponent in (0.5, 0.7, 1.0, 1.5, 2.0)
     ]
     stages = MAKERS["micro_reversals"](motion_range(problem.situation.robot, problem.recording), JOINT - 1, 0)
-    plain, told, least = (
+    plain, reported, least = (
         grams.chances_of([grams.of(stages)])[0, 1]
         for grams in (Grams(problem, causes, some) for some in ((), forms, trials))
     )
     assert plain > 0.9
-    assert told < 0.7 * plain
-    assert told < least + 0.2
+    assert reported < 0.7 * plain
+    assert reported < least + 0.2
 
 
 @pytest.mark.slow

@@ -186,7 +186,7 @@ def test_what_is_far_from_chance_is_sure_on_a_joint_of_its_own(
         ((500.0, 1.0), 0.0, False),  # the joints contradict each other
     ],
 )
-def test_what_all_joints_share_is_told_by_those_without_a_stronger_effect(
+def test_what_all_joints_share_is_reported_by_those_without_a_stronger_effect(
     gains: tuple[float, float], other: float, counts: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """A shared coefficient counts beside a stronger effect on one joint only if the other joint supports it."""
@@ -195,9 +195,9 @@ def test_what_all_joints_share_is_told_by_those_without_a_stronger_effect(
     delay = replace(_member("time_delay", None, (column, column)), gain=sum(gains))
     ripple = replace(_member("torque_ripple", 1, (column,)), gain=other)
     gram = np.array([1e4, 1e4])
-    told = PerJointEvidence(gram, np.sqrt(np.array(gains) * gram), np.ones(2), np.zeros(2))
+    reported = PerJointEvidence(gram, np.sqrt(np.array(gains) * gram), np.ones(2), np.zeros(2))
     monkeypatch.setattr(acceptance, "accept", lambda problem, groups: None)
-    monkeypatch.setattr(acceptance, "per_joint_evidence", lambda *_: told)
+    monkeypatch.setattr(acceptance, "per_joint_evidence", lambda *_: reported)
     situation = SimpleNamespace(runs=(slice(0, ROWS),), robot=None)
     problem = SimpleNamespace(situation=situation, recording=SimpleNamespace(tau=column), rows=ROWS)
     assert exceeds_leakage(problem, delay, [ripple]) is counts  # type: ignore[arg-type]

@@ -34,10 +34,10 @@ def test_one_coefficient_stops_at_its_bound(bounds: tuple[float, float]) -> None
     y = 1.2 * x + rng.normal(size=200)
     gram = np.array([[x @ x]])
     score = Score(gram, np.array([x @ y]), gram[0], visible_root(gram, gram[0]), np.zeros((0, 1)))
-    told = lsq_linear(x[:, None], y, bounds=bounds)
+    reported = lsq_linear(x[:, None], y, bounds=bounds)
     gain, coefficients = score.bounded(*(np.array([bound]) for bound in bounds))
-    assert coefficients == pytest.approx(told.x, rel=1e-6, abs=1e-6)
-    assert gain == pytest.approx(max(y @ y - 2 * told.cost, 0.0), rel=1e-6, abs=1e-4)
+    assert coefficients == pytest.approx(reported.x, rel=1e-6, abs=1e-6)
+    assert gain == pytest.approx(max(y @ y - 2 * reported.cost, 0.0), rel=1e-6, abs=1e-4)
 
 
 @pytest.mark.parametrize("rows", [0, 1, GLANCE, 10 * GLANCE + 7])

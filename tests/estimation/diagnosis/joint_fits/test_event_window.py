@@ -68,7 +68,7 @@ def test_a_push_at_the_log_s_end_and_what_is_no_push_have_their_errors(
 
 @pytest.mark.slow
 @pytest.mark.parametrize(("begin", "end"), [(0.3, 0.55), (0.4, 0.7)])
-def test_a_push_on_a_moving_arm_is_told_from_its_first_to_its_last_moment(
+def test_a_push_on_a_moving_arm_is_distinguished_from_its_first_to_its_last_moment(
     arm: Robot, arm_log: Callable[..., Log], pose_arm: Callable[..., Problem], begin: float, end: float
 ) -> None:
     """A constant force on a moving arm, found as a short pulse, gets its full window by the body's Jacobian."""

@@ -156,8 +156,8 @@ def test_a_vibration_keeps_its_phase_in_a_later_motion(
     later = slice(1013, None)
     motion = [x[later] for x in (recording.q, recording.dq, recording.ddq, recording.t)]
     for model in (fitted.model, load_model(tmp_path)):
-        told = (model.torque(*motion) - model.torque(*motion[:3]))[:, 0]
-        assert np.corrcoef(told, wave[later])[0, 1] > 0.99
+        reported = (model.torque(*motion) - model.torque(*motion[:3]))[:, 0]
+        assert np.corrcoef(reported, wave[later])[0, 1] > 0.99
     (states, *_), _ = effect_columns(problem, replace(recording, **_rows(recording, later)), [member])
     assert states.origin == recording.t[0]
 
@@ -197,7 +197,7 @@ def test_a_column_that_is_hardly_one_is_left_open() -> None:
 
 
 @pytest.mark.parametrize("variance", [4.0, 0.01, np.inf])
-def test_what_is_one_quantity_told_twice_is_known_as_well_as_the_other(variance: float) -> None:
+def test_what_is_one_quantity_reported_twice_is_known_as_well_as_the_other(variance: float) -> None:
     """A tie reduces the second variance to the given value at most, and the covariance stays positive definite."""
     covariance = np.array([[0.25, 0.1 if np.isinf(variance) else 0.4 * np.sqrt(variance)], [0.0, variance]])
     covariance[1, 0] = covariance[0, 1]

@@ -149,7 +149,7 @@ def test_the_model_is_what_was_fitted_with_a_load_that_the_gear_bears(
 
 
 @pytest.mark.slow
-def test_nothing_is_borne_of_what_no_gear_feels(recording: Recording, pose_arm: Callable[..., Problem]) -> None:
+def test_nothing_is_carried_of_what_no_gear_feels(recording: Recording, pose_arm: Callable[..., Problem]) -> None:
     """Friction does not load a gear; a spring does, but improves no fit without load-dependent effects."""
     problem = pose_arm(recording)
     (friction,) = _members(problem, BY_LOAD)

@@ -25,7 +25,7 @@ SATURATION, TILT = Hypothesis(EFFECTS["torque_constant_saturation"], 1), Hypothe
 
 @pytest.mark.slow
 @pytest.mark.parametrize("error", [0.85, 0.3, -0.25])
-def test_base_model_and_a_false_reading_are_told_apart(
+def test_base_model_and_a_false_reading_are_distinguished(
     arm: Robot, arm_log: Callable[..., Log], pose_arm: Callable[..., Problem], error: float
 ) -> None:
     """The joint fit reduces the base model's error to less than a sixth, and estimates the distortion to 10 %."""

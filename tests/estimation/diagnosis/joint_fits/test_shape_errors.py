@@ -53,28 +53,28 @@ def test_a_velocity_is_as_uncertain_as_its_exponent_lets_it_be(
     wanted, narrow = (
         np.abs(np.log(velocities[curve.max() - curve < BOUND] / velocity)).max() for curve in (profile, held)
     )
-    told = 1.96 * shape_errors(problem, member, nothing)[0] / velocity
-    assert told == pytest.approx(wanted, abs=0.03)
-    assert told > 1.2 * narrow
-    assert abs(np.log(velocity / SPEED)) < told
+    reported = 1.96 * shape_errors(problem, member, nothing)[0] / velocity
+    assert reported == pytest.approx(wanted, abs=0.03)
+    assert reported > 1.2 * narrow
+    assert abs(np.log(velocity / SPEED)) < reported
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("share", "told"), [(0.0, True), (1.0, True), (0.0, False)])
-def test_a_choice_is_told_where_the_other_explains_less(
-    arm: Robot, arm_log: Callable[..., Log], pose_arm: Callable[..., Problem], share: float, told: bool
+@pytest.mark.parametrize(("share", "reported"), [(0.0, True), (1.0, True), (0.0, False)])
+def test_a_choice_is_reported_where_the_other_explains_less(
+    arm: Robot, arm_log: Callable[..., Log], pose_arm: Callable[..., Problem], share: float, reported: bool
 ) -> None:
     """The choice between load and motor torque has no error if the data determine it, and an infinite one if not."""
     recording = build_recording(arm, [arm_log(torque_noise=0.02)])
     ripple = Hypothesis(EFFECTS["torque_ripple"], 1)
     now = pose_arm(recording).situation
     X = ripple.effect.columns(now, 1, (40.0, 0.0, share))
-    coefficients = np.array([0.02, 0.0, 0.2, 0.1]) if told else np.array([0.5, 0.3, 0.0, 0.0])
+    coefficients = np.array([0.02, 0.0, 0.2, 0.1]) if reported else np.array([0.5, 0.3, 0.0, 0.0])
     problem = pose_arm(replace(recording, tau=recording.tau + X @ coefficients))
     member = refine(problem, ripple, (40.0, 0.0, 0.0), accept(problem, ()))
     error = shape_errors(problem, member, accept(problem, ()))[2]
-    assert error == (0.0 if told else np.inf)
-    if told:
+    assert error == (0.0 if reported else np.inf)
+    if reported:
         assert member.shape[2] == share
 
 
@@ -163,6 +163,6 @@ def test_a_change_between_two_logs_may_have_come_at_any_time_there(
 def test_a_moment_may_be_as_far_as_the_likelihood_drops_at_once(edge: float) -> None:
     """The interval reaches to a sudden drop of the likelihood, found to 2 %, on either side."""
     for way in (-1, 1):
-        told = _reach(lambda x, way=way: 30.0 if way * x > edge or way * x < -0.3 else 3.0, 0.0, 0.2, (-50.0, 50.0))
-        assert told == pytest.approx(edge, rel=0.02)
+        reported = _reach(lambda x, way=way: 30.0 if way * x > edge or way * x < -0.3 else 3.0, 0.0, 0.2, (-50.0, 50.0))
+        assert reported == pytest.approx(edge, rel=0.02)
     assert _reach(lambda x: 30.0, 0.0, 0.2, (-50.0, 50.0)) == 0.0

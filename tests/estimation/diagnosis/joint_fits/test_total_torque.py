@@ -95,8 +95,8 @@ def test_noise_that_is_cut_off_is_lost_on_average(hidden: tuple[Problem, np.ndar
     seen = replace(state, measured=measured, beyond=whole - state.torque, _cache={})
     column = CurrentClipping().local(seen, 1, (limit,))[:, 0]
     lost = cut.mean(axis=0) - levels
-    told = np.array([column[np.argmin(np.abs(whole[:, 0] - level))] for level in levels])
-    np.testing.assert_allclose(told, lost, atol=3 * 0.03 * limit / np.sqrt(5000) + 0.002 * limit)
+    reported = np.array([column[np.argmin(np.abs(whole[:, 0] - level))] for level in levels])
+    np.testing.assert_allclose(reported, lost, atol=3 * 0.03 * limit / np.sqrt(5000) + 0.002 * limit)
 
 
 @pytest.mark.slow

@@ -97,7 +97,7 @@ def test_logs_of_any_length_count(counted: tuple[Recording, np.ndarray, np.ndarr
     assert unbiased_frequencies(few, np.eye(1), noise[:10]) == np.inf
 
 
-def test_rows_at_rest_are_told_apart(counted: tuple[Recording, np.ndarray, np.ndarray]) -> None:
+def test_rows_at_rest_are_distinguished(counted: tuple[Recording, np.ndarray, np.ndarray]) -> None:
     """Adding an equally long rest does not change the frequency."""
     recording, _, noise = counted
     still = np.zeros((ROWS, 1))

@@ -239,7 +239,7 @@ def test_a_log_in_which_a_joint_stands_levels_no_noise(clean: Recording, pose_ar
 
 
 @pytest.mark.slow
-def test_a_vibration_above_the_band_is_told(recording: Recording, pose_arm: Callable[..., Problem]) -> None:
+def test_a_vibration_above_the_band_is_reported(recording: Recording, pose_arm: Callable[..., Problem]) -> None:
     """A steady oscillation between both cut-offs is significant with the rows above the band only."""
     size = 0.03
     cutoffs = [pose_arm(recording, wider=MAX_HIGH_BAND_ERROR).whitening.bands[0].cutoff]

@@ -175,8 +175,8 @@ def test_moments_of_reversals_are_as_wrong_as_is_said(arm: Robot, fourier_motion
     errors = turns - _crossings(dq[first : first + len(recording), 0])
     assert len(errors) >= 5
     assert recording.reversal_time_error is not None
-    usual, told = STEP * np.abs(errors), recording.reversal_time_error[turns.astype(int), 0]
-    assert 1 / 3 < np.sqrt(np.mean(told**2) / np.mean(usual**2)) < 3
+    usual, reported = STEP * np.abs(errors), recording.reversal_time_error[turns.astype(int), 0]
+    assert 1 / 3 < np.sqrt(np.mean(reported**2) / np.mean(usual**2)) < 3
 
 
 def _crossings(v: np.ndarray) -> np.ndarray:

@@ -91,14 +91,14 @@ def test_faults_of_a_recording_are_no_effects(arm: Robot, log: Log) -> None:
 
 
 @pytest.mark.slow
-def test_stretches_of_a_log_are_told_as_one_log(arm: Robot, log: Log) -> None:
+def test_stretches_of_a_log_are_reported_as_one_log(arm: Robot, log: Log) -> None:
     """A held-out log with a gap counts as one log in two stretches."""
     half = len(log) // 2
     other = log.rows(slice(half, None))
     middle = (other.duration / 2, other.duration / 2 + 0.5)
-    for unseen, told in ((other, ""), (_holed(other, middle), ", in 2 stretches")):
+    for unseen, reported in ((other, ""), (_holed(other, middle), ", in 2 stretches")):
         result = diagnose(arm, log.rows(slice(half)), held_out=unseen, candidates=FEW[:1], friction="coulomb-viscous")
-        assert result.how_unseen == f"1 log that the fit has not seen{told}"
+        assert result.how_unseen == f"1 log that the fit has not seen{reported}"
 
 
 @pytest.mark.parametrize("field", ["held_out", "logs"])
@@ -110,14 +110,14 @@ def test_a_log_in_other_units_is_refused(arm: Robot, log: Log, field: str) -> No
         diagnose(arm, logs["logs"], held_out=logs["held_out"])
 
 
-def test_what_an_effect_may_look_like_is_told_and_not_refused(arm: Robot, log: Log) -> None:
+def test_what_an_effect_may_look_like_is_reported_and_not_refused(arm: Robot, log: Log) -> None:
     """A wrong sign of the torque gives a note, because an effect may cause it."""
     result = repair_log(arm, replace(log, tau=-np.asarray(log.tau)), "Log 1")
     assert len(result.logs) == 1
     assert any("sign" in note for note in result.notes)
 
 
-def test_torques_of_another_unit_are_told_first(arm: Robot, log: Log) -> None:
+def test_torques_of_another_unit_are_reported_first(arm: Robot, log: Log) -> None:
     """If most joints' torques differ from the description by a factor, the first note says so."""
     result = repair_log(arm, replace(log, tau=log.tau / 100.0), "Log 1")
     assert result.notes[0].startswith(

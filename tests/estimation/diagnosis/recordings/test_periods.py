@@ -68,7 +68,7 @@ def test_the_projection_is_free_of_encoder_noise() -> None:
 
 @pytest.mark.parametrize("period", [10.0, 7.3219])
 @pytest.mark.parametrize("rounded", [True, False])
-def test_the_noise_of_the_mean_over_repetitions_is_told(period: float, rounded: bool) -> None:
+def test_the_noise_of_the_mean_over_repetitions_is_reported(period: float, rounded: bool) -> None:
     """The noise density of the mean is estimated to a third, also if rounding is the same in all repetitions."""
     q, _, _ = _motion(period, 8 * period)
     count = 2 * np.pi / 2**17

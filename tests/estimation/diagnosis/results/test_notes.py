@@ -11,7 +11,7 @@ from estimation.diagnosis.findings import Finding, Gain, Parameter
 from estimation.diagnosis.results.notes import LITTLE, beside_larger, turning_joints, unsure_gain, worse_joints
 
 
-def test_joints_that_the_extension_makes_worse_are_told() -> None:
+def test_joints_that_the_extension_makes_worse_are_reported() -> None:
     """Joints whose held-out error grows by more than a tenth and 0.1 % of the torque are noted; others are not."""
     before = np.array([0.050, 0.050, 0.0005, 0.050, np.nan])
     after = np.array([0.051, 0.074, 0.0012, 0.080, np.nan])
@@ -46,8 +46,8 @@ def test_a_name_of_which_nothing_is_determined_is_no_more_than_likely() -> None:
             for known in determined
         )
         gain = Gain(nrmse_before=0.04, nrmse_after=0.036, ci95=(-0.01, 0.014))
-        told = {"p_value": 0.0, "delta_bic": 90.0, "rivals": (), "sentence": "", "visible": 1.0, "coordinate": ""}
-        return Finding(effect=effect, joint=2, parameters=parameters, gain=gain, **told)
+        reported = {"p_value": 0.0, "delta_bic": 90.0, "rivals": (), "sentence": "", "visible": 1.0, "coordinate": ""}
+        return Finding(effect=effect, joint=2, parameters=parameters, gain=gain, **reported)
 
     open_ = unsure_gain(finding("stribeck", False, False))
     assert open_.startswith("The held-out gain of stribeck of joint 2 is not significant")
@@ -56,7 +56,7 @@ def test_a_name_of_which_nothing_is_determined_is_no_more_than_likely() -> None:
         assert unsure_gain(other).endswith("its interval includes zero.")
 
 
-def test_what_is_as_small_as_formulas_leave_is_told_all_the_same() -> None:
+def test_what_is_as_small_as_formulas_leave_is_reported_all_the_same() -> None:
     """An effect that is small beside a stronger one on its joint is noted, with its share of that one's gain."""
     step, delay, friction, spring = (
         SimpleNamespace(

@@ -73,8 +73,8 @@ def test_an_interval_holds_what_machines_may_have(arm: Robot) -> None:
     assert not exponent.determined
 
 
-@pytest.mark.parametrize(("error", "told"), [(0.02, True), (0.3, False)])
-def test_levers_that_are_perhaps_none_have_no_dead_centre(arm: Robot, error: float, told: bool) -> None:
+@pytest.mark.parametrize(("error", "reported"), [(0.02, True), (0.3, False)])
+def test_levers_that_are_perhaps_none_have_no_dead_centre(arm: Robot, error: float, reported: bool) -> None:
     """A dead centre is determined only if the lever ratio is significantly above zero."""
     coefficients = np.array([400.0, -300.0, 0.0, 900.0])
     member = FittedEffect(Hypothesis(EFFECTS["spring"], 1), (0.3, -2.9, 3.0), None, 100.0, coefficients, 6, 1.0)  # type: ignore[arg-type]
@@ -85,8 +85,8 @@ def test_levers_that_are_perhaps_none_have_no_dead_centre(arm: Robot, error: flo
     fitted: Any = SimpleNamespace(model=SimpleNamespace(extensions=[extension]))
     centre = _parameters(arm, member, fitted, 0, np.ones(7, dtype=bool))[-1]
     assert centre.name == "dead_centre"
-    assert centre.determined is told
-    assert bool(np.isfinite(centre.ci95).all()) is told
+    assert centre.determined is reported
+    assert bool(np.isfinite(centre.ci95).all()) is reported
 
 
 def test_what_is_no_part_of_the_model_says_so() -> None:
@@ -114,16 +114,16 @@ def finding_of(pattern: str, finding: Finding) -> Finding:
     return replace(finding, effect="unexplained", pattern=pattern)
 
 
-def test_a_gain_elsewhere_is_told_with_its_joints() -> None:
+def test_a_gain_elsewhere_is_reported_with_its_joints() -> None:
     """A gain on other joints than the finding's own is stated with these joints."""
     gain = Gain(nrmse_before=0.02, nrmse_after=0.01, ci95=(0.0, 0.02))
     bare: Any = {"effect": "encoder_offset", "parameters": (), "p_value": 0.0, "delta_bic": 9.0, "rivals": ()}
     bare |= {"sentence": "", "visible": 1.0}
-    told = {
+    reported = {
         joints: Finding(joint=4, gain=replace(gain, joints=joints), **bare).elsewhere
         for joints in ((), (4,), (5, 6), (5,))
     }
-    assert told == {(): "", (4,): "", (5, 6): " of joints 5, 6", (5,): " of joint 5"}
+    assert reported == {(): "", (4,): "", (5, 6): " of joints 5, 6", (5,): " of joint 5"}
 
 
 @pytest.mark.parametrize("effect", ["thermal_friction", "load_heat"])

@@ -116,13 +116,15 @@ def test_kicks_without_the_rest_are_no_effect(problem: Problem) -> None:
     member = _elastic(problem)
     nothing = accept(problem, ())
     parts = score(problem, problem.split(member.group, member.coefficients, problem.far_from_reversals), nothing)
-    assert parts.gram.sum(axis=1)[0] ** 2 / parts.gram[0, 0] > 20, "calm rows tell too little for this test"
+    assert parts.gram.sum(axis=1)[0] ** 2 / parts.gram[0, 0] > 20, "calm rows show too little for this test"
     assert _reversal_scatter(_with(problem, member, -0.2, 1.0), member, nothing) == np.inf
     assert 1.0 < _reversal_scatter(_with(problem, member, 0.55, 2.0), member, nothing) < np.inf
 
 
-@pytest.mark.parametrize(("aside", "told"), [(1.0, True), (0.0, False), (0.3, False)])
-def test_a_delay_must_be_told_aside_from_the_kicks_of_a_play(problem: Problem, aside: float, told: bool) -> None:
+@pytest.mark.parametrize(("aside", "reported"), [(1.0, True), (0.0, False), (0.3, False)])
+def test_a_delay_must_be_reported_aside_from_the_kicks_of_a_play(
+    problem: Problem, aside: float, reported: bool
+) -> None:
     """A delay that shows only near the impacts of backlash is not supported."""
     reach = round(ANSWERS / (problem.recording.step * problem.whitening.stride))
     # The link must cross seldom enough that rows without impacts are left.
@@ -138,7 +140,7 @@ def test_a_delay_must_be_told_aside_from_the_kicks_of_a_play(problem: Problem, a
     group = problem.measured(lag, at)
     late = FittedEffect(lag, at, group, 1e4, np.array([50.0 / np.sqrt(group.gram[0, 0])]), 1, 1.0)
     data = _sized(problem, late, np.where(near, 1.0, aside))
-    assert delay_supported_away_from_impacts(data, late, [play]) is told
+    assert delay_supported_away_from_impacts(data, late, [play]) is reported
     # Without an effect that causes impacts, no support is required.
     assert delay_supported_away_from_impacts(data, late, [])
 

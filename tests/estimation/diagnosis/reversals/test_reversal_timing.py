@@ -72,7 +72,7 @@ def _timed(robot: Robot, log: Log) -> ReversalTiming:
 @pytest.mark.parametrize(
     ("seed", "late"), [pytest.param(1006, True, marks=pytest.mark.longer), (1011, True), (1011, False)]
 )
-def test_torque_that_is_late_is_told_by_each_joints_reversals(cases: Callable, seed: int, late: bool) -> None:
+def test_torque_that_is_late_is_reported_by_each_joints_reversals(cases: Callable, seed: int, late: bool) -> None:
     """Each joint's delay is within four standard errors, and their mean within three, which fails once in a thousand.
 
     With these encoders the reversals of low-passed motion are known to some milliseconds only.
@@ -80,12 +80,12 @@ def test_torque_that_is_late_is_told_by_each_joints_reversals(cases: Callable, s
     case, robot, log = cases(seed, late)
     delay = case.effects[0].amount if late else 0.0
     timing = _timed(robot, log)
-    told = np.isfinite(timing.errors)
-    assert told.sum() >= 3
-    away = (timing.lags - delay)[told] / timing.errors[told]
+    reported = np.isfinite(timing.errors)
+    assert reported.sum() >= 3
+    away = (timing.lags - delay)[reported] / timing.errors[reported]
     assert np.abs(away).max() < 4.0
-    weights = timing.errors[told] ** -2
-    assert abs(weights @ (timing.lags - delay)[told]) < 3.0 * np.sqrt(weights.sum())
+    weights = timing.errors[reported] ** -2
+    assert abs(weights @ (timing.lags - delay)[reported]) < 3.0 * np.sqrt(weights.sum())
     # The error is at most 0.5 ms, with a sample period of 4 ms.
     assert weights.sum() ** -0.5 < 5e-4
 
@@ -168,10 +168,10 @@ def test_joints_whose_rows_count_are_timed_where_that_tells_far_more(recording: 
             trusted=np.array([True, False]),
             reversal_time_error=np.full(recording.q.shape, late),
         )
-        told = timing.beside(counting)
-        assert told is not None
-        np.testing.assert_array_equal(np.isfinite(told.errors), kept)
-        np.testing.assert_array_equal(told.residual[~np.array(kept)], 0.0)
+        reported = timing.beside(counting)
+        assert reported is not None
+        np.testing.assert_array_equal(np.isfinite(reported.errors), kept)
+        np.testing.assert_array_equal(reported.residual[~np.array(kept)], 0.0)
     both = replace(
         recording,
         sign_known_from_velocity=everywhere,
@@ -198,8 +198,8 @@ def test_what_reversals_tell_counts_as_one_row_for_each_joint(
         assert after.cross == pytest.approx(before.cross + product)
         assert problem.product(after, after) == pytest.approx(after.gram, rel=1e-4)
     delay = Hypothesis(EFFECTS["time_delay"], None)
-    told = [per_joint_evidence(p, delay, (2e-3,), accept(p, ())) for p in (plain, problem)]
-    assert told[1].gram - told[0].gram == pytest.approx([4e6, 0.0], abs=1e-3 * told[0].gram.max())
+    reported = [per_joint_evidence(p, delay, (2e-3,), accept(p, ())) for p in (plain, problem)]
+    assert reported[1].gram - reported[0].gram == pytest.approx([4e6, 0.0], abs=1e-3 * reported[0].gram.max())
     # The fitted coefficient, and the prior on it, are those of rows and reversals together.
     member = refine(problem, delay, (2e-3,), accept(problem, ()))
     rows = score(plain, plain.measured(delay, member.shape), accept(plain, ()))
@@ -222,10 +222,10 @@ def test_reversals_of_a_thinned_log_are_timed_by_all_its_samples(
     assert recording.full_rate is not None
     assert recording.step == pytest.approx(2 * recording.full_rate.step)
     thinned = _timed(robot, log)
-    told = np.isfinite(thinned.errors)
-    assert told.sum() >= 3
-    assert np.abs((thinned.lags - case.effects[0].amount) / thinned.errors)[told].max() < 4.0
-    both = told & np.isfinite(plain.errors)
+    reported = np.isfinite(thinned.errors)
+    assert reported.sum() >= 3
+    assert np.abs((thinned.lags - case.effects[0].amount) / thinned.errors)[reported].max() < 4.0
+    both = reported & np.isfinite(plain.errors)
     # The base model is fitted to half of the rows, so the width of its sign may differ by chance.
     assert np.all(np.abs(thinned.lags - plain.lags)[both] < np.hypot(plain.errors, thinned.errors)[both])
     monkeypatch.setattr(log_reading, "MOST_FINE", 10_000)

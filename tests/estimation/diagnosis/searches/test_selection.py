@@ -125,5 +125,5 @@ def _rivals(
         found=(selection.SelectedEffect(member(A, bic, worth), 1e-30),),  # type: ignore[arg-type]
         visible_in_torque=frozenset(seen),
     )
-    told = selection.with_rivals(SimpleNamespace(rows=1000), [], chosen)  # type: ignore[arg-type]
-    return told.found[0].rivals  # type: ignore[return-value]
+    reported = selection.with_rivals(SimpleNamespace(rows=1000), [], chosen)  # type: ignore[arg-type]
+    return reported.found[0].rivals  # type: ignore[return-value]

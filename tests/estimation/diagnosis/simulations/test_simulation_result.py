@@ -57,7 +57,7 @@ def test_the_simulated_robot_comes_nearer_with_what_was_found(found: Diagnosis) 
     assert "Forward simulation, joint 2: controller correction" in found.summary()
 
 
-def test_what_grows_worse_is_told_before_what_hardly_grows_better() -> None:
+def test_what_grows_worse_is_reported_before_what_hardly_grows_better() -> None:
     """The summary describes the joint that changes most, for better or worse."""
     still = np.zeros(2)
     torque = (np.array([0.0231, 0.042]), np.array([0.0230, 0.051]))

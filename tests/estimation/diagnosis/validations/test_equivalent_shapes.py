@@ -95,7 +95,7 @@ def test_a_form_that_fits_worse_is_not_listed(
 
 
 @pytest.mark.slow
-def test_a_tilt_is_told_beside_the_first_axis_own_moments() -> None:
+def test_a_tilt_is_reported_beside_the_first_axis_own_moments() -> None:
     """With the first axis' moments fitted, tilt angles are within 3 standard errors; without them they are biased.
 
     The chance that one of the two angles is not is 1 in 180.

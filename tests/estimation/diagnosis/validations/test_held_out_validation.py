@@ -111,7 +111,7 @@ def test_a_name_that_surely_harms_is_left_out_with_a_note() -> None:
 
 
 @pytest.mark.parametrize(
-    ("p_value", "kind", "named", "told"),
+    ("p_value", "kind", "named", "reported"),
     [
         (1e-4, "load", False, False),
         (1e-10, "load", False, True),
@@ -122,7 +122,7 @@ def test_a_name_that_surely_harms_is_left_out_with_a_note() -> None:
     ],
 )
 def test_a_faint_free_function_that_unseen_data_deny_is_noise(
-    p_value: float, kind: str, named: bool, told: bool
+    p_value: float, kind: str, named: bool, reported: bool
 ) -> None:
     """A free function with a weak p-value and contradicting held-out data is dropped as noise if nothing else is found.
 
@@ -134,13 +134,13 @@ def test_a_faint_free_function_that_unseen_data_deny_is_noise(
     bench.shows[free.hypothesis.label] = HARMS
     founds = (SelectedEffect(STRIBECK, 1e-5, ()),) if named else ()
     result = validated(bench, *founds, free=[free], p_values=[p_value])
-    assert [member for member, *_ in result.rejected_discrepancies] == ([free] if told else [])
+    assert [member for member, *_ in result.rejected_discrepancies] == ([free] if reported else [])
     assert not result.refuted
     assert len(result.changes) == 1
 
 
 @pytest.mark.parametrize("shown", [HELPS, HARMS])
-def test_what_a_refuted_name_was_for_is_told_as_unexplained(shown: Shown) -> None:
+def test_what_a_refuted_name_was_for_is_reported_as_unexplained(shown: Shown) -> None:
     """A free function replaces a rejected finding; it is in the model only if it passes the validation."""
     free = member_of("pattern:load:0:odd", 2)
     bench = bench_with(spring=HARMS)
@@ -204,7 +204,7 @@ def test_a_close_rival_that_helps_takes_the_place() -> None:
 
 
 @pytest.mark.parametrize("shown", [HARMS, IDLE, Shown(kept=0.1), Shown(rise=1.1)])
-def test_a_rival_that_is_not_borne_out_takes_no_place(shown: Shown) -> None:
+def test_a_rival_that_is_not_confirmed_takes_no_place(shown: Shown) -> None:
     """A rival that harms, or does not significantly help, does not replace a finding."""
     result = validated(
         bench_with(spring=HARMS, stribeck=shown), SelectedEffect(SPRING, 1e-9, ((STRIBECK, 1.0),)), held_out=False
@@ -231,7 +231,7 @@ def test_the_surest_goes_first_and_others_are_measured_anew() -> None:
     assert "spring" in state_change(result.changes[0])
 
 
-def test_a_free_function_that_errs_is_told_and_no_part_of_the_model() -> None:
+def test_a_free_function_that_errs_is_reported_and_no_part_of_the_model() -> None:
     """A rejected free function is reported with p-value and gain, but not part of the model."""
     bench = bench_with(load=HARMS)
     result = validated(bench, SelectedEffect(SPRING, 1e-9, ()), free=[FREE, SWING], p_values=[1e-4, 1e-3])
@@ -265,7 +265,7 @@ def test_free_functions_that_harm_together_are_left_out_until_they_do_not(extra:
     assert [member for member, *_ in result.rejected_discrepancies] == ([] if kept == 2 else [FREE])
 
 
-def test_what_errs_on_all_joints_is_told_of_the_whole_robot() -> None:
+def test_what_errs_on_all_joints_is_reported_of_the_whole_robot() -> None:
     """A rejected function of all joints is reported for the whole robot."""
     result = validated(bench_with(swinging=HARMS), free=[SWING], p_values=[1e-10])
     assert [member for member, _, _ in result.rejected_discrepancies] == [SWING]

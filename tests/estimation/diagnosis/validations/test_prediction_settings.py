@@ -75,8 +75,8 @@ def test_its_band_holds_most_errors_on_other_unseen_motions(
     shares = np.mean([predict(model, one).band_coverage for one in more], axis=0)
     assert np.all(np.abs(shares - 0.95) < 0.05)
     covered = model.provenance["band95_coverage"]
-    told = np.array(model.provenance["unseen_nrmse"])
-    np.testing.assert_allclose(told, predict(model, other).nrmse, rtol=1e-9 if held_out else 0.2)
+    reported = np.array(model.provenance["unseen_nrmse"])
+    np.testing.assert_allclose(reported, predict(model, other).nrmse, rtol=1e-9 if held_out else 0.2)
     assert np.allclose(covered, 0.95, atol=0.03) if held_out else covered == [None, None]
 
 
@@ -95,9 +95,9 @@ def test_heat_of_the_logs_before_counts_in_its_errors(quiet: Model, arm_log: Cal
     model = replace(quiet, extensions=(heat,))
     parts = np.ones((50, 2))
     unseen = HeldOutErrors("", np.arange(50.0), 1.0, parts, (parts, parts), parts > 0, None)
-    told = with_band(model, [first], [other], unseen).provenance["unseen_nrmse"]
+    reported = with_band(model, [first], [other], unseen).provenance["unseen_nrmse"]
     warm, cold = predict(model, other, before=[first]).nrmse, predict(model, other).nrmse
-    np.testing.assert_allclose(told, warm, rtol=1e-9)
+    np.testing.assert_allclose(reported, warm, rtol=1e-9)
     assert warm[1] > 1.05 * cold[1]
 
 

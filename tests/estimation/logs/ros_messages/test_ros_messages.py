@@ -229,7 +229,7 @@ def test_topic_with_efforts_of_the_robots_joints_is_chosen(tmp_path):
         read_log(path, 7, joints=NAMES, mapping=LogMapping(topic="/other"))
 
 
-def test_topics_that_cannot_be_told_apart_are_listed(tmp_path):
+def test_topics_that_cannot_be_distinguished_are_listed(tmp_path):
     """Two topics with all joints and efforts need a choice."""
     bag = Bag(tmp_path / "log", "db3")
     for row in range(3):

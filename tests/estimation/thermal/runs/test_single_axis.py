@@ -95,7 +95,7 @@ def test_stretches_of_constant_speed_are_found() -> None:
         assert np.ptp(np.abs(v[stretch])) < 0.02 * abs(v[stretch].mean())
 
 
-def test_what_cannot_be_told_is_said() -> None:
+def test_what_cannot_be_reported_is_said() -> None:
     """A single speed, no constant speed, and arrays of other shapes are named."""
     t, q, dq, ddq = swings()
     with pytest.raises(NotIdentifiableError, match="separately"):

@@ -53,11 +53,13 @@ def test_description_is_the_known_robot_and_not_the_true_one(kind: str, tmp_path
     read = pin.buildModelFromXML(urdf_of(machine.known, kind))
     rng = np.random.default_rng(2)
     q, v, a = rng.normal(size=(3, 20, machine.n))
-    told = rigid_torque(read, q, v, a)
+    reported = rigid_torque(read, q, v, a)
     # The file holds 9 to 12 digits.
-    np.testing.assert_allclose(told, rigid_torque(machine.known, q, v, a), rtol=1e-6, atol=1e-6 * np.abs(told).max())
-    off = rigid_torque(machine.model, q, v, a) - told
-    assert 0.005 < np.sqrt((off**2).mean() / (told**2).mean()) < 0.15
+    np.testing.assert_allclose(
+        reported, rigid_torque(machine.known, q, v, a), rtol=1e-6, atol=1e-6 * np.abs(reported).max()
+    )
+    off = rigid_torque(machine.model, q, v, a) - reported
+    assert 0.005 < np.sqrt((off**2).mean() / (reported**2).mean()) < 0.15
 
 
 @pytest.mark.parametrize("draw", [draw_periodic, draw_aperiodic, draw_moves])
@@ -280,13 +282,15 @@ def test_a_stranger_shows_beyond_the_base_model_and_its_own_column_brings_a_gain
     """An effect outside the catalogue has the wanted visible size, and its true column improves held-out prediction."""
     case = draw_case(17, hide=[CrossWave], size=0.03, kind="er3a", periodic=True, duration=20.0, unseen=20.0)
     assert case.visible()[0] == pytest.approx(0.03, rel=0.15)
-    told = ask_oracle(case, logged=True)
+    reported = ask_oracle(case, logged=True)
     # 3 % squared is 9e-4 in the logs. Another motion shows more or less, and 20 s of noise change it by 1e-4.
-    gain = ((told.before - told.after) / case.level() ** 2)[case.effects[0].j]
+    gain = ((reported.before - reported.after) / case.level() ** 2)[case.effects[0].j]
     assert 3e-4 < gain < 5e-3
     # A function of joint positions is known as well from the encoders.
-    assert told.as_measured is not None
-    assert ((told.before - told.as_measured) / case.level() ** 2)[case.effects[0].j] == pytest.approx(gain, rel=0.05)
+    assert reported.as_measured is not None
+    assert ((reported.before - reported.as_measured) / case.level() ** 2)[case.effects[0].j] == pytest.approx(
+        gain, rel=0.05
+    )
 
 
 def test_presliding_starts_where_it_slips() -> None:

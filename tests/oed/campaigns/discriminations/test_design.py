@@ -1,4 +1,4 @@
-"""The experiment that tells two effects apart, before there is a log."""
+"""The experiment that separates two effects, before there is a log."""
 
 from __future__ import annotations
 
@@ -111,7 +111,7 @@ def test_more_noise_needs_larger_effects(two: Robot, found: Discrimination) -> N
 
 
 def test_the_experiment_beats_the_reference_alone(found: Discrimination) -> None:
-    """What is proposed tells smaller effects apart than repeating the reference does."""
+    """What is proposed separates smaller effects than repeating the reference does."""
     repeated = next(judged for judged in found.ranking if judged.kind == "repeat")
     assert found.ranking[0].energy >= repeated.energy
 

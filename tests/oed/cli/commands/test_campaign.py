@@ -84,7 +84,7 @@ def test_without_a_design_a_quick_one_is_made(run: Callable[..., Any], robot: Pa
         (("--torque-margin", 0.99), 1, "joint"),
     ],
 )
-def test_bad_input_is_told_in_one_line(
+def test_bad_input_is_reported_in_one_line(
     run: Callable[..., Any],
     robot: Path,
     experiment: Path,

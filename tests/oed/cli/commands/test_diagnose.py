@@ -85,7 +85,7 @@ def test_its_files_are_of_use(done: Path) -> None:
 
 
 def test_limits_before_any_experiment(run, robot: Path, experiment: Path, tmp_path: Path) -> None:
-    """With --limits, a trajectory alone tells what it could show, and what it could not."""
+    """With --limits, a trajectory alone shows what it could show, and what it could not."""
     line = ("diagnose", "--limits", "--robot", robot, "--trajectory", experiment / "trajectory.csv", "--out", tmp_path)
     result = run(*line, "--json")
     assert result.code == 0, result.err
@@ -166,7 +166,7 @@ def test_a_model_knows_its_robot(run, done: Path, experiment: Path, tmp_path: Pa
         (("--limits", "--trajectory", "nowhere.csv"), "nowhere.csv"),
     ],
 )
-def test_bad_use_is_told(arguments, message, run, robot: Path, tmp_path: Path) -> None:
+def test_bad_use_is_reported(arguments, message, run, robot: Path, tmp_path: Path) -> None:
     """A call that means nothing, and files that are not there, end with code 2, the reason, and no file."""
     result = run("diagnose", "--robot", robot, *arguments, "--out", tmp_path / "out")
     assert result.code == 2
@@ -179,12 +179,12 @@ def test_bad_use_is_told(arguments, message, run, robot: Path, tmp_path: Path) -
 def test_logs_with_clocks_of_their_own(data: Callable[[str], Path], run: Callable[..., Any], tmp_path: Path) -> None:
     """Logs that overlap are put one after the other as --own-clocks does, and that is said; one log twice is refused.
 
-    One of the folder's four rings in saturation and tells nothing of the arm: it is left out, and that is said.
+    One of the folder's four rings in saturation and shows nothing of the arm: it is left out, and that is said.
     """
     folder = data("simple_pendulum_dfki")
     line = ["diagnose", "--robot", folder / "simple_pendulum.urdf", "--log", folder]
     texts = []
-    for name, clocks in (("alone", ()), ("told", ("--own-clocks",))):
+    for name, clocks in (("alone", ()), ("reported", ("--own-clocks",))):
         done = run(*line, "--out", tmp_path / name, *clocks)
         assert done.code == 0, done.err
         assert "hand_guiding" in done.out

@@ -52,7 +52,7 @@ def test_bad_options_end_with_one_message_and_no_folder(
 
 @pytest.mark.slow
 def test_a_log_that_does_not_tell_the_payload_ends_with_code_1(run, experiment: Path, tmp_path: Path) -> None:
-    """Two joints cannot tell a payload's centre; the message names a motion, and nothing is written."""
+    """Two joints cannot show a payload's centre; the message names a motion, and nothing is written."""
     out = tmp_path / "out"
     done = run("payload", "--model", experiment, "--log", experiment / "log.csv", "--out", out)
     assert done.code == 1, done.err
@@ -90,7 +90,7 @@ def test_two_logs_give_a_payload_a_report_and_controller_files(run, tmp_path: Pa
     assert {file.name for file in out.iterdir()} == {"payload.json", "report.html", *files}
     assert json.loads((out / "payload.json").read_text()) == data
     mass, *centre = data["quantities"][:4]
-    # The noise is 2 % of the torque: 16 s tell the mass to a per cent.
+    # The noise is 2 % of the torque: 16 s show the mass to a per cent.
     assert mass["value"] == pytest.approx(1.5, rel=0.03)
     assert [item["value"] for item in centre] == pytest.approx([0.02, -0.01, 0.08], abs=0.005)
     page = (out / "report.html").read_text()

@@ -56,8 +56,8 @@ def logs(robot: Path, experiment: Path, tmp_path_factory: pytest.TempPathFactory
     (folder / "logs").mkdir()
     for k, (m, (_, _, duty)) in enumerate(zip(motions, plan, strict=True)):
         log = simulate(plant, m, seed=k, warmth=warmth)
-        told: dict[str, Any] = {"run": 1 + round(2 * (1 - duty)), "duty": duty} if duty else {}
-        write_log(folder / "logs" / f"{k}.parquet", replace(log, metadata=told))
+        reported: dict[str, Any] = {"run": 1 + round(2 * (1 - duty)), "duty": duty} if duty else {}
+        write_log(folder / "logs" / f"{k}.parquet", replace(log, metadata=reported))
     return folder / "logs"
 
 
@@ -95,7 +95,7 @@ def test_the_model_predicts_cold_and_warm(done: Path, robot: Path, logs: Path) -
 def test_predictions_follow_the_heat(run: Callable[..., Any], done: Path, logs: Path, tmp_path: Path) -> None:
     """The last log, 14 minutes in, is predicted better after the logs before it than as a cold start; both are said."""
     errors = []
-    for options, told in (
+    for options, reported in (
         ((), "assumed cold"),
         (("--before", logs / "0.parquet", "--before", logs / "1.parquet"), "2 earlier logs"),
     ):
@@ -104,7 +104,7 @@ def test_predictions_follow_the_heat(run: Callable[..., Any], done: Path, logs: 
             *options, "--force", "--json",
         )  # fmt: skip
         assert ended.code == 0, ended.err
-        assert told in ended.data["heat"]
+        assert reported in ended.data["heat"]
         errors.append(ended.data["error_rms"])
     # The band is that of ten minutes; a quarter of a minute, warm and slower, may differ by some percent.
     assert np.all(np.abs(np.array(ended.data["band95_coverage"]) - 0.95) < 0.05)
@@ -132,7 +132,7 @@ def test_the_page_shows_time_powers_and_curves(done: Path) -> None:
 
 
 def test_results_are_not_overwritten(run: Callable[..., Any], done: Path, robot: Path, logs: Path) -> None:
-    """A folder with results is kept without --force, told before anything is computed."""
+    """A folder with results is kept without --force, reported before anything is computed."""
     ended = run("thermal", "--robot", robot, "--log", logs, "--out", done)
     assert ended.code == 2
     assert "--force" in ended.err or "exists" in ended.err
@@ -147,7 +147,7 @@ def test_results_are_not_overwritten(run: Callable[..., Any], done: Path, robot:
         (("--ambient", 293.15), "kelvin"),
     ],
 )
-def test_wrong_options_are_told(
+def test_wrong_options_are_reported(
     run: Callable[..., Any], robot: Path, logs: Path, tmp_path: Path, options: tuple[Any, ...], message: str
 ) -> None:
     """An unknown model, a joint that is not there, a rising friction and kelvins end with one message and code 2."""
@@ -158,7 +158,7 @@ def test_wrong_options_are_told(
     assert not (tmp_path / "out").exists()
 
 
-def test_a_robot_at_rest_is_told(run: Callable[..., Any], robot: Path, tmp_path: Path) -> None:
+def test_a_robot_at_rest_is_reported(run: Callable[..., Any], robot: Path, tmp_path: Path) -> None:
     """Logs without motion end with code 1 or 2 and one message."""
     t = np.arange(0.0, 20.0, 0.01)
     rng = np.random.default_rng(0)

@@ -62,7 +62,7 @@ def test_limits_hold_between_the_samples(problem: FourierProblem) -> None:
 
 
 def test_shrinking(problem: FourierProblem) -> None:
-    """What keeps the limits is left as it is; what does not keeps its shape, and goes as far as told."""
+    """What keeps the limits is left as it is; what does not keeps its shape, and goes as far as stated."""
     for z in points(problem, 5):
         kept = problem.shrunk(1e-3 * z)
         np.testing.assert_array_equal(kept, 1e-3 * z)

@@ -72,13 +72,13 @@ def test_the_summary_says_what_changed(result):
 
 def test_the_file_says_what_changed(result):
     """The data of design.json are JSON without NaN and hold durations, torques, use of limits and the verdict."""
-    told = json.loads(json.dumps(result.to_dict(), allow_nan=False))["retiming"]
-    assert told["duration_after"] < told["duration_before"]
-    assert told["given_keeps_limits"] is True
-    assert told["verdict"] == result.retimed.verdict()
+    reported = json.loads(json.dumps(result.to_dict(), allow_nan=False))["retiming"]
+    assert reported["duration_after"] < reported["duration_before"]
+    assert reported["given_keeps_limits"] is True
+    assert reported["verdict"] == result.retimed.verdict()
     for when in ("torque_before", "torque_after"):
-        assert len(told[when]["peak"]) == len(told[when]["rms"]) == 6
-    assert set(told["usage"]) == set(told["usage_before"]) == {"velocity", "acceleration", "jerk", "torque"}
+        assert len(reported[when]["peak"]) == len(reported[when]["rms"]) == 6
+    assert set(reported["usage"]) == set(reported["usage_before"]) == {"velocity", "acceleration", "jerk", "torque"}
 
 
 def test_it_reads_back_what_it_saved(result, robot, tmp_path):

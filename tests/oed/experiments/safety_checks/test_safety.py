@@ -88,7 +88,7 @@ def test_the_rms_torque_decides(er3a):
 
 
 @pytest.mark.slow
-def test_an_rms_limit_below_gravity_is_told_first(er3a):
+def test_an_rms_limit_below_gravity_is_reported_first(er3a):
     """A joint whose motor cannot hold the home pose for long is named, with the limit that would do."""
     bound = np.full(6, np.inf)
     bound[1] = 1.0
@@ -96,7 +96,7 @@ def test_an_rms_limit_below_gravity_is_told_first(er3a):
         design(replace(er3a, limits=replace(er3a.limits, torque_rms=bound)))
 
 
-def test_a_limit_below_gravity_is_told_first(er3a):
+def test_a_limit_below_gravity_is_reported_first(er3a):
     """A joint that cannot hold the home pose is named, with the torque that would do, before any search."""
     with pytest.raises(InfeasibleError, match=r"joint \d: holding the pose takes .* or more"):
         design(weaker(er3a, 0.05))
@@ -130,7 +130,7 @@ def test_strokes_that_would_collide_are_left_out_or_free():
 
 @pytest.mark.slow
 def test_a_home_in_collision_is_refused(er3a, free_design):
-    """A start pose that the user states and that collides is told with the pair and the depth."""
+    """A start pose that the user states and that collides is reported with the pair and the depth."""
     motion = free_design.motion
     report = check_motion(collision_model(er3a), motion, confirm=False)
     home = motion.q[np.argmin(np.abs(motion.t - report.time[report.worst]))]
@@ -162,7 +162,7 @@ def test_a_second_experiment_adds_what_the_first_lacks(er3a):
     ],
 )
 def test_options_out_of_range_are_refused(er3a, options, message):
-    """Each wrong option is told with what is allowed."""
+    """Each wrong option is reported with what is allowed."""
     with pytest.raises(InputError, match=message):
         design(er3a, **options)
 
@@ -179,7 +179,7 @@ def test_scaling_is_reported_beside_the_plain_numbers(er3a, scaling):
 
 @pytest.mark.slow
 def test_essential_parameters_only(er3a, free_design, tmp_path):
-    """With a share stated, columns whose torque is below it are left out, and what is left is easier to tell apart."""
+    """With a share stated, columns whose torque is below it are left out, and what is left is easier to separate."""
     whole, part = free_design, design(er3a, essential=0.02)
     assert set(part.base.names) < set(whole.base.names)
     assert part.optimised.value("cond") < whole.optimised.value("cond")

@@ -80,7 +80,7 @@ def view():
         unseen="a log that the fit has not seen",
         limits=LIMITS,
         next_kind="constant speeds",
-        next_why="it would tell them apart",
+        next_why="it would show them apart",
         next_resolves=0.98,
         next_ranking=(("constant speeds", 0.98, 60.0),),
     )
@@ -130,7 +130,7 @@ def test_a_page_without_findings(verdict, expected, found, following, level, vie
 
 
 @pytest.mark.slow
-def test_no_chance_is_told_that_nobody_knows(view):
+def test_no_chance_is_reported_that_nobody_knows(view):
     """What the smallest number of a computer says of a probability is no probability."""
     sure = replace(view, findings=(replace(view.findings[0], p_value=2.2e-308),))
     text = render(diagnosis_page(sure))
@@ -148,14 +148,14 @@ def test_what_brings_nothing_explains_nothing(interval, stated, view):
     assert any(found.text == finding.sentence for found in page.findings)
 
 
-def test_the_error_of_every_row_is_told_where_it_is_known(view):
+def test_the_error_of_every_row_is_reported_where_it_is_known(view):
     """Beside the error of rows that count stands that of `oed predict`, which has them all."""
     (table,) = next(s for s in diagnosis_page(view).sections if s.title.startswith("Measured")).tables
     assert table.headings[-1] == "all rows [%]"
     assert [row[-1] for row in table.rows] == [pytest.approx(7.0), None]
 
 
-def test_the_error_told_is_that_of_a_joint_with_a_finding(view):
+def test_the_error_reported_is_that_of_a_joint_with_a_finding(view):
     """Another joint may change by more, for what the base model makes of it: that is not what was found."""
     page = diagnosis_page(replace(view, nrmse_before=np.array([0.2, 0.1]), nrmse_after=np.array([0.1, 0.11])))
     assert page.facts[1].label == "Error of joint 2, held-out data"
@@ -165,7 +165,7 @@ def test_the_error_told_is_that_of_a_joint_with_a_finding(view):
 
 
 @pytest.mark.slow
-def test_what_has_no_name_is_not_told_to_need_no_experiment(view):
+def test_what_has_no_name_is_not_stated_to_need_no_experiment(view):
     """Findings without a name leave the cause open: the page says how to look for it."""
     named, unexplained = (
         render(diagnosis_page(replace(view, verdict=verdict, next_kind=""))) for verdict in ("named", "unexplained")
@@ -185,7 +185,7 @@ def test_a_rare_rival_that_fits_as_well_is_not_passed_over(view):
 
 
 @pytest.mark.slow
-def test_what_to_play_next_is_told(view):
+def test_what_to_play_next_is_reported(view):
     """The page lists which motion is played when, with what payload and base, and where the motion comes from."""
     run = {"motion": 1, "pause_s": 2.0, "payload_kg": 0.0, "gravity": None}
     tilted = run | {"pause_s": 60.0, "payload_kg": 4.5, "gravity": [2.54, 0.0, -9.475]}
@@ -194,8 +194,8 @@ def test_what_to_play_next_is_told(view):
         assert part in text, part
 
 
-def test_a_note_is_told_of_the_places_it_is_of():
-    """Effects that one note is of on different joints are not told as if it were of all of them on all joints."""
+def test_a_note_is_reported_of_the_places_it_is_of():
+    """Effects that one note is of on different joints are not stated as if it were of all of them on all joints."""
     hidden = [
         Limit(
             effect=effect,
@@ -218,7 +218,7 @@ def test_a_note_is_told_of_the_places_it_is_of():
 
 
 @pytest.mark.slow
-def test_the_simulated_motion_is_told(view):
+def test_the_simulated_motion_is_reported(view):
     """The page says what was simulated under which loop, per joint in its unit, and draws the joint that changes."""
     t = 0.01 * np.arange(N)
     two = np.column_stack([np.sin(t), np.cos(t)])

@@ -41,8 +41,8 @@ def fit() -> ThermalEstimate:
 def logs() -> list[Log]:
     """Logs that say of themselves at which duty cycle they are, and one that says nothing."""
     q = np.zeros((2, 1))
-    told = [(0.0, 1, 1.0), (3000.0, 1, 1.0), (4800.0, 2, 0.4)]
-    named = [Log(t=np.array([t, t + 590.0]), q=q, metadata={"run": run, "duty": duty}) for t, run, duty in told]
+    reported = [(0.0, 1, 1.0), (3000.0, 1, 1.0), (4800.0, 2, 0.4)]
+    named = [Log(t=np.array([t, t + 590.0]), q=q, metadata={"run": run, "duty": duty}) for t, run, duty in reported]
     return [*named, Log(t=np.array([9000.0, 9001.0]), q=q)]
 
 

@@ -38,7 +38,7 @@ def contrast(one: str, other: str) -> float:
 
 
 @pytest.mark.parametrize("vision", VISION)
-def test_joint_colours_are_told_apart(vision: str) -> None:
+def test_joint_colours_are_distinguished(vision: str) -> None:
     """Seven joints have seven colours; 20 in L*a*b* is far beyond what eyes confuse (about 2.3) even in thin lines."""
     seen = [lab(VISION[vision] @ linear(value)) for value in JOINT_COLOURS]
     assert min(float(np.linalg.norm(one - other)) for one, other in combinations(seen, 2)) > 20

@@ -134,7 +134,7 @@ def test_flat_tops_are_flagged(seen):
     assert flagged[:, 1].sum() > 0.7 * np.sum(np.abs(torque[:, 1]) > level)  # all but tops of one or two samples
 
 
-def test_a_few_flat_tops_are_no_chance_where_torque_is_told_finely(seen):
+def test_a_few_flat_tops_are_no_chance_where_torque_is_reported_finely(seen):
     """Two peaks that are cut off are; the same torque in coarse steps stays at its top as it does elsewhere."""
     t = 0.004 * np.arange(5000)
     now, clipping = seen(times=t), EFFECTS["current_clipping"]
@@ -282,11 +282,11 @@ def test_the_documentation_lists_every_effect():
 
 @pytest.mark.parametrize("name", ["thermal_friction", "torque_constant_heat", "load_heat"])
 def test_heat_has_forms_of_all_time_constants_that_a_log_may_show(seen, name):
-    """Two minutes and a half tell time constants up to three times that: unseen data may choose of those."""
+    """Two minutes and a half show time constants up to three times that: unseen data may choose of those."""
     now, effect = seen(2, times=0.1 * np.arange(1501)), EFFECTS[name]
-    told = list(dict.fromkeys(shape[0] for shape in effect.forms(now, 2)))
-    assert told == [value for value in effect.shapes[0].grid if value <= 450.0]
-    assert len(told) > 1
+    reported = list(dict.fromkeys(shape[0] for shape in effect.forms(now, 2)))
+    assert reported == [value for value in effect.shapes[0].grid if value <= 450.0]
+    assert len(reported) > 1
 
 
 def test_the_best_places_are_apart():

@@ -1,4 +1,4 @@
-"""Rotors that a description leaves out, or tells as datasheets do: what passes a gear is without them."""
+"""Rotors that a description leaves out, or shows as datasheets do: what passes a gear is without them."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ def _held(now):
     return replace(merged, rigid=merged.rigid + rotor * np.outer(now.ddq[:, 0], np.arange(now.robot.n) == 0))
 
 
-def test_a_rotor_within_its_link_is_told_from_it(seen):
+def test_a_rotor_within_its_link_is_distinguished_from_it(seen):
     """Where one base parameter holds rotor and link, the gear's load is without the rotor that the maker describes."""
     now = seen(4, seed=1)
     rotor = float(now.robot.rotor_inertia[0])
@@ -32,7 +32,7 @@ def test_a_rotor_within_its_link_is_told_from_it(seen):
 
 
 def test_a_rotor_is_as_sure_as_what_tells_it(seen):
-    """One that a log tells is sure; a datasheet's may err by 30 %; one that nothing tells is some of the inertia."""
+    """One that a log shows is sure; a datasheet's may err by 30 %; one that nothing shows is some of the inertia."""
     now = seen(4, seed=1)
     rotor = float(now.robot.rotor_inertia[0])
     held, bare = _held(now), seen(4, seed=1, robot=replace(now.robot, rotor_inertia=np.zeros(4)))
@@ -56,7 +56,7 @@ def test_a_rotor_is_as_sure_as_what_tells_it(seen):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("effect", ["backlash", "joint_elasticity"])
-def test_a_rotor_that_is_told_is_as_one_that_is_described(effect, seen):
+def test_a_rotor_that_is_reported_is_as_one_that_is_described(effect, seen):
     """A first joint's gear and link are without the rotor, whether the description has it or the shape."""
     robot = seen(5, seed=4).robot
     assert robot.chain.joints[0].kind == "revolute"
@@ -70,6 +70,6 @@ def test_a_rotor_that_is_told_is_as_one_that_is_described(effect, seen):
     np.testing.assert_allclose(lumped.torque, described.torque, atol=1e-9 * np.abs(lumped.torque).max())
     shape, after = {"backlash": ((1e-3, 0.0), (0.02,)), "joint_elasticity": ((1e4,), (0.05,))}[effect]
     cases = ((described, 0.0), (lumped, rotor), (lumped, 0.0))
-    known, told, taken = (EFFECTS[effect].columns(now, 1, (*shape, b, *after)) for now, b in cases)
-    np.testing.assert_allclose(told, known, atol=1e-6 * np.abs(known).max())
+    known, reported, taken = (EFFECTS[effect].columns(now, 1, (*shape, b, *after)) for now, b in cases)
+    np.testing.assert_allclose(reported, known, atol=1e-6 * np.abs(known).max())
     assert np.abs(taken - known).max() > 0.1 * np.abs(known).max()

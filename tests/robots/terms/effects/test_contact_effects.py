@@ -73,7 +73,7 @@ def test_a_push_that_lasts_is_a_wrench_on_the_flange(now, twin):
 
 
 @pytest.mark.parametrize("hardness", [0.005, 0.1, 0.6, 1.0, 2.0])
-def test_a_force_that_lasts_is_told_by_its_mean(now, hardness):
+def test_a_force_that_lasts_is_reported_by_its_mean(now, hardness):
     """Whatever its course: a column's impulse over the duration is that of one newton."""
     column = EFFECTS["external_contact"].columns(now, None, (1.0, 1.5, hardness, 1.0))[:, :, 0]
     jacobian = now.sensitivity("jacobian")[:, 0]
@@ -102,8 +102,8 @@ def test_a_push_on_a_body_is_a_force_at_one_place_of_it(now, twin):
         wrench = np.concatenate([force, np.cross(lever, force)])
         strength = np.sin(np.pi * (now.t[i] - 1.0) / 1.5) ** 0.1 / MEAN
         np.testing.assert_allclose(X[i] @ coefficients, strength * own.T @ wrench, atol=1e-6)
-    told = push.describe(None, coefficients, (1.0, 1.5, 0.1, 0.0, float(body)))
-    assert f"force of 37.4 N at one place of body {body}" in told
+    reported = push.describe(None, coefficients, (1.0, 1.5, 0.1, 0.0, float(body)))
+    assert f"force of 37.4 N at one place of body {body}" in reported
 
 
 def test_a_push_that_lasts_is_looked_for_about_a_brief_one(now):
@@ -117,8 +117,8 @@ def test_a_push_that_lasts_is_looked_for_about_a_brief_one(now):
 def test_a_search_for_pushes_finds_the_moment(now):
     """Ranked by what a constant explains, the windows of a push come first, in noise twice its size.
 
-    Slow noise makes more of a long window than of a short one; joints that rest for most of the time are told by the
-    rest of it, and one that stands by nothing.
+    Slow noise makes more of a long window than of a short one; joints that rest for most of the time are
+    judged by the rest of it, and one that stands by nothing.
     """
     rng = np.random.default_rng(1)
     X = EFFECTS["external_contact"].columns(now, None, (3.1, 0.8))
@@ -185,14 +185,14 @@ def test_an_axis_along_gravity_carries_no_weight(seen):
         assert X[:, j, 4 * j + 3].any() == (np.abs(weight[:, j]).max() > 1e-6)
 
 
-def test_a_push_is_told_by_what_joints_feel_of_it() -> None:
+def test_a_push_is_reported_by_what_joints_feel_of_it() -> None:
     """A force that is rounding beside the moment is none, and so is a moment beside a force."""
     shape = (21.3, 1.5, 0.1, 1.0)
-    for told, size in (
+    for reported, size in (
         ("a moment of 1.26 N m", [1e-9, 0.0, 2e-10, 0.0, 1.26, 0.0]),
         ("a force of 5 N", [3.0, 4.0, 0, 0, 0, 0]),
     ):
         sentence = EFFECTS["external_contact"].describe(None, np.array(size), shape)
-        assert f"with {told}, constant" in sentence
+        assert f"with {reported}, constant" in sentence
     both = EFFECTS["external_contact"].describe(None, np.array([3.0, 4.0, 0.0, 0.0, 2.0, 0.0]), shape)
     assert "with a force of 5 N and a moment of 2 N m" in both

@@ -173,7 +173,7 @@ def test_static_effects_share_one_expression(effect, seen):
 
 
 def test_descriptions_and_coordinates_are_for_people(effect, seen):
-    """An effect is told in one sentence, and shows on an axis with a unit."""
+    """An effect is reported in one sentence, and shows on an axis with a unit."""
     now = seen(velocity_scale=2e-3)
     for joint, point in _points(effect, now):
         text = effect.describe(joint, np.full(len(effect.parameters(now.robot, joint)), 0.1), point)
@@ -194,6 +194,6 @@ def test_descriptions_and_coordinates_are_for_people(effect, seen):
     ],
 )
 def test_words_follow_the_sign(name: str, shape: tuple[float, ...], more: str, less: str) -> None:
-    """A value below zero is told as what it means."""
+    """A value below zero is reported as what it means."""
     for sign, words in ((1.0, more), (-1.0, less)):
         assert words in EFFECTS[name].describe(1, np.array([0.05 * sign]), shape)

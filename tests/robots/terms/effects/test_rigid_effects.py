@@ -71,7 +71,7 @@ def test_a_tilt_may_leave_more_on_an_axis_along_gravity(random_robot):
     lying = replace(robot, chain=replace(robot.chain, gravity=tuple(9.81 * across / np.linalg.norm(across))))
     tilt = EFFECTS["base_tilt"]
     assert [tilt.leakage(upright, j) for j in range(3)] == [0.5, 0.08, 0.08]
-    assert tilt.leakage(upright, 0, (1.0, 0.0)) == 0.08  # its own moments are told
+    assert tilt.leakage(upright, 0, (1.0, 0.0)) == 0.08  # its own moments are reported
     assert tilt.leakage(lying, 0) == EFFECTS["spring"].leakage(upright, 0) == 0.08
 
 

@@ -136,7 +136,7 @@ def sliding(seen, random_robot):
 
 
 def test_a_ripple_of_a_linear_axis_is_one_of_its_length(sliding):
-    """A screw's wave of 3 mm over a tenth of a metre is proposed, told in mm and N, its order in rad/m."""
+    """A screw's wave of 3 mm over a tenth of a metre is proposed, reported in mm and N, its order in rad/m."""
     now, q = sliding, sliding.q[:, 1]
     now = replace(now, q=now.q * 0.1 / np.ptp(q), dq=now.dq * 0.1 / np.ptp(q))
     order = 2 * np.pi / 0.003
@@ -164,9 +164,9 @@ def test_friction_by_the_position_of_a_linear_axis_goes_by_waves_over_its_range(
 def test_the_sentence_tells_what_grows_with_the_load():
     """A motor's constant that ripples does so by a share of its torque: that is no small ripple."""
     for share, what in ((0.0, "load"), (1.0, "motor torque")):
-        told = RIPPLE.describe(3, np.array([0.003, 0.004, 0.03, -0.04]), (12.0, 0.0, share))
+        reported = RIPPLE.describe(3, np.array([0.003, 0.004, 0.03, -0.04]), (12.0, 0.0, share))
         assert (
-            told
+            reported
             == f"The torque of joint 3 ripples with an amplitude of 0.005 N m and 5 % of its {what}, 12 times per turn."
         )
 
