@@ -19,6 +19,9 @@ if (_worker := os.environ.get("PYTEST_XDIST_WORKER", "gw")[2:]) and hasattr(os, 
     _cores = sorted(os.sched_getaffinity(0))
     os.sched_setaffinity(0, {_cores[int(_worker) % len(_cores)]})
 
+# Programs that tests start need not compile the packages anew each time.
+os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
+
 # A shell ignores Ctrl-C for what it starts in the background, and so would the tests of Ctrl-C.
 signal.signal(signal.SIGINT, signal.default_int_handler)
 

@@ -15,6 +15,7 @@ from estimation.diagnosis.validations.decision import decide
 from estimation.diagnosis.validations.extended_model import fit_extended_model
 from estimation.diagnosis.validations.name_comparison import compare_with_free_functions
 from estimation.diagnosis.validations.validation import validate
+from estimation.regressions.torque_meanings import with_torque_constants
 from robots.common.errors import InputError
 from robots.common.memory import give_back
 from robots.common.parallel import one_blas_thread
@@ -75,6 +76,7 @@ def diagnose(
     given, other = _listed(logs), _listed(held_out)
     if not given:
         raise InputError("no logs", allowed="one or more")
+    robot = with_torque_constants(robot, given)
     effects = _effects(robot, candidates)
     bar = progress or SILENT
     bar.start("diagnosing", 1.0)

@@ -3,11 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 
+import numpy as np
+
+from estimation.gate.finding import Finding
 from estimation.gate.gate import check_log
-from estimation.gate.report import GateReport
+from estimation.gate.report import GateReport, worst_first
 from robots.robot import Robot
 from robots.signals import Log
+
+# Share of a log's rows that another log may have by chance, as at rest or on coarse columns.
+REPEATED = 0.3
 
 
 def check_logs(
@@ -38,4 +45,31 @@ def check_logs(
         reports.append(report)
     if all(report.without_motion for report in reports):
         reports[0].raise_if_refused()
+    for later, report in enumerate(reports):
+        shares = [_repeated_share(logs[later], other) for other in logs[:later]]
+        if not report.without_motion and max(shares, default=0.0) > REPEATED:
+            earlier = int(np.argmax(shares))
+            found = _repeated(logs[earlier], earlier, shares[earlier])
+            reports[later] = replace(report, findings=worst_first([*report.findings, found]))
     return tuple(report.left_out() if report.without_motion else report for report in reports)
+
+
+def _repeated_share(log: Log, other: Log) -> float:
+    """Share of a log's rows whose positions and torques another log has to the last digit."""
+    rows = [np.ascontiguousarray(np.hstack([one.q, one.q if one.tau is None else one.tau])) for one in (log, other)]
+    if rows[0].shape[1] != rows[1].shape[1]:
+        return 0.0
+    # Rows at rest are alike in any log.
+    keys = [np.unique(values.view(np.dtype((np.void, values.itemsize * values.shape[1]))).ravel()) for values in rows]
+    return float(len(np.intersect1d(keys[0], keys[1], assume_unique=True)) / max(len(keys[0]), 1))
+
+
+def _repeated(other: Log, number: int, share: float) -> Finding:
+    return Finding(
+        name="same_rows",
+        severity="warning",
+        text=f"{100 * share:.0f} % of its rows are those of {other.name or f'log {number + 1}'}",
+        action="give each recording once: standard errors count these rows twice",
+        value=100 * share,
+        unit="%",
+    )

@@ -21,7 +21,7 @@ from estimation.logs.provenance import describe_logs
 from estimation.models.model import Model
 from estimation.preprocessing import Harmonics
 from estimation.regressions.preparation import Prepared, prepare_all
-from estimation.regressions.torque_meanings import as_joint_torque
+from estimation.regressions.torque_meanings import as_joint_torque, with_torque_constants
 from estimation.uncertainty import fast_noise, period_noise
 from robots.base_parameters import find_base_parameters
 from robots.common.errors import InputError, NotIdentifiableError
@@ -88,7 +88,9 @@ def identify(
         NotIdentifiableError: logs in which no joint moves, or no joint's torque can be predicted.
     """
     chosen = choose_estimator(method)
-    data = [as_joint_torque(robot, log) for log in ([logs] if isinstance(logs, Log) else logs)]
+    data = [logs] if isinstance(logs, Log) else list(logs)
+    robot = with_torque_constants(robot, data)
+    data = [as_joint_torque(robot, log, estimate=False) for log in data]
     if not data:
         raise InputError("no logs", allowed="one or more")
     if chosen.simulates:

@@ -21,7 +21,8 @@ BAG_FILES = (".db3", ".mcap")
 def describe_logs(logs: Sequence[Log]) -> list[dict[str, object]]:
     """Lists name, hash of the file where there is one, number of samples, start and duration [s] of each log.
 
-    A log with temperatures also gives the mean of each joint and of the ambient [degC], null where a sensor was silent.
+    A log whose torques were converted gives what they were. A log with temperatures also gives the mean of each joint
+    and of the ambient [degC], null where a sensor was silent.
     """
     described: list[dict[str, object]] = []
     for log in logs:
@@ -34,6 +35,7 @@ def describe_logs(logs: Sequence[Log]) -> list[dict[str, object]]:
                 "start": float(log.t[0]),
                 "duration": log.duration,
                 **_temperatures(log),
+                **({"torque_was": was} if (was := log.metadata.get("torque_was")) else {}),
             }
         )
     return described

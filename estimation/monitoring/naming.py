@@ -132,7 +132,7 @@ def name_changes(
     found = []
     for c in by_group["friction"]:
         kind: Kind = "damage" if c.size > 0 else "friction_decrease"
-        found.append(_finding(c, kind, c.quantity.index + 1, relative(c.size, c.error), "%", detected, log))
+        found.append(_finding(c, kind, c.quantity.index + 1, relative(c.size, _with_margin(c)), "%", detected, log))
     payload = by_group["payload"]
     if payload:
         found.append(_payload(payload, detected, log))
@@ -164,6 +164,11 @@ def _payload(changes: Sequence[Change], detected: float, log: str) -> Finding:
     size = _interval(mass)
     found = _finding(main, "payload", None, size, "kg", detected, log, text)
     return found
+
+
+def _with_margin(c: Change) -> float:
+    """Standard error of a step in friction: what the model gets wrong is as large as the smallest finding."""
+    return float(np.hypot(c.error, c.quantity.margin / NORMAL_95))
 
 
 def _interval(c: Change) -> tuple[float, float, float]:

@@ -23,6 +23,7 @@ from estimation.payloads.paths import PathMatch, match_paths
 from estimation.payloads.physical import PhysicalBody, physical_body
 from estimation.payloads.result import JointEvidence, PayloadEstimate
 from estimation.regressions.preparation import Prepared, Rows, prepare_all, still_joints
+from estimation.regressions.torque_meanings import as_joint_torque, with_torque_constants
 from robots.common.errors import InputError, NotIdentifiableError
 from robots.common.parallel import one_blas_thread
 from robots.common.progress import SILENT, Progress
@@ -86,6 +87,8 @@ def identify_payload(
     machine = robot if robot is not None else None if known is None else known.robot
     if machine is None:
         raise InputError("no robot", remedy="name the robot of the logs")
+    machine = with_torque_constants(machine, free)
+    loaded, free = ([as_joint_torque(machine, log, estimate=False) for log in some] for some in (loaded, free))
     if free and estimate is None:
         estimate = identify(machine, free, seed=seed, progress=progress)
         known = estimate.model

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
@@ -14,6 +15,7 @@ from estimation.gate.measurements.outliers import find_outliers
 from estimation.gate.measurements.timing import FEWEST
 from estimation.models.model import Model
 from estimation.preprocessing import LowPass, Smoother, SmoothingSpline
+from robots.common.errors import AssumedValueWarning
 from robots.robot import Robot
 from robots.signals import Log
 
@@ -74,3 +76,17 @@ def smoother_of(model: Model, cutoff: float) -> Smoother:
     smoothing = model.provenance.get("smoothing")
     kind = smoothing.get("kind") if isinstance(smoothing, Mapping) else None
     return SmoothingSpline(cutoff) if kind == SmoothingSpline.name else LowPass(cutoff)
+
+
+def note_meaning(model: Model, log: Log) -> None:
+    """Says that the model's logs held something else than joint torques, if the log does not state it.
+
+    Args:
+        model: with the provenance of its logs.
+        log: with joint torques or currents, or without.
+    """
+    were = {str(entry.get("torque_was") or "") for entry in model.provenance.get("logs", ())}
+    if (log.tau is None and log.current is None) or "torque_was" in log.metadata or not were or "" in were:
+        return
+    text = f"the torque columns of the model's logs were {', '.join(sorted(were))}; those of this log are read as joint"
+    warnings.warn(AssumedValueWarning(f"{text} torques. If they hold the same, state --torque-is"), stacklevel=3)

@@ -15,7 +15,7 @@ from estimation.logs.clocks import clock_shift_between, earlier_logs_on_clock
 from estimation.logs.known_setup import HEAT, require_plain
 from estimation.models.model import Model
 from estimation.predictions.band import band_of_motion, beyond_the_recorded
-from estimation.predictions.checked_motions import checked_motion, joined, smoother_of
+from estimation.predictions.checked_motions import checked_motion, joined, note_meaning, smoother_of
 from estimation.preprocessing import resample, smooth
 from estimation.preprocessing.smoothing import low_pass
 from estimation.regressions.preparation import torque_of
@@ -226,6 +226,7 @@ def predict(
         )
     cutoff = float(model.provenance.get("cutoff_hz", 10.0))
     log = as_joint_torque(robot, log) if log.tau is not None or log.current is not None else log
+    note_meaning(model, log)
     gate, parts = checked_motion(robot, log) if check else (None, [log])
     log = joined(parts)
     motion = Motion.concatenate([smooth(resample(part.t, part.q), smoother_of(model, cutoff)) for part in parts])
@@ -283,10 +284,8 @@ def warmed(model: Model, before: Sequence[Log], log: Log, later: float) -> tuple
     """
     if not model.keeps_heat:
         if before:
-            raise InputError(
-                "the model has no thermal part",
-                remedy="use a model of oed thermal, or remove the earlier logs (--before)",
-            )
+            remedy = "use a model of oed thermal, or remove the earlier logs (--before)"
+            raise InputError("the model has no thermal part", remedy=remedy)
         return [], ""
     if not before:
         return [], COLD

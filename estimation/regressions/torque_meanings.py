@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 
@@ -11,7 +12,7 @@ from numpy.typing import NDArray
 from estimation.logs.known_setup import robot_for_log
 from estimation.logs.torque_source import KEY, parse_meaning
 from estimation.preprocessing import LowPass, resample, smooth
-from robots.common.errors import InputError
+from robots.common.errors import AssumedValueWarning, InputError
 from robots.regressor import TorqueModel
 from robots.robot import Robot
 from robots.signals import Log
@@ -24,11 +25,12 @@ Array = NDArray[np.float64]
 MOST, SHOWN, CORRELATED, PRECISE = 20_000, 0.02, 50.0, 0.2
 
 
-def as_joint_torque(robot: Robot, log: Log, meaning: str | None = None) -> Log:
+def as_joint_torque(robot: Robot, log: Log, meaning: str | None = None, *, estimate: bool = True) -> Log:
     """Converts a log whose torque columns mean something else.
 
     - ``current``: torque is the current [A] times the robot's torque constant. Where the description states none, the
-      constant is estimated from its links: the torques are then as accurate as the description.
+      constant is estimated from its links: the torques are then as accurate as the description. For several logs, see
+      `with_torque_constants`.
     - ``motor``: torque is that of the motor [N m] times the gear ratio.
     - ``without-gravity``: the described torque of gravity is added.
 
@@ -36,6 +38,7 @@ def as_joint_torque(robot: Robot, log: Log, meaning: str | None = None) -> Log:
         robot: with n joints.
         log: with torques, or with currents for ``current``.
         meaning: see `parse_meaning`; None for what the log's metadata state, if anything.
+        estimate: whether a torque constant that the robot lacks is estimated.
 
     Returns:
         The log with joint torques; the same one if there is nothing to convert.
@@ -54,7 +57,8 @@ def as_joint_torque(robot: Robot, log: Log, meaning: str | None = None) -> Log:
         raise InputError(f"{log.n} joints", file=_file(log), allowed=f"{robot.n}, as {robot.name} has")
     tau = np.array(values, dtype=float)
     if name == "current":
-        tau[:, joints] *= _torque_constants(robot, log, tau, joints)
+        known = with_torque_constants(robot, [log], meaning) if estimate else robot
+        tau[:, joints] *= _torque_constants(known, log, joints)
     elif name == "motor":
         tau[:, joints] *= _gear_ratios(robot, log, joints)
     else:
@@ -62,6 +66,49 @@ def as_joint_torque(robot: Robot, log: Log, meaning: str | None = None) -> Log:
     kept = {key: value for key, value in log.metadata.items() if key != KEY}
     current = None if name == "current" else log.current
     return replace(log, tau=tau, current=current, metadata={**kept, "torque_was": str(stated)})
+
+
+def with_torque_constants(robot: Robot, logs: Sequence[Log], meaning: str | None = None) -> Robot:
+    """Estimates torque constants that the description does not state, once for all logs.
+
+    Logs of one robot have the same constants. An estimate of each log would take a payload of one log for another
+    constant.
+
+    Args:
+        robot: with n joints.
+        logs: of the robot, without unknown payloads; those whose columns do not hold currents do not count.
+        meaning: see `as_joint_torque`.
+
+    Returns:
+        The robot with these constants; NaN remains where the logs do not show them.
+
+    Raises:
+        InputError: a description without links, which the estimate needs.
+
+    Warns:
+        AssumedValueWarning: with the constants.
+    """
+    known = np.array(robot.torque_constant, dtype=float)
+    wanted, used = np.zeros(robot.n, dtype=bool), []
+    for log in logs:
+        stated, values = meaning or log.metadata.get(KEY), log.tau if log.tau is not None else log.current
+        if not stated or values is None or log.n != robot.n:
+            continue
+        name, joints = parse_meaning(str(stated), robot.n)
+        if name == "current" and np.isnan(known[joints]).any():
+            wanted[joints] = True
+            used.append((log, np.asarray(values, dtype=float)))
+    wanted &= np.isnan(known)
+    if not wanted.any():
+        return robot
+    known[wanted] = _estimated_constants(robot, used)[wanted]
+    if np.isfinite(known[wanted]).any():
+        listed = ", ".join(
+            f"{known[j]:.4g} at {robot.joint_names[j]}" for j in np.flatnonzero(wanted & ~np.isnan(known))
+        )
+        text = f"{robot.name}: torque constants estimated from the described links [N m/A at the joint]: {listed}"
+        warnings.warn(AssumedValueWarning(text), stacklevel=2)
+    return replace(robot, torque_constant=known)
 
 
 def _file(log: Log) -> str | None:
@@ -101,13 +148,8 @@ def _described(robot: Robot, log: Log, meaning: str) -> Callable[[Array, Array, 
     return torque
 
 
-def _torque_constants(robot: Robot, log: Log, current: Array, joints: Sequence[int]) -> Array:
-    """Gives the torque constants of joints, estimated where the description states none."""
+def _torque_constants(robot: Robot, log: Log, joints: Sequence[int]) -> Array:
     constants = np.asarray(robot.torque_constant, dtype=float)[list(joints)]
-    if np.isfinite(constants).all():
-        return constants
-    estimated = _estimated_constants(robot, log, current)[list(joints)]
-    constants = np.where(np.isfinite(constants), constants, estimated)
     if not np.isfinite(constants).all():
         raise InputError(
             "torque_is current, but the description states no torque constant, and its links do not show it",
@@ -118,14 +160,35 @@ def _torque_constants(robot: Robot, log: Log, current: Array, joints: Sequence[i
     return constants
 
 
-def _estimated_constants(robot: Robot, log: Log, current: Array) -> Array:
+def _estimated_constants(robot: Robot, logs: Sequence[tuple[Log, Array]]) -> Array:
     """Regresses the described torque on currents, with free friction and offset (n,); NaN where it is not shown."""
+    cross, square, spread, left, rows = np.zeros((5, robot.n))
+    parts = [_own_part(robot, log, current) for log, current in logs]
+    for x, y, rigid in parts:
+        cross += np.einsum("tj,tj->j", x, y)
+        square += np.einsum("tj,tj->j", x, x)
+        spread += len(x) * rigid
+        rows += len(x)
+    factor = np.divide(cross, square, out=np.zeros(robot.n), where=square > 0)
+    for x, y, _ in parts:
+        left += np.sum((y - factor * x) ** 2, axis=0)
+    shown = (square > SHOWN**2 * spread) & (cross != 0)
+    error = np.sqrt(
+        np.divide(left / np.maximum(rows, 1) * CORRELATED, square, out=np.full(robot.n, np.inf), where=shown)
+    )
+    with np.errstate(divide="ignore"):
+        return np.where(shown & (error < PRECISE * np.abs(factor)), 1.0 / factor, np.nan)
+
+
+def _own_part(robot: Robot, log: Log, current: Array) -> tuple[Array, Array, Array]:
+    """Described torque and current without what friction and offset explain (N, n), and the torque's variance (n,)."""
     grid = resample(log.t, log.q)
     motion = smooth(grid, LowPass(min(6.0, 0.2 / float(np.median(np.diff(log.t))))))
-    rows = slice(None, None, max(1, len(log) // MOST))
-    q, dq, ddq, i = motion.q[rows], motion.dq[rows], motion.ddq[rows], current[rows]
+    kept = slice(None, None, max(1, len(motion) // MOST))
+    q, dq, ddq = motion.q[kept], motion.dq[kept], motion.ddq[kept]
+    i = np.column_stack([np.interp(motion.t[kept], log.t, values) for values in current.T])
     rigid = _described(robot, log, "current")(q, dq, ddq) + np.asarray(robot.rotor_inertia) * ddq
-    constants = np.full(robot.n, np.nan)
+    x, y = np.zeros((2, *q.shape))
     for joint in range(robot.n):
         speed = float(np.sqrt(np.mean(dq[:, joint] ** 2)))
         if not speed > 0:
@@ -135,10 +198,5 @@ def _estimated_constants(robot: Robot, log: Log, current: Array) -> Array:
         if not robot.rotor_inertia[joint]:
             own = np.column_stack([own, ddq[:, joint]])
         both = np.column_stack([rigid[:, joint], i[:, joint]])
-        x, y = (both - own @ np.linalg.lstsq(own, both, rcond=None)[0]).T
-        if x.std() > SHOWN * rigid[:, joint].std() and x @ y != 0:
-            factor = float(x @ y / (x @ x))
-            error = float(np.sqrt(np.mean((y - factor * x) ** 2) / (x @ x) * CORRELATED))
-            if error < PRECISE * abs(factor):
-                constants[joint] = 1.0 / factor
-    return constants
+        x[:, joint], y[:, joint] = (both - own @ np.linalg.lstsq(own, both, rcond=None)[0]).T
+    return x, y, rigid.var(axis=0)

@@ -32,7 +32,7 @@ class TwoSmallest(oed.Criterion):
 
 
 if __name__ == "__main__":
-    quick = oed.SearchOptions(effort=oed.Effort(islands=1, starts=2, hops=2, finish_samples=100), workers=1)
+    quick = oed.SearchOptions(effort=oed.Effort(islands=1, starts=2, hops=0, finish_samples=100), workers=1)
     model = oed.ModelOptions(friction="coulomb-viscous")
     own = oed.design("er3a", criterion=TwoSmallest(), model=model, search=quick)
     usual = oed.design("er3a", criterion="cond", model=model, search=quick)

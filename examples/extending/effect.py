@@ -55,7 +55,7 @@ if __name__ == "__main__":
         search = oed.SearchOptions(
             effort=oed.Effort(islands=1, starts=1, hops=0, finish_samples=100), workers=1, seed=seed
         )
-        plan = oed.TrajectoryOptions(periods=1)
+        plan = oed.TrajectoryOptions(periods=1, strokes=False)
         motion = oed.design(robot, search=search, trajectory=plan).motion
         logs.append(simulate(plant, motion, seed=seed))
     found = diagnose(robot, logs[0], held_out=logs[1], candidates=[TightHose(), "spring", "stribeck"])

@@ -29,8 +29,9 @@ if __name__ == "__main__":
     import oed
 
     robot = load_robot("er3a")
-    search = oed.SearchOptions(effort=oed.Effort(islands=1, starts=2, hops=2, finish_samples=100), workers=1)
-    log = simulate(nominal_plant(robot), oed.design(robot, search=search).motion, seed=1)
+    search = oed.SearchOptions(effort=oed.Effort(islands=1, starts=1, hops=0, finish_samples=100), workers=1)
+    design = oed.design(robot, trajectory=oed.TrajectoryOptions(periods=1, strokes=False), search=search)
+    log = simulate(nominal_plant(robot), design.motion, seed=1)
     for method in ("load-weighted", "wls"):
         estimate = identify(robot, log, method=method)
         shares = [100 * joint.residual_rms / joint.torque_rms for joint in estimate.joints]

@@ -62,6 +62,6 @@ if __name__ == "__main__":
         "er3a",
         model=oed.ModelOptions(friction="coulomb-viscous"),
         trajectory=oed.TrajectoryOptions(family=Bumps(count=10)),
-        search=oed.SearchOptions(effort=oed.Effort(islands=1, starts=2, hops=2, finish_samples=100), workers=1),
+        search=oed.SearchOptions(effort=oed.Effort(islands=1, starts=1, hops=0, finish_samples=100), workers=1),
     )
     print(design.summary())

@@ -48,7 +48,8 @@ if __name__ == "__main__":
     design = oed.design(
         robot,
         model=oed.ModelOptions(friction=term),
-        search=oed.SearchOptions(effort=oed.Effort(islands=1, starts=2, hops=2, finish_samples=100), workers=1),
+        trajectory=oed.TrajectoryOptions(periods=1, strokes=False),
+        search=oed.SearchOptions(effort=oed.Effort(islands=1, starts=1, hops=0, finish_samples=100), workers=1),
     )
     model = default_model(robot, friction=term, velocity_scale=1e-3)
     plant = Plant(model=model, parameters=np.nan_to_num(model.nominal))

@@ -42,7 +42,7 @@ if __name__ == "__main__":
         model=oed.ModelOptions(friction="coulomb-viscous"),
         limits=oed.LimitOptions(motion=[FlangeSpeed(largest=0.5)]),
         trajectory=oed.TrajectoryOptions(strokes=False),
-        search=oed.SearchOptions(effort=oed.Effort(islands=1, starts=2, hops=2, finish_samples=100), workers=1),
+        search=oed.SearchOptions(effort=oed.Effort(islands=1, starts=1, hops=0, finish_samples=100), workers=1),
     )
     positions = robot.chain.transforms(design.motion.q)[:, -1, :3, 3]
     fastest = np.linalg.norm(np.diff(positions, axis=0), axis=1).max() / robot.period

@@ -64,23 +64,33 @@ TorqueIsOption = Annotated[
 ]
 
 
-def with_torque_meaning(robot: Robot, logs: Sequence[Log], torque_is: str | None) -> list[Log]:
+def with_torque_meaning(
+    robot: Robot, logs: Sequence[Log], torque_is: str | None, without: Sequence[Log] | None = None
+) -> tuple[Robot, list[Log]]:
     """Converts torque columns of another meaning to joint torques, by the robot's description.
 
     Args:
         robot: of the logs.
         logs: with their payloads and gravity vectors; a log without torque stays as it is.
         torque_is: see `estimation.logs.torque_source.parse_meaning`; None for what the mapping states.
+        without: those of the logs that have no unknown payload, by which torque constants are estimated; None for all.
+
+    Returns:
+        The robot, with estimated torque constants where it needs them, and the logs.
 
     Raises:
         InputError: an unknown meaning, or a description that lacks what is needed.
     """
     from estimation.logs.torque_source import parse_meaning
-    from estimation.regressions.torque_meanings import as_joint_torque
+    from estimation.regressions.torque_meanings import as_joint_torque, with_torque_constants
 
     if torque_is is not None:
         parse_meaning(torque_is, robot.n)
-    return [log if log.tau is None and log.current is None else as_joint_torque(robot, log, torque_is) for log in logs]
+    robot = with_torque_constants(robot, logs if without is None else without, torque_is)
+    return robot, [
+        log if log.tau is None and log.current is None else as_joint_torque(robot, log, torque_is, estimate=False)
+        for log in logs
+    ]
 
 
 def with_known_setup(

@@ -10,6 +10,7 @@ import platform
 import shutil
 import subprocess
 import tempfile
+from collections import OrderedDict
 from collections.abc import Callable, Sequence
 from functools import cache
 from pathlib import Path
@@ -26,6 +27,8 @@ FLAGS = ("-march=native", "-fno-math-errno", "-fPIC", "-shared")
 VECTOR_LIBM = ("-DVECTOR_LIBM", "-Wl,--no-undefined", "-lmvec")
 # Optimisation pays, up to a length at which it would take minutes: a chain of ten oblique joints, differentiated.
 LONG = 600_000
+# A robot that is loaded again has the same functions: their sources are kept, the last ones of a process.
+KEPT = 64
 
 
 class CompilerError(RuntimeError):
@@ -41,7 +44,7 @@ class CompiledFunction(BatchFunction):
 
     def __init__(self, function: casadi.Function) -> None:
         super().__init__(function)
-        library = _build(c_source(row_major(function)))
+        library = _build(_source(function))
         try:
             loaded = ctypes.CDLL(str(library))
             self._all, self._sums = loaded.batch_all, loaded.batch_sums
@@ -64,6 +67,18 @@ class CompiledFunction(BatchFunction):
     def _sum(self, groups: int, size: int, arguments: list[Array], outputs: tuple[Array, ...]) -> None:
         counts = ctypes.c_longlong(groups), ctypes.c_longlong(size)
         self._sums(*counts, _pointers(arguments), _pointers(outputs))
+
+
+_SOURCES: OrderedDict[bytes, str] = OrderedDict()
+
+
+def _source(function: casadi.Function) -> str:
+    key = hashlib.sha256(function.serialize().encode()).digest()
+    source = _SOURCES.pop(key, None) or c_source(row_major(function))
+    _SOURCES[key] = source
+    if len(_SOURCES) > KEPT:
+        _SOURCES.popitem(last=False)
+    return source
 
 
 def _pointers(arrays: Sequence[Array]) -> ctypes.Array[ctypes.c_void_p]:

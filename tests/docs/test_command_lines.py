@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 import shlex
+from functools import cache
 from typing import Any
 
 import pytest
@@ -23,13 +24,18 @@ def command_lines() -> list[str]:
     return sorted(set(found))
 
 
+@cache
+def commands() -> dict[str, Any]:
+    """The program's commands by name."""
+    return dict(typer.main.get_command(app).commands)
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("line", command_lines())
 def test_options_exist(line):
     """A printed call names a command of the program, options that it has, and all that it requires."""
-    commands: dict[str, Any] = dict(typer.main.get_command(app).commands)
     _, name, *words = shlex.split(line, comments=True)
-    parameters = commands[name].params
+    parameters = commands()[name].params
     known = {spelling for p in parameters for spelling in (*p.opts, *p.secondary_opts)}
     used = {word.split("=")[0] for word in words if re.match(r"--?[a-z]", word)}
     assert used <= known

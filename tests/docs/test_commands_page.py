@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -17,6 +18,7 @@ SECTIONS = dict(re.findall(r"^## `oed (\w+)`\n(.*?)(?=^## |\Z)", PAGE, flags=re.
 COMMON = {"--force", "--json", "--quiet", "--config", "--help"}
 
 
+@cache
 def commands() -> dict[str, Any]:
     """Every command of the program."""
     return dict(typer.main.get_command(app).commands)

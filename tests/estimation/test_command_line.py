@@ -43,7 +43,7 @@ def run(monkeypatch, capsys):
 def log_file(tmp_path_factory, fourier_motion):
     robot = load_robot("er3a")
     path = tmp_path_factory.mktemp("logs") / "log.csv"
-    write_log(path, simulate(nominal_plant(robot), fourier_motion(robot, duration=10.0)))
+    write_log(path, simulate(nominal_plant(robot), fourier_motion(robot, duration=10.0, period=0.01)))
     return path
 
 

@@ -42,6 +42,20 @@ def payload(names: Names) -> None:
     assert np.abs([item.value for item in body[1:4]] - tool.lever).max() < 0.005
 
 
+def thermal_friction(names: Names) -> None:
+    """The unseen motion is predicted cold and warm, and the fitted friction lies between the plant's own two parts."""
+    errors = names["errors"]
+    # Noise of about 2 %, and 2 % for one factor of two parts that fall differently.
+    assert errors["cold", "with heat"].max() < 0.05
+    assert errors["warm", "with heat"].max() < 0.05
+    assert np.all(errors["warm", "without heat"] > 4 * errors["warm", "with heat"])
+    coulomb, viscous = names["truth"][:, 0], names["truth"][:, 1]
+    for joint, curve in enumerate(names["curves"].T):
+        fitted = np.interp(names["elapsed"], names["minutes"], curve)
+        # 2 %: a log averages over 10 s, in which the cold robot heats up.
+        assert np.all((viscous[:, joint] - 0.02 < fitted) & (fitted < coulomb[:, joint] + 0.02))
+
+
 def mujoco_corrected(names: Names) -> None:
     """The spring at joint 2 is found with its stiffness, and the corrected model follows the robot."""
     finding = names["diagnosis"].findings[0]
@@ -50,6 +64,21 @@ def mujoco_corrected(names: Names) -> None:
     assert abs(finding.parameters[0].value / names["REAL"]["stiffness"] - 1) < 0.1
     errors = names["torque_errors"]
     assert np.linalg.norm(errors["corrected"]) < 0.2 * np.linalg.norm(errors["original"])
+
+
+def two_robots(names: Names) -> None:
+    """Inertial parameters repeat, and the damage is found on the right robot, dated between two logs and sized."""
+    # 5 %: the thesis' own figure between cold and warm.
+    assert all(change < 0.05 for change in names["changes"].values())
+    assert names["cold_over_warm"] > 1.3
+    day, first, starts, true = names["day"], names["first"], names["STARTS"], 100 * names["DAMAGE"]
+    assert day == 1
+    assert starts[first - 1] < 60 <= starts[first]
+    assert all(len(names["alarms"][1, d]) == 0 for d in range(names["DAYS"]))
+    assert len(names["alarms"][2, 0]) == 0
+    assert abs(100 * names["sizes"].mean() - true) < 5.0
+    # The level alone does not show the damage on that day.
+    assert names["levels"][2, 1][first:].max() < names["levels"][1, 0][0]
 
 
 def your_own_robot(names: Names) -> None:
@@ -78,7 +107,9 @@ CLAIMS: dict[str, Callable[[Names], None]] = {
         real_robot,
         hidden_effect,
         payload,
+        thermal_friction,
         mujoco_corrected,
+        two_robots,
         your_own_robot,
         your_own_effect,
     )

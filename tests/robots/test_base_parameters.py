@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+import os
 import pickle
 import re
 from dataclasses import replace
@@ -21,6 +22,7 @@ from robots.terms import RigidBody, RotorInertia, TorqueOffset
 ROBOTS = ["er3a", "ur10", "panda"]
 EYE = np.eye(3)
 TILTED = (3.0, 2.0, -9.0)
+MANY = settings(max_examples=60 if os.environ.get("LONGER") else 25)
 
 
 @pytest.fixture(autouse=True)
@@ -91,7 +93,7 @@ def test_regrouping_keeps_the_torque(name, catalogue_robot, states):
 
 
 @pytest.mark.slow
-@settings(max_examples=60, deadline=None, derandomize=True, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(MANY, deadline=None, derandomize=True, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(seed=st.integers(0, 10_000), n=st.integers(1, 6))
 def test_any_chain(seed, n, random_robot, twin, states):
     """On any chain the number is the rank, regrouping keeps the torque, and the classes are those of the nullspace."""

@@ -94,7 +94,8 @@ def joint_evidence(fitted: Fitted) -> list[JointEvidence]:
     rows, robot = fitted.rows, fitted.robot
     kept = rows.thinned(max(1, len(rows.q) // CHOICE_ROWS))
     heavy = np.einsum("jmkp,k->jmp", gravity_rows(robot, rows.q[kept]), np.asarray(robot.chain.gravity))
-    late = np.where(np.abs(fitted.delay_values) > SURE * fitted.delay_errors, fitted.delay_values, 0.0)
+    sure = [d is not None and abs(d.value) > d.sticks + SURE * d.error for d in fitted.delays]
+    late = np.where(sure, fitted.delay_values, 0.0)
     return [
         _evidence_of(fitted, joint, kept, heavy[joint], float(late[joint]))
         for joint, fit in enumerate(fitted.fits)

@@ -32,15 +32,24 @@ class Delays(Check):
 
     def run(self, context: Context) -> list[Finding]:
         """Reports one delay if the joints agree, otherwise one of each joint."""
-        delays, period = context.fitted.delays, context.cleaned.timing.period
-        common = _common_delay(delays, period)
-        if common is not None:
-            return [common]
-        return [
-            _finding(delay.value, delay.error, joint, period, 1)
-            for joint, delay in enumerate(delays, start=1)
-            if delay is not None and _is_significant(delay, delays, period)
-        ]
+        return findings_of(context.fitted.delays, context.cleaned.timing.period)
+
+
+def findings_of(delays: Sequence[Delay | None], period: float) -> list[Finding]:
+    """Judges the delays of all joints.
+
+    Args:
+        delays: (n,), None of joints without a fit.
+        period: of the samples [s].
+    """
+    common = _common_delay(delays, period)
+    if common is not None:
+        return [common]
+    return [
+        _finding(delay.value, delay.error, joint, period, 1)
+        for joint, delay in enumerate(delays, start=1)
+        if delay is not None and _is_significant(delay, delays, period)
+    ]
 
 
 def _common_delay(delays: Sequence[Delay | None], period: float) -> Finding | None:
@@ -59,13 +68,14 @@ def _common_delay(delays: Sequence[Delay | None], period: float) -> Finding | No
         abs(delay.value - mean) < max(AGREE_ERRORS * delay.error, AGREE * period, AGREE_SHARE * abs(mean))
         for delay in known
     )
-    if not agree or abs(mean) <= max(LONG * period, SURE * error):
+    sticks = float(np.median([delay.sticks for delay in known]))
+    if not agree or abs(mean) <= sticks + max(LONG * period, SURE * error):
         return None
     return _finding(mean, error, None, period, len(known))
 
 
 def _is_significant(delay: Delay, delays: Sequence[Delay | None], period: float) -> bool:
-    if not np.isfinite(delay.error) or abs(delay.value) <= max(SURE * delay.error, LONG * period):
+    if not np.isfinite(delay.error) or abs(delay.value) <= delay.sticks + max(SURE * delay.error, LONG * period):
         return False
     if abs(delay.value) <= usual_delay(period):
         return delay.saved > WORTH

@@ -87,7 +87,9 @@ class TorqueMeanings(Check):
 
 
 def _finding(robot: Robot, best: Hypothesis) -> Finding:
-    listed = ", ".join(f"{factor:.2g}" for factor in best.factors)
+    factors = [f"{factor:.2g}" for factor in best.factors]
+    # Another unit has one factor for all joints.
+    listed = factors[0] if len(set(factors)) == 1 else ", ".join(factors)
     named = ",".join(str(joint + 1) for joint in best.joints)
     why = f"they are about {listed} times the described torques of joints {named.replace(',', ', ')}"
     some = "" if len(best.joints) == robot.n else f":{named}"

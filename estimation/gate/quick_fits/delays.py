@@ -21,6 +21,8 @@ UNEXPLAINED, LONGER = 0.15, 12.0
 STEP, FEWEST_STEPS, MOST_STEPS = 0.06, 6, 60
 # Rows from which the search starts; then all rows are used near the best delay.
 ROWS = 3000
+# Share of a joint's RMS speed between which a reversal is timed.
+REVERSING = 0.05
 
 
 @dataclass(frozen=True)
@@ -31,11 +33,14 @@ class Delay:
         value: by which the torque is logged after the position that belongs to it [s].
         error: standard error [s]; infinite if the best delay is the longest that was tried.
         saved: share of the unexplained torque that the delay explains.
+        sticks: time for which the joint stands at a reversal [s]. Its friction changes in this time, so that a delay
+            as short is none.
     """
 
     value: float
     error: float
     saved: float
+    sticks: float
 
 
 def usual_delay(period: float) -> float:
@@ -112,14 +117,40 @@ class _Search:
             k = lowest
 
 
+def sticking_time(rows: Rows, joint: int) -> float:
+    """Gives the median time [s] for which a joint stands at its reversals, zero without any.
+
+    It is the time below a speed, extrapolated to a speed of zero by that below twice the speed.
+
+    Args:
+        rows: the excerpts.
+        joint: counted from 0.
+    """
+    excess, first = [], 0
+    for part in rows.excerpts:
+        v = rows.dq[first : first + len(part.t), joint]
+        first += len(part.t)
+        turns = np.flatnonzero(v[:-1] * v[1:] < 0)
+        below, twice = (_lengths(np.abs(v) < k * REVERSING * rows.speed[joint], turns) for k in (1, 2))
+        excess += ((2 * below - twice) * float(np.median(np.diff(part.t)))).tolist()
+    return max(float(np.median(excess)), 0.0) if excess else 0.0
+
+
+def _lengths(slow: NDArray[np.bool_], places: NDArray[np.intp]) -> NDArray[np.intp]:
+    """Gives the number of rows of the slow stretch around each place; zero where it is not slow."""
+    fast = np.concatenate([[-1], np.flatnonzero(~slow), [len(slow)]])
+    after = np.searchsorted(fast, places)
+    return np.asarray(np.where(slow[places], fast[after] - fast[after - 1] - 1, 0))
+
+
 def _refined(rows: Rows, fit: JointFit, joint: int, search: _Search) -> Delay:
     """Interpolates the best delay between those that were tried, and gives its standard error."""
     shifts, best = search.shifts, search.best(joint)
-    half = len(shifts) // 2
+    half, sticks = len(shifts) // 2, sticking_time(rows, joint)
     zero = search.error(joint, half)
     if best in (0, 2 * half):
         left = search.error(joint, best)
-        return Delay(float(shifts[best]), np.inf, float(1 - left / zero) if zero > 0 else 0.0)
+        return Delay(float(shifts[best]), np.inf, float(1 - left / zero) if zero > 0 else 0.0, sticks)
     left, middle, right = (search.error(joint, place) for place in (best - 1, best, best + 1))
     bend = left - 2 * middle + right
     value = float(shifts[best] + 0.5 * (left - right) / bend * (shifts[1] - shifts[0])) if bend > 0 else shifts[best]
@@ -130,7 +161,7 @@ def _refined(rows: Rows, fit: JointFit, joint: int, search: _Search) -> Delay:
     scores = np.add.reduceat(slope * residual, rows.starts)
     curvature = float(slope @ slope)
     error = float(np.sqrt(scores @ scores)) / curvature if curvature > 0 else np.inf
-    return Delay(value, error, float(1 - np.sqrt(_remaining(fit, tau) / zero)) if zero > 0 else 0.0)
+    return Delay(value, error, float(1 - np.sqrt(_remaining(fit, tau) / zero)) if zero > 0 else 0.0, sticks)
 
 
 def _remaining(fit: JointFit, tau: Array) -> float:

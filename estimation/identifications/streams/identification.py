@@ -23,7 +23,7 @@ from estimation.identifications.fit import (
 from estimation.identifications.identification import describe_fit
 from estimation.identifications.streams.errors import Errors
 from estimation.identifications.streams.pieces import Pieces
-from estimation.identifications.streams.survey import merged_report, survey
+from estimation.identifications.streams.survey import BLOCK, merged_report, survey
 from estimation.identifications.verdicts import determined_parameters, require_predictable
 from estimation.logs.parquet_streams import LogStream
 from estimation.models.model import Model
@@ -31,6 +31,7 @@ from estimation.preprocessing import LowPass
 from estimation.regressions.braking_friction import with_braking_friction
 from estimation.regressions.joint_regressor import JointRegressor
 from estimation.regressions.moments import Moments
+from estimation.regressions.torque_meanings import with_torque_constants
 from robots.base_parameters import BaseParameters, find_base_parameters
 from robots.common.errors import InputError, NotIdentifiableError
 from robots.common.parallel import one_blas_thread
@@ -92,6 +93,7 @@ def identify_stream(
         )
     if stream.n != robot.n:
         raise InputError(f"{stream.n} joints", file=stream.path, allowed=f"{robot.n}, as {robot.name} has")
+    robot = with_torque_constants(robot, [stream.rows(0, min(BLOCK, len(stream)))], stream.torque_is)
     bar = _Rows(progress or SILENT, READINGS * len(stream))
     found = survey(robot, stream, bar.advance)
     report = merged_report(found, stream)

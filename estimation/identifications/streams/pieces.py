@@ -103,7 +103,7 @@ class Pieces:
         return stop - first - int(high - low)
 
     def _prepared(self, k: int, first: int, stop: int) -> Prepared:
-        log = as_joint_torque(self.robot, self.stream.rows(first, stop), self.stream.torque_is)
+        log = as_joint_torque(self.robot, self.stream.rows(first, stop), self.stream.torque_is, estimate=False)
         low, high = np.searchsorted(self.survey.dropped, [first, stop])
         if low < high:
             kept = np.ones(len(log), dtype=bool)

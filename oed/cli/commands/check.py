@@ -46,7 +46,7 @@ def check(
         progress.start("checking the logs", None)
         names, kinds = described.joint_names, described.chain.kinds
         read = read_logs(logs, n=described.n, torque=False, mapping=mapping, joints=names, kinds=kinds)
-        known = with_torque_meaning(described, with_known_setup(read, payload, gravity), torque_is)
+        described, known = with_torque_meaning(described, with_known_setup(read, payload, gravity), torque_is)
         reports = [check_log(described, log) for log in known]
     refused = [report for report in reports if report.refused]
     console.result(

@@ -100,7 +100,7 @@ def force(
         robot = identified.robot
         options: dict[str, Any] = {"n": robot.n, "mapping": mapping, "joints": robot.joint_names}
         read = read_logs([log, *(healthy or [])], **options, kinds=robot.chain.kinds)
-        recorded, *normal = with_torque_meaning(robot, with_known_setup(read, payload, gravity), torque_is)
+        _, (recorded, *normal) = with_torque_meaning(robot, with_known_setup(read, payload, gravity), torque_is)
         assumed = ""
 
         def predicted(own: Log) -> Prediction:

@@ -129,7 +129,7 @@ def identify(
                 read = read_logs(
                     log, n=described.n, mapping=mapping, joints=described.joint_names, kinds=described.chain.kinds
                 )
-                logs = with_torque_meaning(described, with_known_setup(read, payload, gravity), torque_is)
+                described, logs = with_torque_meaning(described, with_known_setup(read, payload, gravity), torque_is)
                 table = compare_methods(described, logs, **options) if method == "all" else None
                 result = run(described, logs, method=method if table is None else table.rows[0].method, **options)
             result.save(folder.path("model.json").parent)

@@ -86,7 +86,7 @@ def monitor(
                 watcher = Monitor(read_baseline(model), settings)
             robot = watcher.baseline.robot
             logs, refused = _read(log or [], log_dir, robot, mapping)
-            logs = with_torque_meaning(robot, with_known_setup(logs, payload, None), torque_is)
+            _, logs = with_torque_meaning(robot, with_known_setup(logs, payload, None), torque_is)
             result = monitor_logs(watcher, logs, refused=refused, progress=progress)
             result.save(folder.path("monitor.json").parent)
             folder.path("trends.csv")

@@ -128,10 +128,12 @@ def payload(
             options: dict[str, Any] = {"n": described.n, "mapping": mapping, "joints": described.joint_names}
             options["kinds"] = described.chain.kinds
             loaded, free = read_logs(log, **options), read_logs(without, **options) if without else ()
-            logs = with_torque_meaning(described, with_known_setup([*loaded, *free], payload, gravity), torque_is)
+            both = with_known_setup([*loaded, *free], payload, gravity)
+            reference = described if known is None else known.robot
+            reference, logs = with_torque_meaning(reference, both, torque_is, both[len(loaded) :])
             result = identify_payload(
                 logs[: len(loaded)],
-                robot=None if known is not None else described,
+                robot=None if known is not None else reference,
                 without=logs[len(loaded) :],
                 model=known,
                 seed=seed,

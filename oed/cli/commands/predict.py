@@ -55,7 +55,7 @@ def predict(
             read = read_log(
                 log, n=robot.n, torque=False, mapping=mapping, joints=robot.joint_names, kinds=robot.chain.kinds
             )
-            (recorded,) = with_torque_meaning(robot, with_known_setup([read], payload, gravity), torque_is)
+            _, (recorded,) = with_torque_meaning(robot, with_known_setup([read], payload, gravity), torque_is)
             progress.start("predicting", None)
             later, clock = clock_shift(identified, recorded)
             heat = heat_of(model, identified, recorded, before or [], ambient, mapping, later)

@@ -46,7 +46,7 @@ def build(upright: Robot, fourier_motion: Callable[..., Motion], pinocchio_torqu
         gain: tuple[float, ...] = (1.0, 1.0, 1.0),
         askew: tuple[float, ...] = (0.0, 0.0, 0.0),
     ) -> Log:
-        motion = fourier_motion(upright, seed)
+        motion = fourier_motion(upright, seed, period=0.008)
         field = pin.exp3(-np.array(askew)) @ (upright.chain.gravity if gravity is None else gravity)
         f = upright.friction
         tau = f[:, 0] * np.tanh(motion.dq / WIDTH) + f[:, 1] * motion.dq + upright.rotor_inertia * motion.ddq

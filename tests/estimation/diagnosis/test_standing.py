@@ -100,7 +100,8 @@ def test_single_joint_logs_beside_another_find_nothing_that_is_not_there(
 @pytest.mark.slow
 def test_what_one_joint_alone_shows_is_found(arm: Robot, alone: Callable[..., Log]) -> None:
     """From logs of one moving joint each, a friction step is found, and stretches of its log measure the gain."""
-    found = diagnose(arm, [alone(0, 100.0, step=0.6), alone(1, 200.0)])
+    candidates = ("friction_step", "thermal_friction", "external_contact", "stribeck", "torque_sensor_drift")
+    found = diagnose(arm, [alone(0, 100.0, step=0.6), alone(1, 200.0)], candidates=candidates)
     assert [(finding.effect, finding.joint) for finding in found.findings] == [("friction_step", 1)]
     assert "a joint moves in one log only" in found.how_unseen or "acts in one log only" in found.how_unseen
     assert found.extended[0] < 0.8 * found.baseline[0]

@@ -50,3 +50,15 @@ def test_a_fault_still_refuses_all(er3a, good):
     wrong = replace(good(), q=np.rad2deg(good().q))
     with pytest.raises(InputError, match="degrees"):
         check_logs(er3a, [rest(good(), 0.0), wrong])
+
+
+@pytest.mark.slow
+def test_rows_that_are_given_twice_are_named(er3a, good):
+    """A copy under another name, and an excerpt with times of its own, are warnings; another motion is not."""
+    log = replace(good(), name="first")
+    excerpt = replace(log.rows(slice(0, 4000)), name="part")
+    excerpt = replace(excerpt, t=excerpt.t + 100.0)
+    reports = check_logs(er3a, [log, replace(log, name="copy"), excerpt, good(2)])
+    named = [[finding.name for finding in report.findings] for report in reports]
+    assert named == [[], ["same_rows"], ["same_rows"], []]
+    assert "100 % of its rows are those of first" in reports[1].findings[0].text

@@ -32,7 +32,8 @@ def experiment(er3a):
         search=oed.SearchOptions(effort=Effort(islands=1, starts=1, hops=0, screened=20), workers=1),
     )
     plant = nominal_plant(er3a, spread=0.1, seed=1, sensors=Sensors(coloured_share=0.5, correlation_time=0.04))
-    estimates = [identify(er3a, simulate(plant, plan.motion, seed=seed)) for seed in range(SEEDS)]
+    # The gate takes as long as the fit, and the logs differ in their noise only: one of them passes it.
+    estimates = [identify(er3a, simulate(plant, plan.motion, seed=seed), check=not seed) for seed in range(SEEDS)]
     truth = find_base_parameters(plant.model).from_standard(plant.parameters)
     errors = np.array([estimate.model.values for estimate in estimates]) - truth
     deviations = np.array([np.sqrt(np.diag(estimate.model.covariance)) for estimate in estimates])

@@ -74,14 +74,18 @@ def test_an_extended_model_says_the_same_once_loaded(name, base, moving, tmp_pat
     whole[list(base.columns)] = base.values
     tried = list(_extensions(EFFECTS[name], base, situation(base.torque_model, whole, t, *states)))
     assert tried
-    alone = base.torque(*states, t)
-    for extension in tried:
-        extended = replace(base, extensions=(extension,))
-        extended.save(tmp_path / "model.json", force=True)
-        expected = extended.torque(*states, t) - alone
-        loaded = load_model(tmp_path / "model.json")
+    replace(base, extensions=tuple(tried)).save(tmp_path / "model.json")
+    loaded = load_model(tmp_path / "model.json")
+    assert len(loaded.extensions) == len(tried)
+    alone, alone_loaded = base.torque(*states, t), replace(loaded, extensions=()).torque(*states, t)
+    np.testing.assert_allclose(alone_loaded, alone, rtol=0, atol=1e-8 * max(np.abs(alone).max(), 1.0))
+    for extension, again in zip(tried, loaded.extensions, strict=True):
+        expected = replace(base, extensions=(extension,)).torque(*states, t) - alone
         np.testing.assert_allclose(
-            loaded.torque(*states, t) - alone, expected, rtol=0, atol=1e-8 * max(np.abs(alone).max(), 1.0)
+            replace(loaded, extensions=(again,)).torque(*states, t) - alone,
+            expected,
+            rtol=0,
+            atol=1e-8 * max(np.abs(alone).max(), 1.0),
         )
 
 

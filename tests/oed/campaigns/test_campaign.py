@@ -114,7 +114,9 @@ def test_heat_is_the_work_of_friction(small_campaign: Campaign, two: Robot) -> N
 
 def test_temperatures_rise_in_heating_and_fall_in_cooling(er3a: Robot, er3a_design: Design) -> None:
     """Expected temperatures start at the surroundings', rise over the heating cycles and fall in the cooling test."""
-    made = oed.campaign(er3a, design=er3a_design, programme=Programme(cycles=4, cooling=3), ambient=25.0)
+    made = oed.campaign(
+        er3a, design=er3a_design, programme=Programme(cycles=4, cooling=3), ambient=25.0, collision=False
+    )
     assert made.temperatures is not None
     T1, T2 = made.temperatures.at([0.0, 300.0, 1200.0, 2100.0])
     np.testing.assert_allclose(T1[0], 25.0)
@@ -190,10 +192,11 @@ def test_a_changed_file_is_refused(saved: Path, tmp_path: Path) -> None:
 def test_a_design_is_read_from_its_folder(er3a: Robot, er3a_design: Design, tmp_path: Path) -> None:
     """A saved design is the excitation stage; one for another robot is refused, one for another description noted."""
     er3a_design.save(tmp_path)
-    made = oed.campaign(er3a, design=tmp_path, programme=Programme(cycles=1))
+    options = {"design": tmp_path, "programme": Programme(cycles=1), "collision": False}
+    made = oed.campaign(er3a, **options)
     np.testing.assert_array_equal(made.stages_by_name["excitation"].motion.q, er3a_design.motion.q)
     other = dataclasses.replace(er3a, digest="0" * 64)
-    assert any("another description" in n for n in oed.campaign(other, design=tmp_path).notes)
+    assert any("another description" in n for n in oed.campaign(other, **options).notes)
     with pytest.raises(InputError, match="for er3a, not for ur10"):
         oed.campaign(dataclasses.replace(er3a, name="ur10"), design=tmp_path)
     with pytest.raises(InputError, match=r"design\.json"):

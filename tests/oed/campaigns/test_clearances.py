@@ -23,7 +23,7 @@ SPARSE = 25
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", ["er3a", "ur10", "panda"])
+@pytest.mark.parametrize("name", ["er3a", "ur10", pytest.param("panda", marks=pytest.mark.longer)])
 def test_no_pose_of_a_trimmed_box_collides(name: str) -> None:
     """No pose of the box collides by coal's own distances, home is in it, and most of the wanted room is left.
 

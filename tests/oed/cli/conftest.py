@@ -109,7 +109,7 @@ def experiment(robot: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
 
     folder = tmp_path_factory.mktemp("experiment")
     described = load_robot(robot)
-    flat.design(described, effort=TINY, workers=1).save(folder)
+    flat.design(described, effort=TINY, workers=1, periods=1).save(folder)
     log = simulate(nominal_plant(described), read_trajectory(folder / "trajectory.csv")[0])
     write_log(folder / "log.csv", log)
     identify(described, [log]).save(folder)

@@ -10,7 +10,10 @@ import pytest
 
 from estimation import read_log
 from oed.exports import read_trajectory
+from robots.loading import load_robot
 from robots.version import VERSION
+from tests.oed import flat
+from tests.oed.cli.conftest import TINY
 
 RESULTS = {
     "design": ("trajectory.csv", "design.json", "report.html"),
@@ -23,12 +26,21 @@ RESULTS = {
 EACH = pytest.mark.parametrize("command", list(RESULTS))
 
 
+@pytest.fixture(scope="session")
+def short(robot: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A trajectory of 5 s without strokes, which is soon retimed."""
+    folder = tmp_path_factory.mktemp("short")
+    options = {"effort": TINY, "workers": 1, "periods": 1, "base_frequency": 0.25, "strokes": False}
+    flat.design(load_robot(robot), **options).save(folder)
+    return folder / "trajectory.csv"
+
+
 @pytest.fixture
-def arguments(robot: Path, experiment: Path, tmp_path: Path):
+def arguments(robot: Path, experiment: Path, short: Path, tmp_path: Path):
     """Give a command's arguments, its results going to this test's own folder."""
     lines = {
         "design": ["--robot", robot, "--effort", "quick", "--workers", 1, "--periods", 1, "--out", tmp_path],
-        "retime": [experiment / "trajectory.csv", "--robot", robot, "--out", tmp_path],
+        "retime": [short, "--robot", robot, "--out", tmp_path],
         "export": [experiment / "trajectory.csv", "--out", tmp_path / "out.csv"],
         "simulate": ["--robot", robot, "--trajectory", experiment / "trajectory.csv", "--out", tmp_path / "out.csv"],
         "identify": ["--robot", robot, "--log", experiment / "log.csv", "--out", tmp_path],

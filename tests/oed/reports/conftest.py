@@ -34,7 +34,7 @@ SEGMENTS = (
 
 @dataclass(frozen=True)
 class Case:
-    """A robot of n joints, the last of them prismatic where there are seven."""
+    """A robot of n joints, the last of them prismatic where there are two or seven."""
 
     n: int
     motion: Motion
@@ -44,7 +44,7 @@ class Case:
 
     @property
     def kinds(self) -> list[str]:
-        return ["revolute"] * (self.n - 1) + ["prismatic" if self.n == 7 else "revolute"]
+        return ["revolute"] * (self.n - 1) + ["prismatic" if self.n in (2, 7) else "revolute"]
 
     def pictures(self) -> tuple[Picture, ...]:
         """Draws everything there is."""
@@ -93,7 +93,7 @@ def build(n: int) -> Case:
     return Case(n, Motion(t, q, dq, ddq), limits, measured, predicted)
 
 
-@pytest.fixture(scope="session", params=[1, 7], ids=lambda n: f"{n} joints")
+@pytest.fixture(scope="session", params=[1, 2, pytest.param(7, marks=pytest.mark.longer)], ids=lambda n: f"{n} joints")
 def case(request: pytest.FixtureRequest) -> Case:
     return build(request.param)
 

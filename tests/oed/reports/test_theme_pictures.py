@@ -25,7 +25,7 @@ from robots.limits import Limits, Margin
 
 @pytest.mark.slow
 def test_all_pictures_are_drawn_by_both_libraries(case: Any, tmp_path: Path) -> None:
-    """Robots of one and seven joints, gaps in the torque and a prismatic joint included, can be drawn."""
+    """Robots of one and of more joints, gaps in the torque and a prismatic joint included, can be drawn."""
     for picture in case.pictures():
         assert len(to_plotly(picture).data) >= len(picture.panels)
         save_png(picture, tmp_path / f"{picture.name}.png", dpi=40)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import subprocess
 import sys
+from collections import OrderedDict
 from pathlib import Path
 
 import casadi
@@ -12,6 +13,7 @@ import numpy as np
 import pytest
 
 from robots.batch import batch_function, compiled
+from robots.batch.c_source import c_source
 from robots.batch.compiled import CompiledFunction
 from robots.batch.vectorised import VectorisedFunction
 from robots.common.errors import InputError
@@ -162,3 +164,22 @@ def test_two_processes_may_build_the_same(fresh, needs_compiler, monkeypatch, tm
     processes = [subprocess.Popen(command, cwd=ROOT, stdout=subprocess.PIPE, text=True) for _ in range(2)]
     assert [process.communicate(timeout=60)[0].strip() for process in processes] == ["50.0", "50.0"]
     assert [path.suffix for path in fresh.iterdir()] == [".so"]
+
+
+def test_a_function_that_is_built_again_is_not_written_again(needs_compiler, monkeypatch, tmp_path: Path) -> None:
+    """An equal function takes the source of the first; one that differs by a constant has its own."""
+    monkeypatch.setenv("ROBOT_OED_CACHE", str(tmp_path))
+    written = []
+    monkeypatch.setattr(compiled, "c_source", lambda function: written.append(function) or c_source(function))
+    monkeypatch.setattr(compiled, "_SOURCES", OrderedDict())
+    monkeypatch.setattr(compiled, "KEPT", 2)
+
+    def value(constant: float) -> float:
+        x = casadi.SX.sym("x")
+        return float(CompiledFunction(casadi.Function("f", [x], [constant - x]))(X)[0].ravel()[3])
+
+    assert [value(constant) for constant in (1.0, 1.0, 2.0, 1.0)] == [-2.0, -2.0, -1.0, -2.0]
+    assert len(written) == 2
+    # Two are kept, those used last.
+    assert [value(constant) for constant in (3.0, 1.0, 2.0)] == [0.0, -2.0, -1.0]
+    assert len(written) == 4

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import os
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -32,7 +34,7 @@ def test_robots_of_the_catalogue(name, catalogue_robot, twin, states):
 
 
 @pytest.mark.slow
-@settings(max_examples=80, deadline=None, derandomize=True)
+@settings(max_examples=80 if os.environ.get("LONGER") else 30, deadline=None, derandomize=True)
 @given(seed=st.integers(0, 10_000), n=st.integers(1, 8))
 def test_any_chain(seed, n, random_robot, twin, states):
     """Any chain of sliding and turning joints about oblique axes, under any gravity, gives pinocchio's torques."""

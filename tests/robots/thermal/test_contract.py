@@ -111,7 +111,7 @@ def test_the_ambient_temperature_is_felt(model: ThermalModel) -> None:
 @pytest.mark.slow
 def test_any_motion_is_followed(model: ThermalModel) -> None:
     """A motion of strokes and pauses gives the temperatures of its momentary power, within the stated error."""
-    t = np.arange(0.0, 600.0, 0.02)
+    t = np.arange(0.0, 400.0, 0.02)
     moving = (t % 200.0) < 120.0
     dq = np.where(moving, 3.0 * np.sin(2 * np.pi * t / 4.0), 0.0)
     cold = 9.0 * np.sign(dq) + 6.0 * dq

@@ -85,7 +85,7 @@ def _lag_of_gauge(motion: Motion, size: float, tau: np.ndarray) -> np.ndarray:
         (_swing, 0.1, "pattern:sway:0:even"),
         pytest.param(_rub, 0.1, "pattern:sway:0:odd", marks=pytest.mark.longer),
         (_bend, 0.2, "pattern:acceleration:0:even"),
-        (_creep, 0.1, "pattern:creep:0:even"),
+        pytest.param(_creep, 0.1, "pattern:creep:0:even", marks=pytest.mark.longer),
         pytest.param(_sag, 0.1, "pattern:supply:0:even", marks=pytest.mark.longer),
         pytest.param(_push, 0.1, "pattern:push:1:even", marks=pytest.mark.longer),
         pytest.param(_leak, 0.2, "pattern:ageing:0:even", marks=pytest.mark.longer),

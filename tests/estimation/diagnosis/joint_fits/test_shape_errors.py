@@ -45,7 +45,7 @@ def test_a_velocity_is_as_uncertain_as_its_exponent_lets_it_be(
     member = refine(problem, STRIBECK, (0.2, 1.0), nothing)
     velocity = member.shape[0]
     velocities = velocity * np.exp(np.linspace(-1.0, 1.0, 81))
-    exponents = np.linspace(0.5, 2.5, 41)
+    exponents = np.linspace(0.5, 2.5, 21)
     gains = np.array(
         [[score(problem, problem.measured(STRIBECK, (v, d)), nothing).gain for d in exponents] for v in velocities]
     )

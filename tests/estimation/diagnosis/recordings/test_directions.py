@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import cache
 
 import numpy as np
 import pytest
@@ -193,19 +194,44 @@ def test_torque_between_samples_is_not_trusted_beside_a_reversal(arm: Robot, fou
     assert _beside(Log(t=shaken, q=spline(shaken), tau=np.ones_like(motion.q)), arm) >= 6
 
 
+@pytest.fixture(scope="module")
+def long_motion(arm: Robot, fourier_motion: Callable) -> Callable[[float, float], tuple[Motion, Array, Array]]:
+    """Simulates a minute of motion with jumps of acceleration, once for all encoders."""
+
+    @cache
+    def build(friction: float, loop: float) -> tuple[Motion, Array, Array]:
+        motion = fourier_motion(arm, duration=59.9)
+        q, dq, _ = _kicked(motion, friction=friction, loop=loop)
+        return motion, q, dq
+
+    return build
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("counts", [2.0**17, 2.0**20, 2.0**24])
-@pytest.mark.parametrize(("friction", "loop"), [(0.0, 1.0), (0.03, 12.0), (0.3, 12.0), (1.0, 20.0), (3.0, 30.0)])
+@pytest.mark.parametrize(
+    ("friction", "loop"),
+    [
+        (0.0, 1.0),
+        (0.03, 12.0),
+        pytest.param(0.3, 12.0, marks=pytest.mark.longer),
+        pytest.param(1.0, 20.0, marks=pytest.mark.longer),
+        (3.0, 30.0),
+    ],
+)
 def test_positions_beside_reversals_tell_how_well_those_are_known(
-    arm: Robot, fourier_motion: Callable, friction: float, loop: float, counts: float
+    arm: Robot,
+    long_motion: Callable[[float, float], tuple[Motion, Array, Array]],
+    friction: float,
+    loop: float,
+    counts: float,
 ) -> None:
     """Rows that count have a velocity known to an eighth, except for 1 %, for any jump of acceleration and encoder.
 
     In the spectrum of a slow motion the jumps are below the encoder's noise, but next to reversals they show, or are
     small. Without jumps an encoder of a million counts gives reversal times to 0.3 ms.
     """
-    motion = fourier_motion(arm, duration=59.9)
-    q, dq, _ = _kicked(motion, friction=friction, loop=loop)
+    motion, q, dq = long_motion(friction, loop)
     recording = _trusting(arm, _counted(motion, q, counts))
     assert recording.reversal_time_error is not None
     if friction == 0.0 and counts >= 2**20:

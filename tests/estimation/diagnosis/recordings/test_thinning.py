@@ -157,6 +157,7 @@ def test_torque_that_is_cut_off_in_a_thinned_log_is_found(
     most = float(np.quantile(np.abs(log.tau[:, 0]), 0.95))
     tau = log.tau.copy()
     np.clip(tau[:, 0], -most, most, out=tau[:, 0])
-    (finding,) = diagnose(arm, [replace(log, tau=tau)]).findings
+    similar = ("current_clipping", "torque_constant_saturation", "current_lag", "friction_step")
+    (finding,) = diagnose(arm, [replace(log, tau=tau)], candidates=similar).findings
     assert (finding.effect, finding.joint) == ("current_clipping", 1)
     assert next(p.value for p in finding.parameters if p.unit == "N m") == pytest.approx(most, rel=0.02)

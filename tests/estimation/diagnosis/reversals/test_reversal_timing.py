@@ -69,7 +69,9 @@ def _timed(robot: Robot, log: Log) -> ReversalTiming:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("seed", "late"), [(1006, True), (1011, True), (1011, False)])
+@pytest.mark.parametrize(
+    ("seed", "late"), [pytest.param(1006, True, marks=pytest.mark.longer), (1011, True), (1011, False)]
+)
 def test_torque_that_is_late_is_told_by_each_joints_reversals(cases: Callable, seed: int, late: bool) -> None:
     """Each joint's delay is within four standard errors, and their mean within three, which fails once in a thousand.
 

@@ -13,10 +13,25 @@ from estimation.diagnosis.recordings.log_reading import build_recording
 from estimation.diagnosis.validations.gain_intervals import HeldOutErrors
 from estimation.diagnosis.validations.prediction_settings import with_band, with_best_cutoff, with_best_sign_sharpness
 from estimation.models.extension import Extension
+from estimation.models.model import Model
 from estimation.predictions.prediction import predict
 from robots.robot import Robot
 from robots.signals import Log
 from robots.terms import FrictionTerm
+
+FEW = ("friction_step", "stribeck")  # settings are those of the base model: none of the logs has an effect
+
+
+@pytest.fixture(scope="module")
+def quiet(arm: Robot, arm_log: Callable[..., Log]) -> Model:
+    """Returns the model of a log with little noise."""
+    return diagnose(arm, arm_log(torque_noise=0.02), candidates=FEW).model
+
+
+@pytest.fixture(scope="module")
+def noisy(arm: Robot, arm_log: Callable[..., Log]) -> Model:
+    """Returns the model of a log with more noise."""
+    return diagnose(arm, arm_log(torque_noise=0.05), candidates=FEW).model
 
 
 @pytest.mark.slow
@@ -28,7 +43,7 @@ def test_a_model_predicts_unseen_motion_about_as_well_as_any_smoothing_lets_it(
         replace(seen, q=seen.q + np.random.default_rng(4).normal(size=seen.q.shape) * [1e-3, 1e-6])
         for seen in (arm_log(torque_noise=0.02), arm_log(torque_noise=0.02, motion_seed=5, seed=5))
     )
-    model = diagnose(arm, log).model
+    model = diagnose(arm, log, candidates=FEW).model
     problem = pose_arm(build_recording(arm, [log]))
     lowest, highest = (
         extreme(problem.recording.cutoff, *(band.cutoff for band in problem.whitening.bands)) for extreme in (min, max)
@@ -48,14 +63,14 @@ def test_a_model_predicts_unseen_motion_about_as_well_as_any_smoothing_lets_it(
 @pytest.mark.slow
 @pytest.mark.parametrize("held_out", [True, False])
 def test_its_band_holds_most_errors_on_other_unseen_motions(
-    arm: Robot, arm_log: Callable[..., Log], held_out: bool
+    arm: Robot, arm_log: Callable[..., Log], noisy: Model, held_out: bool
 ) -> None:
     """The 95 % band contains 90 to 100 % of the errors on four other motions, with and without held-out logs.
 
     The noise of one motion of 20 s changes this by 3 %; that of four fixed motions, by half as much.
     """
     log, other, *more = (arm_log(torque_noise=0.05, motion_seed=k, seed=k) for k in range(6))
-    model = diagnose(arm, log, held_out=other if held_out else None).model
+    model = diagnose(arm, log, held_out=other, candidates=FEW).model if held_out else noisy
     assert predict(model, more[0]).band is not None
     shares = np.mean([predict(model, one).band_coverage for one in more], axis=0)
     assert np.all(np.abs(shares - 0.95) < 0.05)
@@ -66,11 +81,10 @@ def test_its_band_holds_most_errors_on_other_unseen_motions(
 
 
 @pytest.mark.slow
-def test_heat_of_the_logs_before_counts_in_its_errors(arm: Robot, arm_log: Callable[..., Log]) -> None:
+def test_heat_of_the_logs_before_counts_in_its_errors(quiet: Model, arm_log: Callable[..., Log]) -> None:
     """The held-out error of a thermal effect counts with the heat of the logs before."""
     first, other = (arm_log(torque_noise=0.02, motion_seed=k, seed=k) for k in range(2))
     other = replace(other, t=other.t + first.t[-1] + 5.0)
-    plain = diagnose(arm, first).model
     heat = Extension(
         effect="thermal_friction",
         joint=2,
@@ -78,7 +92,7 @@ def test_heat_of_the_logs_before_counts_in_its_errors(arm: Robot, arm_log: Calla
         coefficients=np.array([3.0, 0.0]),
         covariance=np.zeros((5, 5)),
     )
-    model = replace(plain, extensions=(heat,))
+    model = replace(quiet, extensions=(heat,))
     parts = np.ones((50, 2))
     unseen = HeldOutErrors("", np.arange(50.0), 1.0, parts, (parts, parts), parts > 0, None)
     told = with_band(model, [first], [other], unseen).provenance["unseen_nrmse"]
@@ -88,10 +102,9 @@ def test_heat_of_the_logs_before_counts_in_its_errors(arm: Robot, arm_log: Calla
 
 
 @pytest.mark.slow
-def test_its_band_grows_as_errors_do_on_parts_left_out(arm: Robot, arm_log: Callable[..., Log]) -> None:
+def test_its_band_grows_as_errors_do_on_parts_left_out(noisy: Model, arm_log: Callable[..., Log]) -> None:
     """The band grows by each joint's ratio of held-out to fit error, and is at least that of the fit."""
-    log = arm_log(torque_noise=0.05)
-    model = diagnose(arm, log).model
+    log, model = arm_log(torque_noise=0.05), noisy
     seen = np.quantile(np.abs(log.tau - predict(model, log).predicted), 0.95, axis=0)
     parts = np.ones((50, 2))
     fitted = (parts, np.array([1.5, 4.0]) * parts)
@@ -102,13 +115,13 @@ def test_its_band_grows_as_errors_do_on_parts_left_out(arm: Robot, arm_log: Call
 
 
 @pytest.mark.slow
-def test_friction_turns_round_as_sharply_as_all_rows_say(arm: Robot, arm_log: Callable[..., Log]) -> None:
+def test_friction_turns_round_as_sharply_as_all_rows_say(quiet: Model, arm_log: Callable[..., Log]) -> None:
     """The width of the sign is restored from rows near reversals, and improves the prediction.
 
     A diagnosis does not use these rows. The plant's sign is tanh(dq / 1 mrad/s), and its log has 2 % of noise.
     """
     log, other = (arm_log(torque_noise=0.02, motion_seed=k, seed=k) for k in range(2))
-    model = diagnose(arm, log).model
+    model = quiet
     for v0, worse in ((5e-4, 1.0), (0.016, 1.3)):
         terms = tuple(
             replace(term, velocity_scale=v0) if isinstance(term, FrictionTerm) else term

@@ -21,13 +21,20 @@ BRIEF = InteriorPoint(max_iter=25, finish_iter=15)
 
 
 def design(robot, **options):
-    settings = {"friction": "coulomb-viscous", "effort": TINY, "solver": BRIEF, "strokes": False, "workers": 1}
+    trajectory = {"strokes": False, "periods": 1}
+    settings = {"friction": "coulomb-viscous", "effort": TINY, "solver": BRIEF, "workers": 1, **trajectory}
     return flat.design(robot, **{**settings, **options})
 
 
 @pytest.fixture(scope="module")
 def er3a():
     return load_robot("er3a")
+
+
+@pytest.fixture(scope="module")
+def free_design(er3a):
+    """A design without any choice."""
+    return design(er3a)
 
 
 def weaker(robot, share):
@@ -96,11 +103,10 @@ def test_a_limit_below_gravity_is_told_first(er3a):
 
 
 @pytest.mark.slow
-def test_clearance_decides_and_is_proved(er3a):
+def test_clearance_decides_and_is_proved(er3a, free_design):
     """A design that watches collisions keeps its clearance at all times; without, the same seed collides."""
     model = collision_model(er3a)
-    free = design(er3a)
-    assert check_motion(model, free.motion, confirm=False).collides
+    assert check_motion(model, free_design.motion, confirm=False).collides
     kept = design(er3a, collision=True)
     report = check_motion(model, kept.motion)
     assert report.certified
@@ -123,9 +129,9 @@ def test_strokes_that_would_collide_are_left_out_or_free():
 
 
 @pytest.mark.slow
-def test_a_home_in_collision_is_refused(er3a):
+def test_a_home_in_collision_is_refused(er3a, free_design):
     """A start pose that the user states and that collides is told with the pair and the depth."""
-    motion = design(er3a).motion
+    motion = free_design.motion
     report = check_motion(collision_model(er3a), motion, confirm=False)
     home = motion.q[np.argmin(np.abs(motion.t - report.time[report.worst]))]
     with pytest.raises(InfeasibleError, match="mm"):
@@ -172,9 +178,9 @@ def test_scaling_is_reported_beside_the_plain_numbers(er3a, scaling):
 
 
 @pytest.mark.slow
-def test_essential_parameters_only(er3a, tmp_path):
+def test_essential_parameters_only(er3a, free_design, tmp_path):
     """With a share stated, columns whose torque is below it are left out, and what is left is easier to tell apart."""
-    whole, part = design(er3a), design(er3a, essential=0.02)
+    whole, part = free_design, design(er3a, essential=0.02)
     assert set(part.base.names) < set(whole.base.names)
     assert part.optimised.value("cond") < whole.optimised.value("cond")
     # By the description itself: each column left out is below the share of every joint's torque on the design.

@@ -31,13 +31,13 @@ def file_of(design: Design, folder: Path) -> bytes:
     return (folder / "trajectory.csv").read_bytes()
 
 
-def test_same_seed_same_file(robot_named, tiny, brief, tmp_path: Path) -> None:
+def test_same_seed_same_file(make_robot, tiny, brief, tmp_path: Path) -> None:
     """The same seed gives the same file byte for byte, in this process and in two others; another seed does not."""
-    effort = replace(tiny, islands=2)
+    robot, effort = make_robot("RR", "two"), replace(tiny, islands=2)
 
     def run(name: str, **options: object) -> bytes:
         chosen = {"friction": "coulomb-viscous", "effort": effort, "solver": brief, "periods": 1, **options}
-        return file_of(flat.design(robot_named("er3a"), **chosen), tmp_path / name)
+        return file_of(flat.design(robot, **chosen), tmp_path / name)
 
     here = run("here", workers=1)
     assert run("again", workers=1) == here
