@@ -102,7 +102,7 @@ class ModelComparison:
         else:
             parts = {item.name for item in self.significant if item.level == "part"}
             text = (
-                f"The runs differ significantly in {len(parts)} parts: {_listed(sorted(parts))}."
+                f"The runs differ significantly in {len(parts)} part{'s' * (len(parts) > 1)}: {_listed(sorted(parts))}."
                 if parts
                 else "The runs differ significantly, but no single part of a joint does."
             )

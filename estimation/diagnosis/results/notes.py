@@ -256,8 +256,9 @@ def _acts(member: FittedEffect, joint: int) -> bool:
 
 
 _SLIGHT = (
-    "{0} is significant too, but not reported as a finding. It explains only {2:.1f} % of what {1} explains on joint "
-    "{3}, which the formula error of that can produce. A log in which {1} acts less would decide."
+    "{0} is significant too, but not reported as a finding. On joint {3}, it improves the fit by only {2:.1f} % of "
+    "what {1} improves it by. A small error in the formula of {1} can produce the same residual. A log in which {1} "
+    "acts less would decide."
 )
 _NOT_ALIKE = (
     "{0} is significant too, but not reported as a finding. The formula error of {1}, or the drives' response to it, "

@@ -46,6 +46,7 @@ def test_friction_of_one_joint_is_named(draw, joint):
     assert change.sentence().startswith(f"Joint {joint}: friction +")
     assert "of this joint alone" in change.sentence()
     assert f"Friction changed on joint {joint} alone" in found.verdict()
+    assert "differ significantly in 1 part:" in found.verdict()
     assert {item.name for item in found.significant if item.level == "part"} == {f"friction of joint {joint}"}
 
 

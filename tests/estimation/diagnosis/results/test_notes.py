@@ -73,7 +73,9 @@ def test_what_is_as_small_as_formulas_leave_is_reported_all_the_same() -> None:
     )
     (note,) = beside_larger(step, [spring, friction])
     assert note.startswith("a step is significant too, but not reported as a finding.")
-    assert "explains only 6.0 % of what a friction explains on joint 3" in note
+    assert "On joint 3, it improves the fit by only 6.0 % of what a friction improves it by." in note
+    assert "A small error in the formula of a friction can produce the same residual." in note
+    assert max(len(sentence.split()) for sentence in note.split(". ")) <= 25
     (note,) = beside_larger(delay, [friction])
     assert note.startswith("a delay is significant too, but not reported as a finding. The formula error of a friction")
     assert beside_larger(None, [friction]) == ()
