@@ -67,18 +67,22 @@ def mujoco_corrected(names: Names) -> None:
 
 
 def two_robots(names: Names) -> None:
-    """Inertial parameters repeat, and the damage is found on the right robot, dated between two logs and sized."""
-    # 5 %: the thesis' own figure between cold and warm.
-    assert all(change < 0.05 for change in names["changes"].values())
-    assert names["cold_over_warm"] > 1.3
-    day, first, starts, true = names["day"], names["first"], names["STARTS"], 100 * names["DAMAGE"]
-    assert day == 1
-    assert starts[first - 1] < 60 <= starts[first]
-    assert all(len(names["alarms"][1, d]) == 0 for d in range(names["DAYS"]))
-    assert len(names["alarms"][2, 0]) == 0
-    assert abs(100 * names["sizes"].mean() - true) < 5.0
-    # The level alone does not show the damage on that day.
-    assert names["levels"][2, 1][first:].max() < names["levels"][1, 0][0]
+    """The thesis' findings: repeatable parameters, friction that heat changes, and a damage that is dated and sized."""
+    # The thesis' limit for inertial parameters.
+    assert all(change.size and change.max() < 0.05 for change in names["changes"].values())
+    assert np.abs(names["cold_over_warm"] - names["true_ratio"]).max() < 0.03
+    results, damage, moment = names["results"], names["DAMAGE"], names["moment"]
+    assert results[1, "with heat"] == []
+    assert [(f.kind, f.joint) for f in results[2, "with heat"]] == [("damage", names["JOINT"])]
+    found = results[2, "with heat"][0]
+    assert found.earliest <= moment <= found.latest
+    assert found.detected - moment < names["CYCLE"]
+    # Five points of 32 % are small beside the change by heat. The monitor's own size is too small, as the text says.
+    assert abs(names["cold_size"][0] - damage) < 0.05
+    assert found.size / 100 < damage
+    # Without heat the healthy robot gets alarms, too, and the damage is not found.
+    assert results[1, "without heat"] != []
+    assert all(f.kind != "damage" for f in results[2, "without heat"])
 
 
 def your_own_robot(names: Names) -> None:
