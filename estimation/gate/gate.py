@@ -19,7 +19,15 @@ from robots.signals import Log
 # Units are found by several checks; one finding of each kind is enough.
 UNITS = ("unit_of_time", "unit_of_position", "motor_side_position")
 # Causes, those of them that count as warnings, too, and findings of the fits that they explain.
-CAUSES = ("gravity_direction", "static_poses", "swapped_columns", "torque_meaning", "unit_of_position", "wrapped_angle")
+CAUSES = (
+    "gravity_direction",
+    "static_poses",
+    "swapped_columns",
+    "torque_meaning",
+    "unit_of_position",
+    "unit_of_time",
+    "wrapped_angle",
+)
 FITTED = ("gravity_direction", "swapped_columns")
 CONSEQUENCES = (
     "badly_excited",

@@ -70,6 +70,7 @@ def test_milliseconds_are_refused(good, spoilt):
     """A step of 4 s on a robot with a controller of 4 ms is one of milliseconds."""
     report = spoilt(t=1e3 * good().t)
     assert "milliseconds" in found(report, "unit_of_time")[0].text
+    assert {finding.name for finding in report.findings} == {"unit_of_time"}
     assert report.refused
 
 
