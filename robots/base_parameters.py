@@ -153,7 +153,7 @@ def find_base_parameters(
     A column that the ones before it span, on random states all over the robot's ranges, is regrouped into them
     (thesis section 1.3.1); the singular values must confirm the rank (section 1.3.2). Columns are measured against the
     largest of their kind (masses, moments, inertias, ...): where right angles are rounded to 1.57, some stand out by
-    parts in a million, which no experiment can tell; `BaseParameters.neglected` says how much that is.
+    parts in a million, which no experiment can show; `BaseParameters.neglected` says how much that is.
 
     Args:
         model: the torque model.

@@ -121,7 +121,7 @@ class Motion(_Samples):
                 that it begins one step (the last of the motion before) after the one before.
 
         Raises:
-            InputError: no motion, another number of joints, times that do not increase, or nothing to tell the step.
+            InputError: no motion, another number of joints, times that do not increase, or nothing that shows the step.
         """
         motions = list(motions)
         if not motions:

@@ -33,12 +33,12 @@ class FrictionChange:
         run: index of the run that is compared with the first.
         total: log of the ratio of mean frictions.
         total_error: its standard error.
-        common: log ratio that the other joints share; NaN where they cannot tell.
+        common: log ratio that the other joints share; NaN where they do not show it.
         own: what this joint has beyond it.
         own_error: standard error of `own` by the noise.
         own_scatter: the same with the scatter that unequal heating makes.
         kind: unchanged; common to all joints; own; unequal: beyond the noise, but not beyond unequal heating; changed:
-            too few joints to tell.
+            too few joints to decide.
     """
 
     joint: int

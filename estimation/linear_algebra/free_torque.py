@@ -47,7 +47,7 @@ def span_of(pieces: Sequence[Piece], rows: int) -> FreeTorque:
     """Builds the span of the columns of pieces, (first row, values (m, k)) each, in any order.
 
     Of each piece, the one that begins first first, those combinations stay that are not zero beside the pieces before:
-    the eigenvalues of its Schur complement tell.
+    the eigenvalues of its Schur complement show it.
     """
     kept: list[Piece] = []
     lines: list[tuple[int, Array]] = []  # of the factor: the first column that is not zero, and values up to the last

@@ -36,7 +36,7 @@ def is_bag_folder(path: Path) -> bool:
 
 
 def form_of(path: Path) -> str:
-    """Finds the format of a file: by its first bytes where the name does not tell.
+    """Finds the format of a file: by its first bytes where the name does not say it.
 
     Args:
         path: an existing file.
@@ -67,7 +67,7 @@ def form_of(path: Path) -> str:
 
 
 def column_names(path: str | PathLike[str]) -> list[str] | None:
-    """Lists the columns of a table without reading it; None where only reading would tell.
+    """Lists the columns of a table without reading it; None where only reading would show them.
 
     Args:
         path: a log.

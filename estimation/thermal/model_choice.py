@@ -48,7 +48,7 @@ def choose_thermal(
             where there are two or more.
         alpha: slope of the friction, where it is known [1/K].
         fixed: other known parameters, by model and name.
-        start: see `fit_thermal`; settled once, by the first model that can tell.
+        start: see `fit_thermal`; settled once, by the first model that can decide.
         starts: see `fit_thermal`.
         seed: see `fit_thermal`.
         progress: receives the progress.

@@ -12,7 +12,7 @@ Array = NDArray[np.float64]
 
 # Groups whose columns are held twice at a time.
 CHUNK = 2048
-# The deviations within groups are a small part, and every so many pieces of the rows are enough to tell it.
+# The deviations within groups are a small part, and every so many pieces of the rows are enough to estimate it.
 EVERY = 4
 
 

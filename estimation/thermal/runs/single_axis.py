@@ -126,7 +126,7 @@ def sweep_friction(t: ArrayLike, q: ArrayLike, dq: ArrayLike, tau: ArrayLike, *,
 
     Raises:
         InputError: arrays of other shapes.
-        NotIdentifiableError: no stretch of constant speed, or strokes too short to tell gravity from friction.
+        NotIdentifiableError: no stretch of constant speed, or strokes too short to separate gravity from friction.
     """
     time, position, v, torque = _arrays(t, q, dq, tau)
     stretches = constant_speeds(v)
