@@ -246,7 +246,7 @@ def test_log_of_another_robot_is_an_input_error(arm, good):
 @pytest.mark.slow
 def test_report_has_verdict_findings_and_actions(good, spoilt):
     """Summary, table and JSON name verdict, findings, numbers and what to do."""
-    report = spoilt(t=1e3 * good().t, tau=-good().tau)
+    report = spoilt(t=1e3 * good().t, q=np.rad2deg(good().q))
     assert "refused" in report.summary()
     assert "milliseconds" in report.summary()
     frame = report.to_frame()
