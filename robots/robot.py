@@ -148,6 +148,11 @@ class Robot:
         """Whether the inertial parameters of every link are known."""
         return bool(np.isfinite(self.inertia).all())
 
+    @property
+    def has_masses(self) -> bool:
+        """Whether these are known and not all zero."""
+        return self.has_inertia and bool(np.any(self.inertia))
+
 
 # The robot keeps its compiled functions, so that they are not compiled again for each log.
 @lru_cache(maxsize=64)

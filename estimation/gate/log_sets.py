@@ -6,6 +6,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from estimation.gate.finding import Finding
 from estimation.gate.gate import check_log
@@ -45,8 +46,9 @@ def check_logs(
         reports.append(report)
     if all(report.without_motion for report in reports):
         reports[0].raise_if_refused()
+    keys = [_row_keys(log) for log in logs] if len(logs) > 1 else []
     for later, report in enumerate(reports):
-        shares = [_repeated_share(logs[later], other) for other in logs[:later]]
+        shares = [len(np.intersect1d(keys[later], other)) / max(len(keys[later]), 1) for other in keys[:later]]
         if not report.without_motion and max(shares, default=0.0) > REPEATED:
             earlier = int(np.argmax(shares))
             found = _repeated(logs[earlier], earlier, shares[earlier])
@@ -54,14 +56,12 @@ def check_logs(
     return tuple(report.left_out() if report.without_motion else report for report in reports)
 
 
-def _repeated_share(log: Log, other: Log) -> float:
-    """Share of a log's rows whose positions and torques another log has to the last digit."""
-    rows = [np.ascontiguousarray(np.hstack([one.q, one.q if one.tau is None else one.tau])) for one in (log, other)]
-    if rows[0].shape[1] != rows[1].shape[1]:
-        return 0.0
-    # Rows at rest are alike in any log.
-    keys = [np.unique(values.view(np.dtype((np.void, values.itemsize * values.shape[1]))).ravel()) for values in rows]
-    return float(len(np.intersect1d(keys[0], keys[1], assume_unique=True)) / max(len(keys[0]), 1))
+def _row_keys(log: Log) -> NDArray[np.uint64]:
+    """A number for each different row of positions and torques: those at rest are alike in any log, and count once."""
+    rows = np.ascontiguousarray(np.hstack([log.q, log.q if log.tau is None else log.tau])).view(np.uint64)
+    # Sums of products with odd numbers, modulo 2^64: two rows share one with a chance of 2^-64.
+    factors = np.random.default_rng(0).integers(0, 2**63, rows.shape[1], dtype=np.uint64) * np.uint64(2) + np.uint64(1)
+    return np.unique(rows @ factors)
 
 
 def _repeated(other: Log, number: int, share: float) -> Finding:

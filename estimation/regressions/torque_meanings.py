@@ -133,7 +133,7 @@ def _gravity(robot: Robot, log: Log) -> Array:
 
 
 def _described(robot: Robot, log: Log, meaning: str) -> Callable[[Array, Array, Array], Array]:
-    if not robot.has_inertia or not np.any(robot.inertia):
+    if not robot.has_masses:
         raise InputError(
             f"torque_is {meaning} needs the links of the robot's description",
             file=_file(log),

@@ -69,18 +69,12 @@ class CandidateFits:
         unexplained = fit_all(moments, spread, (RIDGE,) if few else RIDGES).unexplained[joints]
         return float(np.mean(np.log(np.clip(unexplained, 1e-9, 1.0))))
 
-    @property
-    def described(self) -> bool:
-        """Whether the robot's description has links with mass."""
-        inertia = np.asarray(self.robot.inertia, dtype=float)
-        return bool(np.isfinite(inertia).all() and inertia.any())
-
     def described_gravity(self) -> Array | None:
         """Estimates gravity (3,) [m/s2] from the described links, with free friction, offset and rotor inertia.
 
         None without described links.
         """
-        if not self.described:
+        if not self.robot.has_masses:
             return None
         described = np.asarray(self.robot.inertia, dtype=float).ravel()
         rows = self._meant(Meaning(), FEW_ROWS)

@@ -100,7 +100,7 @@ def _gravities(fits: CandidateFits) -> list[_Cause]:
     return [
         *(_Cause("gravity", Meaning(gravity=direction)) for direction in others),
         _Cause("weightless", Meaning(gravity=np.zeros(3))),
-        *([_Cause("weightless", Meaning(compensated=True))] if fits.described else []),
+        *([_Cause("weightless", Meaning(compensated=True))] if fits.robot.has_masses else []),
     ]
 
 
@@ -164,8 +164,7 @@ def _signs(robot: Robot, joints: list[int]) -> list[_Cause]:
 
 def _sizes(context: Context) -> list[_Cause]:
     """Lists torques of the described size, if the description has links and some joints are far from it."""
-    described = np.asarray(context.robot.inertia, dtype=float).ravel()
-    if not np.isfinite(described).all() or not described.any():
+    if not context.robot.has_masses:
         return []
     evidence = joint_evidence(context.fitted)
     for best in hypotheses(context.robot, evidence)[:1] if evidence else []:

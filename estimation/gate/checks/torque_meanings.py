@@ -62,9 +62,8 @@ class TorqueMeanings(Check):
 
     def run(self, context: Context) -> list[Finding]:
         """Reports one meaning at most, or large nominal errors without one."""
-        described = np.asarray(context.robot.inertia, dtype=float).ravel()
         explained = any(finding.severity != "info" for finding in context.found(EXPLAINED))
-        if not np.isfinite(described).all() or not described.any() or explained:
+        if not context.robot.has_masses or explained:
             return []
         if context.cleaned.columns.prefix != "tau" or not (context.fitted.unexplained < HOPELESS).any():
             return []

@@ -29,7 +29,7 @@ PAUSE = 8.0
 
 @dataclass(frozen=True, eq=False)
 class LogStream:
-    """A log in one or several Parquet files on one clock, of which some rows at a time are in memory.
+    """A log in one or several Parquet files on one clock. Only some of its rows are in memory at a time.
 
     Attributes:
         path: the file, or the folder of the parts.

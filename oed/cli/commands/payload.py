@@ -93,6 +93,10 @@ def payload(
     """
     console = Console(json=json, quiet=quiet)
     with console.working() as progress:
+        from dataclasses import replace
+
+        import numpy as np
+
         from estimation import identify_payload, load_model, read_logs
         from estimation.payloads.exports import payload_export
         from oed.reports import save_payload_report
@@ -129,11 +133,14 @@ def payload(
             options["kinds"] = described.chain.kinds
             loaded, free = read_logs(log, **options), read_logs(without, **options) if without else ()
             both = with_known_setup([*loaded, *free], payload, gravity)
-            reference = described if known is None else known.robot
-            reference, logs = with_torque_meaning(reference, both, torque_is, both[len(loaded) :])
+            if known is not None:
+                stated = np.asarray(described.torque_constant)
+                filled = np.where(np.isnan(stated), known.robot.torque_constant, stated)
+                described = replace(described, torque_constant=filled)
+            described, logs = with_torque_meaning(described, both, torque_is, both[len(loaded) :])
             result = identify_payload(
                 logs[: len(loaded)],
-                robot=None if known is not None else reference,
+                robot=None if known is not None else described,
                 without=logs[len(loaded) :],
                 model=known,
                 seed=seed,

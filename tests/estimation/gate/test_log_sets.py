@@ -1,4 +1,4 @@
-"""Logs that are fitted together, some of which rest."""
+"""Logs that are fitted together: some rest, and some have the same rows."""
 
 from dataclasses import replace
 
