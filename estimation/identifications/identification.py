@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,9 +10,10 @@ from numpy.typing import NDArray
 from estimation.estimators import Estimator
 from estimation.estimators import estimator as choose_estimator
 from estimation.gate import check_logs
-from estimation.identifications.choices import VELOCITY_SCALES, Candidates, Choice, choose
+from estimation.identifications.choices import Candidates, Choice, choose
 from estimation.identifications.estimate import Estimate, JointFit, colour_of
 from estimation.identifications.fit import Fit, fit
+from estimation.identifications.model_forms import ModelForm
 from estimation.identifications.transfer import band_of
 from estimation.identifications.verdicts import determined_parameters, require_predictable
 from estimation.logs.known_setup import gravities_of, require_plain
@@ -23,14 +23,12 @@ from estimation.preprocessing import Harmonics
 from estimation.regressions.preparation import Prepared, prepare_all
 from estimation.regressions.torque_meanings import as_joint_torque, with_torque_constants
 from estimation.uncertainty import fast_noise, period_noise
-from robots.base_parameters import find_base_parameters
 from robots.common.errors import InputError, NotIdentifiableError
 from robots.common.parallel import one_blas_thread
 from robots.common.progress import SILENT, Progress
-from robots.regressor import TorqueModel, default_model
 from robots.robot import Robot
 from robots.signals import Log
-from robots.terms import BendingFriction, FrictionTerm, PositionTorque
+from robots.terms import BendingFriction, FrictionTerm
 from robots.terms.friction import USUAL
 from robots.version import VERSION
 
@@ -106,24 +104,13 @@ def identify(
     by_position = friction == "auto" if position is None else position
     if friction == "auto":
         friction = BendingFriction.within(usual_speeds(prepared))
-
-    def model(scales: float | tuple[float, ...], with_position: bool) -> TorqueModel:
-        plain = default_model(robot, friction=friction, velocity_scale=scales, rotor=rotor, offset=offset)
-        return replace(plain, terms=(*plain.terms, PositionTorque())) if with_position else plain
-
-    try:
-        sharp = model(VELOCITY_SCALES[0], by_position)
-    except InputError as error:
-        raise InputError(error.problem, allowed=error.allowed and f"auto, {error.allowed}") from error
-    base = find_base_parameters(sharp, gravities=gravities_of(data))
+    form = ModelForm(robot, friction, rotor, offset, gravities_of(data))
+    base = form.first(by_position)
     bar.update(1.0, "choosing smoothing and model")
     choice = choose(base, prepared, chosen, candidates or Candidates(), position=position)
     predictable = _predictable(prepared, choice)
     bar.update(2.0, "fitting")
-    if choice.position != by_position:
-        base = find_base_parameters(model(VELOCITY_SCALES[0], False), gravities=gravities_of(data))
-    if set(choice.velocity_scales) != {VELOCITY_SCALES[0]}:
-        base = replace(base, model=model(choice.velocity_scales, choice.position))
+    base = form.chosen(base, choice, by_position)
     found = fit(base, prepared, chosen, choice, seed)
     joints = _joint_fits(found, predictable)
     determined = determined_parameters(found, joints)

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from estimation.estimators import Estimator, Solution
 from estimation.estimators import estimator as choose_estimator
-from estimation.identifications.choices import VELOCITY_SCALES, Candidates, Choice, choose
+from estimation.identifications.choices import Candidates, Choice, choose
 from estimation.identifications.comparison import MOST_ROWS, STRETCHES
 from estimation.identifications.estimate import Estimate, JointFit, colour_of
 from estimation.identifications.fit import (
@@ -21,6 +21,7 @@ from estimation.identifications.fit import (
     sum_moments,
 )
 from estimation.identifications.identification import describe_fit
+from estimation.identifications.model_forms import ModelForm
 from estimation.identifications.streams.errors import Errors
 from estimation.identifications.streams.pieces import Pieces
 from estimation.identifications.streams.survey import BLOCK, merged_report, survey
@@ -32,13 +33,12 @@ from estimation.regressions.braking_friction import with_braking_friction
 from estimation.regressions.joint_regressor import JointRegressor
 from estimation.regressions.moments import Moments
 from estimation.regressions.torque_meanings import with_torque_constants
-from robots.base_parameters import BaseParameters, find_base_parameters
+from robots.base_parameters import BaseParameters
 from robots.common.errors import InputError, NotIdentifiableError
 from robots.common.parallel import one_blas_thread
 from robots.common.progress import SILENT, Progress
-from robots.regressor import TorqueModel, default_model
 from robots.robot import Robot
-from robots.terms import BendingFriction, FrictionTerm, PositionTorque
+from robots.terms import BendingFriction, FrictionTerm
 
 Array = NDArray[np.float64]
 
@@ -107,13 +107,8 @@ def identify_stream(
     by_position = friction == "auto" if position is None else position
     if friction == "auto":
         friction = BendingFriction.within(found.usual)
-    gravities = [] if stream.gravity is None else [stream.gravity]
-
-    def model(scales: float | tuple[float, ...], with_position: bool) -> TorqueModel:
-        plain = default_model(robot, friction=friction, velocity_scale=scales, rotor=rotor, offset=offset)
-        return replace(plain, terms=(*plain.terms, PositionTorque())) if with_position else plain
-
-    base = find_base_parameters(model(VELOCITY_SCALES[0], by_position), gravities=gravities)
+    form = ModelForm(robot, friction, rotor, offset, [] if stream.gravity is None else [stream.gravity])
+    base = form.first(by_position)
     bar.advance(0, "choosing smoothing and model")
     stretches = pieces.stretches(STRETCHES, MOST_ROWS // STRETCHES)
     low_pass = replace(candidates or Candidates(), smoothers=())
@@ -122,10 +117,7 @@ def identify_stream(
     # The stretches are one log: how they differ is no contradiction between logs.
     choice = replace(choice, contradiction=None)
     predictable = require_predictable(moves, found.lowest, found.highest, choice)
-    if choice.position != by_position:
-        base = find_base_parameters(model(VELOCITY_SCALES[0], False), gravities=gravities)
-    if set(choice.velocity_scales) != {VELOCITY_SCALES[0]}:
-        base = replace(base, model=model(choice.velocity_scales, choice.position))
+    base = form.chosen(base, choice, by_position)
     period = float(np.median([part.period for part in found.segments]))
     fitted, errors = _fit(base, pieces, chosen, choice, seed, bar, period)
     joints = _joints(fitted, errors, predictable)
