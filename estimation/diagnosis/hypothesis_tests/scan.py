@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import sys
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property, partial
 from typing import TypeVar
 
@@ -104,7 +104,8 @@ def measure(
         One entry per hypothesis that the data can show.
     """
     entries = forked(partial(_entry, problem), hypotheses, advance, chunk=CHUNK)
-    return [entry for entry in entries if entry is not None]
+    # Effects are compared by identity, and a forked process returns a copy.
+    return [replace(entry, hypothesis=own) for own, entry in zip(hypotheses, entries, strict=True) if entry is not None]
 
 
 def _entry(problem: Problem, hypothesis: Hypothesis) -> Entry | None:

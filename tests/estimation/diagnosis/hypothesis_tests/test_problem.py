@@ -13,6 +13,7 @@ from estimation.diagnosis.hypothesis_tests.problem import Problem
 from estimation.diagnosis.hypothesis_tests.scan import measure, neg_log_p, scan
 from estimation.diagnosis.hypothesis_tests.scoring import accept, score
 from estimation.diagnosis.recordings.log_reading import build_recording
+from robots.common import forks
 from robots.plants import Plant
 from robots.robot import Robot
 from robots.signals import Log
@@ -82,6 +83,15 @@ def test_bounds_hold_a_coefficient_back(problem: Problem) -> None:
     gain, held = result.bounded(far, 2 * far)
     assert np.all(held >= far - 3.01 * np.sqrt(np.sum(result.root**2, axis=0)))
     assert gain < result.gain
+
+
+def test_a_scan_on_several_cores_keeps_the_hypotheses(problem: Problem, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Effects are compared by identity: an entry that a forked process returns has the caller's hypothesis."""
+    monkeypatch.setattr(forks, "available_cores", lambda: 2)
+    given = [Hypothesis(EFFECTS["asymmetric_friction"], joint) for joint in (1, 2)] * 3
+    entries = measure(problem, given)
+    assert len(entries) == len(given)
+    assert all(entry.hypothesis is own for entry, own in zip(entries, given, strict=True))
 
 
 def test_a_coefficient_of_the_wrong_sign_explains_nothing(problem: Problem) -> None:
