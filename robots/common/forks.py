@@ -33,7 +33,8 @@ def forked(
     """Applies a function to every item in forked processes, one per core, and returns the results in order.
 
     A fork shares the data of this process without a copy, so only the results must pickle. Threads do the work where
-    processes cannot be forked safely (Windows, macOS), where this process is itself a worker, and if a fork dies.
+    processes cannot be forked safely (Windows, macOS), and if a fork dies. Where this process is itself one of several
+    workers, the work is done in it.
 
     Args:
         function: what to do with one item; any closure.

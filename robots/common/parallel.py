@@ -142,8 +142,9 @@ def threaded(function: Callable[[Item], Result], items: Iterable[Item]) -> Itera
     """Applies a function on some threads and gives the results in order, a few ahead of who takes them.
 
     Compiled code, linear algebra and filters leave Python's lock; sums taken in order come out alike on any machine.
+    One of several workers has one thread: the other cores are busy.
     """
-    threads = min(available_cores(), MOST_THREADS)
+    threads = 1 if is_worker() else min(available_cores(), MOST_THREADS)
     if threads == 1:
         yield from map(function, items)
         return

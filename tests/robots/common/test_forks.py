@@ -6,6 +6,7 @@ import multiprocessing
 import os
 import signal
 import sys
+import threading
 
 import numpy as np
 import pytest
@@ -75,7 +76,9 @@ def test_a_worker_process_does_not_fork(monkeypatch: pytest.MonkeyPatch) -> None
 
 
 def test_workers_of_a_cluster_do_not_fork(monkeypatch: pytest.MonkeyPatch) -> None:
-    """A process that is marked as one of several workers does the work itself, in threads."""
+    """A process that is marked as one of several workers does the work itself, in one thread."""
     monkeypatch.setattr(parallel._marks, "worker", False)
+    monkeypatch.setattr(parallel, "available_cores", lambda: 4)
     parallel.mark_as_worker()
-    assert set(forked(lambda _: os.getpid(), range(4))) == {os.getpid()}
+    places = set(forked(lambda _: (os.getpid(), threading.get_ident()), range(8)))
+    assert places == {(os.getpid(), threading.get_ident())}
