@@ -8,8 +8,14 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from estimation.payloads.intervals import AXES, Quantity
+from robots.base_parameters import find_base_parameters
 from robots.common.errors import InputError, NotIdentifiableError
+from robots.geometry.chain import Chain
+from robots.regressor import TorqueModel
 from robots.robot import Robot
+from robots.terms import RigidBody
+from robots.terms.situations.flange_body import last_link
+from robots.terms.situations.sensitivities import moved_body
 
 Array = NDArray[np.float64]
 
@@ -25,6 +31,8 @@ LITTLE, WRIST = 0.8, 3
 STEADY = 0.2
 # Poses that are looked at.
 POSES = 300
+# A parameter is in the torques of a robot if its unit vector lies in the space of those that are, but for this part.
+SHOWN = 1e-6
 
 
 def determined(found: Sequence[Quantity]) -> tuple[bool, ...]:
@@ -57,13 +65,17 @@ def require_determined(found: Sequence[Quantity], robot: Robot, q: ArrayLike, gr
             remedy="swap --log and --without, or check which log has the payload",
         )
     shown = f"{free:.3g} ({free - mass.half_width:.3g} to {free + mass.half_width:.3g}) kg"
+    never = never_shown(robot, gravity)
     missing = missing_motion(robot, q, gravity)
     if not known["mass"]:
+        structural = f"no motion of {robot.name} shows the mass of a payload" if "mass" in never else ""
         raise NotIdentifiableError(
             f"the log does not determine the payload's mass: {shown}",
-            remedy=missing or "check that the payload was on the flange; record a longer log, or a heavier payload",
+            remedy=structural
+            or missing
+            or "check that the payload was on the flange; record a longer log, or a heavier payload",
         )
-    axes = [axis for axis in AXES if not known[f"centre_{axis}"]]
+    axes = [axis for axis in AXES if not known[f"centre_{axis}"] and f"centre_{axis}" not in never]
     if axes:
         raise NotIdentifiableError(
             f"the log does not determine the payload's centre of mass along {', '.join(axes)} of the flange (the mass "
@@ -72,8 +84,30 @@ def require_determined(found: Sequence[Quantity], robot: Robot, q: ArrayLike, gr
         )
 
 
+def never_shown(robot: Robot, gravity: Array | None) -> frozenset[str]:
+    """Names what the torques of a robot show of no payload, whatever the motion.
+
+    The height of the centre of mass on a SCARA is an example: the flange never tilts.
+
+    Args:
+        robot: the robot.
+        gravity: in the base frame (3,) [m/s2]; None as described.
+
+    Returns:
+        Of ``mass``, ``centre_x``, ``centre_y`` and ``centre_z`` in the flange frame, those that no motion shows.
+    """
+    model = TorqueModel(robot.under(gravity), (RigidBody(),))
+    columns = last_link(model)
+    base = find_base_parameters(model, columns=columns)
+    grouping = base.grouping[:, list(columns)] @ moved_body(robot.chain.tip)
+    space = np.linalg.qr(grouping.T)[0]
+    parts = np.linalg.norm(space[:4], axis=1)  # of the unit vectors of mass and first moments
+    names = ("mass", *(f"centre_{axis}" for axis in AXES))
+    return frozenset(name for name, part in zip(names, parts, strict=True) if part < 1 - SHOWN)
+
+
 def missing_motion(robot: Robot, q: ArrayLike, gravity: Array | None) -> str:
-    """Says which motion of the wrist a log lacks; empty if gravity acts along all axes of the flange.
+    """Says which motion of the wrist a log lacks; empty if gravity acts along all axes of the flange that it can.
 
     Args:
         robot: the robot.
@@ -84,10 +118,9 @@ def missing_motion(robot: Robot, q: ArrayLike, gravity: Array | None) -> str:
     positions = positions[:: max(1, len(positions) // POSES)]
     ranges = np.ptp(positions, axis=0)
     chain = robot.under(gravity).chain
-    field = np.asarray(chain.gravity, dtype=float)
-    field = field / max(float(np.linalg.norm(field)), np.finfo(float).tiny)
-    along = np.einsum("tij,i->tj", chain.flange(positions)[:, :3, :3], field)
-    steady = [axis for axis, spread in zip(AXES, along.std(axis=0), strict=True) if spread < STEADY]
+    anywhere = np.random.default_rng(0).uniform(-np.pi, np.pi, (POSES, robot.n))
+    turned, possible = (_gravity_spread(chain, poses) for poses in (positions, anywhere))
+    steady = [axis for k, axis in enumerate(AXES) if turned[k] < STEADY <= possible[k]]
     wrist = [
         joint
         for joint in range(max(0, robot.n - WRIST), robot.n)
@@ -102,3 +135,10 @@ def missing_motion(robot: Robot, q: ArrayLike, gravity: Array | None) -> str:
     goal = f", so that gravity turns along {', '.join(steady)} of the flange" if steady else ""
     design = f"`oed design --robot {robot.origin or robot.name} --payload-only`"
     return f"{move}{goal}; {design} designs such a motion"
+
+
+def _gravity_spread(chain: Chain, positions: Array) -> Array:
+    """Standard deviation (3,) of gravity's direction in the flange frame over positions (N, n)."""
+    field = np.asarray(chain.gravity, dtype=float)
+    field = field / max(float(np.linalg.norm(field)), np.finfo(float).tiny)
+    return np.asarray(np.einsum("tij,i->tj", chain.flange(positions)[:, :3, :3], field).std(axis=0))

@@ -107,6 +107,13 @@ class PayloadEstimate:
         """Which of the quantities the logs determine."""
         return determined(self.quantities)
 
+    @property
+    def source(self) -> str:
+        """One line for files that carry the body: where it comes from, and which of its numbers no log determines."""
+        open_ = [item.name for item, known in zip(self.quantities, self.determined, strict=True) if not known]
+        named = f"; assumed, not determined by the logs: {', '.join(open_)}" if open_ else ""
+        return f"payload of {self.robot}, identified by robot-oed{named}"
+
     def seen_from(self, pose: ArrayLike) -> PayloadEstimate:
         """Gives the result in a frame with this pose (4, 4) in the flange frame."""
         return replace(self, frame=np.asarray(pose, dtype=float))
@@ -116,7 +123,10 @@ class PayloadEstimate:
         where = "flange frame" if np.array_equal(self.frame, np.eye(4)) else "frame of --frame"
         lines = [f"{self.robot}: payload by {METHODS[self.method]} ({self.rows} rows); {where}, 95 % intervals"]
         for item, known in zip(self.quantities, self.determined, strict=True):
-            mark = "" if known else "  not determined; typical of a body of this mass"
+            # A centre that another motion would show is refused by the identification.
+            never = item.unit == "m"
+            open_ = "no motion of this robot shows it" if never else "typical of a body of this mass"
+            mark = "" if known else f"  not determined; {open_}"
             title = TITLES.get(item.name, f"{item.name} about the centre of mass")
             value = f"{item.value:.4g} ({item.lower:.4g} to {item.upper:.4g}) {item.unit}"
             lines.append(f"  {title:28} {value}{mark}")

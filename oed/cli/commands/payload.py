@@ -149,7 +149,7 @@ def payload(
             result.save(folder.path("payload.json").parent)
             save_payload_report(result, folder, png=png)
             for form in forms:
-                text = form.text(result.seen, f"payload of {result.robot}, identified by robot-oed")
+                text = form.text(result.seen, result.source)
                 folder.path(form.file).write_text(text, encoding="utf-8")
     written = "".join(f"\n{form.title} written to {(out / form.file).resolve()}" for form in forms)
     console.result(f"{result.summary()}\nwritten to {out.resolve()}{written}", result.to_dict())
