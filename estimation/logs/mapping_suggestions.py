@@ -7,14 +7,15 @@ import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-# Words of a column's name, in the order in which quantities are recognised. A velocity's name often has a position's.
+# Words of a column's name, in English and as German controllers write them, in the order in which quantities are
+# recognised. A velocity's name often has a position's.
 _WORDS = {
-    "temperature": r"temp|temperature|temperatures",
-    "acceleration": r"ddq|qdd|acc|accel|acceleration|accelerations",
-    "velocity": r"dq|qd|vel|velocity|velocities|speed|speeds|omega",
-    "current": r"i|iq|cur|curr|current|currents|amps",
-    "torque": r"tau|trq|tq|torque|torques|effort|efforts|moment|moments|mt|tauj",
-    "position": r"q|pos|position|positions|angle|angles|axis|ax|theta|joint|j|mp|encoder",
+    "temperature": r"temp|temperature|temperatures|temperatur",
+    "acceleration": r"ddq|qdd|acc|accel|acceleration|accelerations|beschleunigung",
+    "velocity": r"dq|qd|vel|velocity|velocities|speed|speeds|omega|geschwindigkeit|drehzahl",
+    "current": r"i|iq|cur|curr|current|currents|amps|strom",
+    "torque": r"tau|trq|tq|torque|torques|effort|efforts|moment|moments|mt|tauj|load|loads|drehmoment",
+    "position": r"q|pos|position|positions|angle|angles|axis|ax|theta|joint|j|mp|encoder|winkel|lage|achse",
 }
 _COMMANDED = re.compile(r"target|desired|des|cmd|command|commanded|ref|reference|setpoint|set|goal|soll|ext|external")
 _UNITS = {

@@ -261,8 +261,8 @@ _SLIGHT = (
     "acts less would decide."
 )
 _NOT_ALIKE = (
-    "{0} is significant too, but not reported as a finding. The formula error of {1}, or the drives' response to it, "
-    "can produce the same residual on these joints."
+    "{0} is significant too, but not reported as a finding. A small error in the formula of {1}, or the drives' "
+    "response to {1}, can produce the same residual on these joints."
 )
 
 

@@ -264,7 +264,8 @@ def _diagnosis(
             read = list(read_logs(logs, **given))
             other = list(read_logs(held_out, **given)) if held_out else []
             # Held-out logs are numbered after the others.
-            robot, both = with_torque_meaning(robot, with_known_setup([*read, *other], *known), torque_is)
+            both = with_known_setup([*read, *other], *known)
+            robot, both = with_torque_meaning(robot, both, torque_is, both[: len(read)])
             if own_clocks:
                 both = on_one_clock(both)
             read, other = both[: len(read)], both[len(read) :]

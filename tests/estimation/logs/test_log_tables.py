@@ -93,6 +93,16 @@ def test_measured_columns_are_proposed_before_commanded_ones():
     assert '"tau_{index}"' in text
 
 
+def test_german_names_and_loads_are_recognised():
+    """As KUKA and Siemens controllers write them."""
+    names = ("Zeit_ms", "Winkel_1", "Winkel_2", "Drehmoment_1", "Drehmoment_2")
+    assert suggest_mapping(names, 2) == (
+        'time: {column: Zeit_ms, unit: ms}\nposition: {columns: "Winkel_{joint}"}\n'
+        'torque: {columns: "Drehmoment_{joint}"}\n'
+    )
+    assert 'torque: {columns: "load_{joint}"}' in suggest_mapping(("t", "pos_1", "pos_2", "load_1", "load_2"), 2)
+
+
 def test_nothing_is_proposed_for_columns_without_meaning(tmp_path):
     """Where no column looks like a position, the message lists the columns and proposes nothing."""
     path = tmp_path / "log.csv"

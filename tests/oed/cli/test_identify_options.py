@@ -14,6 +14,9 @@ import pytest
 
 from estimation import load_model
 from estimation.estimators import ESTIMATORS
+from estimation.exports import standard_parameters
+from robots.regressor import TorqueModel
+from robots.terms import RigidBody
 
 
 @pytest.fixture
@@ -32,14 +35,14 @@ def states(count: int = 20) -> np.ndarray:
 
 @pytest.mark.slow
 def test_urdf(identify, tmp_path: Path) -> None:
-    """The URDF of --urdf loads in another program, which gives the model's rigid-body torques."""
-    done = identify("--urdf", tmp_path / "arm.urdf")
+    """The URDF of --urdf loads in another program, which gives the torques of the model's bodies."""
+    done = identify("--urdf", tmp_path / "arm.urdf", "--method", "consistent")
     assert done.code == 0, done.err
     assert str(tmp_path / "arm.urdf") in done.out
     model = load_model(tmp_path / "out")
-    rigid = np.where([column.term == "rigid_body" for column in model.parameters], model.values, 0.0)
     q, dq, ddq = states()
-    expected = model.torque_model.torque(q, dq, ddq, rigid, columns=model.columns)
+    rigid = TorqueModel(model.robot, (RigidBody(),))
+    expected = rigid.torque(q, dq, ddq, standard_parameters(model).reshape(-1))
     arm = pin.buildModelFromUrdf(str(tmp_path / "arm.urdf"))
     data = arm.createData()
     found = np.array([pin.rnea(arm, data, *row) for row in zip(q, dq, ddq, strict=True)])
