@@ -20,6 +20,13 @@ PRIOR = 1e-2  # weight of the description, in units of each link's mass and reac
 FLOOR = 1e-9  # of a correlation matrix, against rounding
 
 
+NEAREST = (
+    "no bodies that can exist have exactly the identified inertial parameters; those of the nearest ones differ by up "
+    "to {:.2g} standard errors"
+)
+"""Remark of a file whose model was moved."""
+
+
 def nearest_feasible(model: Model, inertia: Array, rotor_inertia: Array) -> tuple[Model, float]:
     """Moves the base parameters to those of bodies that can exist, by as little as their covariance allows.
 

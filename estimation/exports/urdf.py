@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Sequence
 from pathlib import Path
 from xml.etree import ElementTree
@@ -9,10 +10,11 @@ from xml.etree import ElementTree
 import numpy as np
 from numpy.typing import NDArray
 
+from estimation.exports.feasible import NEAREST, nearest_feasible
 from estimation.exports.friction import LinearFriction, linear_friction
 from estimation.exports.standard import REMEDY, standard_parameters
 from estimation.models.model import Model
-from robots.common.errors import InfeasibleError, InputError
+from robots.common.errors import InfeasibleError, InputError, NearestBodiesWarning
 from robots.common.files import write_atomic
 from robots.geometry.chain import Joint
 from robots.geometry.inertia import symmetric
@@ -38,7 +40,7 @@ def export_urdf(model: Model, path: str | Path, *, robot: Robot | None = None, f
 
     Raises:
         InputError: an existing file without `force`, or no description to complete the base parameters with.
-        InfeasibleError: no body that can exist has the identified base parameters.
+        InfeasibleError: no body that can exist is near to the identified base parameters.
     """
     write_atomic(Path(path), urdf_text(model, robot), force=force)
 
@@ -48,10 +50,21 @@ def urdf_text(model: Model, robot: Robot | None = None) -> str:
 
     If the robot came from a URDF or xacro, its file is kept with its meshes; the inertials, and damping and friction of
     the moving joints change. The link that a joint moves gets all the inertia that moves with it; links fixed or locked
-    to it lose theirs. Any other robot gets a plain chain. A comment says what a URDF cannot state.
+    to it lose theirs. Any other robot gets a plain chain. A comment says what a URDF cannot state. If no bodies that
+    can exist have the identified parameters, the nearest ones are written; a `NearestBodiesWarning` says how far off
+    they are.
     """
     known = robot or model.robot
-    inertia = standard_parameters(model, None if robot is None else np.asarray(robot.inertia))
+    described = np.asarray(known.inertia, dtype=float)
+    moved = 0.0
+    try:
+        inertia = standard_parameters(model, described)
+    except InfeasibleError:
+        # A URDF has no rotors: what belongs to a rotor and a link together is the link's.
+        model, moved = nearest_feasible(model, described, np.zeros(known.n))
+        inertia = standard_parameters(model, described)
+        text = f"{known.name}: {NEAREST.format(moved)}; --method consistent fits bodies that can exist"
+        warnings.warn(NearestBodiesWarning(text), stacklevel=2)
     if not (inertia[:, 0] > 0).all():
         raise InfeasibleError("a link's identified mass is not positive", remedy=REMEDY)
     friction = linear_friction(model)
@@ -60,7 +73,7 @@ def urdf_text(model: Model, robot: Robot | None = None) -> str:
     root = _updated(source, known, inertia) if from_file else _chain(known, inertia)
     if friction is not None:
         _state_friction(root, known, friction)
-    root.insert(0, ElementTree.Comment(f" {_remarks(model, friction)} "))
+    root.insert(0, ElementTree.Comment(f" {_remarks(model, friction, moved)} "))
     ElementTree.indent(root)
     return ElementTree.tostring(root, encoding="unicode", xml_declaration=True) + "\n"
 
@@ -75,8 +88,8 @@ def _state_friction(root: Element, robot: Robot, friction: LinearFriction) -> No
         dynamics.set("friction", repr(float(coulomb)))
 
 
-def _remarks(model: Model, friction: LinearFriction | None) -> str:
-    """What the numbers are, and what of the model the file does not state."""
+def _remarks(model: Model, friction: LinearFriction | None, moved: float) -> str:
+    """What the numbers are, and what of the model the file does not state; `moved` as by `nearest_feasible`."""
     parts = [f"identified by robot-oed {VERSION}: inertials"]
     if friction is not None:
         parts[0] += ", damping and friction"
@@ -88,6 +101,8 @@ def _remarks(model: Model, friction: LinearFriction | None) -> str:
         if rough:
             text = "damping and friction approximate the identified friction curve; largest difference up to the"
             parts.append(f"{text} recorded speed: {', '.join(rough)}")
+    if moved:
+        parts.append(NEAREST.format(moved))
     other = {column.term for column in model.parameters if not column.friction and column.term != "rigid_body"}
     left = [f"{term.replace('_', ' ')} parameters" for term in sorted(other)]
     left += [e.effect.replace("_", " ") + ("" if e.joint is None else f" of joint {e.joint}") for e in model.extensions]

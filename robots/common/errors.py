@@ -81,5 +81,9 @@ class OtherRobotWarning(UserWarning):
     """A file was made for another robot than the one that is used."""
 
 
+class NearestBodiesWarning(UserWarning):
+    """The links of a written file are not those identified but the nearest that can exist."""
+
+
 class AssumedValueWarning(UserWarning):
     """A robot description contains values without a source; results that depend on them are uncertain."""

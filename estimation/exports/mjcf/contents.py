@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from estimation.exports.feasible import nearest_feasible
+from estimation.exports.feasible import NEAREST, nearest_feasible
 from estimation.exports.friction import LinearFriction, linear_friction
 from estimation.exports.mjcf.couplings import Coupling, coupling_of
 from estimation.exports.standard import REMEDY, standard_and_rotors
@@ -87,10 +87,7 @@ def contents_of(model: Model, robot: Robot) -> Contents:
         stated=["inertials", "armature"],
     )
     if moved:
-        contents.remarks.append(
-            "no bodies that can exist have exactly the identified inertial parameters; those of the nearest ones "
-            f"differ by up to {moved:.2g} standard errors"
-        )
+        contents.remarks.append(NEAREST.format(moved))
     contents.remarks += [
         f"armature of joint {name} is 0 instead of the identified {value:.2g}"
         for name, value in zip(robot.joint_names, rotors, strict=True)

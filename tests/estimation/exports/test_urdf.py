@@ -8,7 +8,7 @@ from estimation import identify, load_model
 from estimation.exports import export_urdf, standard_parameters
 from robots import load_robot, nominal_plant, simulate
 from robots.base_parameters import find_base_parameters
-from robots.common.errors import InfeasibleError, InputError
+from robots.common.errors import InfeasibleError, InputError, NearestBodiesWarning
 from robots.consistency import normalised_eigenvalues
 from robots.regressor import TorqueModel
 from robots.terms import RigidBody
@@ -94,14 +94,20 @@ def test_a_described_robot_comes_back_as_it_is(ur10):
     np.testing.assert_allclose(found, robot.inertia, rtol=1e-4, atol=1e-4)
 
 
-def test_bodies_that_cannot_exist_are_refused(arm, tmp_path):
-    """Base parameters that belong to no body are refused with what to do, and nothing is written."""
+def test_bodies_that_cannot_exist_give_way_to_the_nearest(arm, tmp_path):
+    """Inertias of the wrong sign by a hundred of their standard errors: a warning, and bodies that can exist."""
     model = TorqueModel(arm, (RigidBody(),))
     base = find_base_parameters(model)
-    path = tmp_path / "robot.urdf"
+    values = base.from_standard(model.nominal)
+    wrong = _model(base, -0.2 * values)
+    wrong = replace(wrong, covariance=np.diag((0.01 * values) ** 2 + 1e-12))
     with pytest.raises(InfeasibleError, match="consistent"):
-        export_urdf(_model(base, -base.from_standard(model.nominal)), path, robot=arm)
-    assert not path.exists()
+        standard_parameters(wrong, arm.inertia)
+    path = tmp_path / "robot.urdf"
+    with pytest.warns(NearestBodiesWarning, match=r"differ by up to \d+ standard errors"):
+        export_urdf(wrong, path, robot=arm)
+    assert "nearest" in path.read_text()
+    assert (normalised_eigenvalues(load_robot(path).inertia) > 0).all()
 
 
 def test_a_robot_without_description_is_refused(arm):
