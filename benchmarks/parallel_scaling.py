@@ -1,8 +1,9 @@
 """How much faster multi-start designs and diagnoses are on two workers: processes, and a Dask cluster on loopback.
 
-Run it with ``python benchmarks/parallel_scaling.py [--cases 8] [--islands 4]`` on an idle machine. Each kind of
-work is done by one worker, by two processes, and by two workers of a Dask scheduler. Start-up of the workers
-counts for processes, since each run starts them; a cluster stands before. Results must be the same to the last bit.
+Run it with ``python benchmarks/parallel_scaling.py [--cases 8] [--islands 8]`` on an idle machine. Each kind of
+work is done by one worker on one core, by two processes, and by two workers of a Dask scheduler. Start-up of the
+workers counts for processes, since each run starts them; a cluster stands before. Results must be the same to the last
+bit. A single diagnosis forks its scans over all cores, so one worker that has both cores is timed, too.
 """
 
 from __future__ import annotations
@@ -47,7 +48,9 @@ def diagnoses(cases: int, workers: int | None, executor: Executor | None) -> Any
 def measure(name: str, work: Callable[[int | None, Executor | None], Any], address: str) -> None:
     """Prints the times of one kind of work."""
     times, results = {}, []
-    for how in ("1 worker", "2 processes", "2 Dask workers"):
+    cores = os.sched_getaffinity(0)
+    for how in ("1 core", "1 worker on both cores", "2 processes", "2 Dask workers"):
+        os.sched_setaffinity(0, {min(cores)} if how == "1 core" else cores)
         start = time.perf_counter()
         if how == "2 Dask workers":
             with cluster(address) as executor:
@@ -58,7 +61,7 @@ def measure(name: str, work: Callable[[int | None, Executor | None], Any], addre
     same = "the same" if all(result == results[0] for result in results) else "NOT the same"
     listed = ", ".join(f"{how} {seconds:.1f} s" for how, seconds in times.items())
     print(
-        f"{name}: {listed}; {times['1 worker'] / times['2 processes']:.2f} times as fast on two processes, Dask takes "
+        f"{name}: {listed}; {times['1 core'] / times['2 processes']:.2f} times as fast on two processes, Dask takes "
         f"{times['2 Dask workers'] / times['2 processes']:.2f} of their time; results are {same}"
     )
 
@@ -68,7 +71,7 @@ def main() -> int:
 
     parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
     parser.add_argument("--cases", type=int, default=8, help="cases of the diagnosis")
-    parser.add_argument("--islands", type=int, default=4, help="searches of the design")
+    parser.add_argument("--islands", type=int, default=8, help="searches of the design")
     options = parser.parse_args()
     warnings.simplefilter("ignore", AssumedValueWarning)
     print(f"{available_cores()} cores, load {os.getloadavg()[0]:.1f} before")

@@ -11,8 +11,8 @@ import numpy as np
 
 from estimation.logs.columns import parse_name
 from estimation.logs.formats import column_names, read_foreign
-from estimation.logs.mapped_tables import count_joints, map_table
-from estimation.logs.mapping import LogMapping
+from estimation.logs.mappings.mapped_tables import count_joints, map_table
+from estimation.logs.mappings.mapping import LogMapping
 from estimation.logs.recorders import Recorder, recorder_of
 from estimation.logs.torque_source import TorqueSource
 from robots.common.errors import InputError

@@ -16,9 +16,9 @@ from estimation.logs.clocks import advice_on_times
 from estimation.logs.columns import BY_FIELD, QUANTITIES, Quantity, column_name, parse_name, refuse_text, unit_factors
 from estimation.logs.formats import is_bag_folder
 from estimation.logs.log_tables import read_log_table, without_broken_derivatives
-from estimation.logs.mapped_tables import UNIT_NOTES
-from estimation.logs.mapping import LogMapping, read_mapping
-from estimation.logs.mapping_suggestions import PLAIN_REMEDY, remedy_for_columns
+from estimation.logs.mappings.mapped_tables import UNIT_NOTES
+from estimation.logs.mappings.mapping import LogMapping, read_mapping
+from estimation.logs.mappings.suggestions import PLAIN_REMEDY, remedy_for_columns
 from estimation.logs.repairs import repair_rows
 from estimation.logs.torque_source import KEY, parse_meaning
 from robots.common.errors import InputError

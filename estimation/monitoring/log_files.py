@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from os import PathLike
 from pathlib import Path
 
-from estimation.logs.mapping import LogMapping
+from estimation.logs.mappings.mapping import LogMapping
 from estimation.logs.reading import read_log
 from estimation.monitoring.result import LogRow
 from robots.common.errors import InputError

@@ -36,6 +36,8 @@ class Meaning:
         tau_factor: of the torques (n,).
         gravity: (3,) [m/s2].
         compensated: whether the controller has subtracted the gravity of the robot's description.
+        coupling: readings of the axes by the joints' positions (n, n).
+        coupled_torques: whether the torques are those of coupled axes, too.
     """
 
     q_from: NDArray[np.intp] | None = None
@@ -44,6 +46,8 @@ class Meaning:
     tau_factor: Array | None = None
     gravity: Array | None = None
     compensated: bool = False
+    coupling: Array | None = None
+    coupled_torques: bool = False
 
 
 class CandidateFits:
@@ -62,6 +66,7 @@ class CandidateFits:
             few: on few rows with one ridge, for a first choice.
         """
         rows = self._meant(meaning, FEW_ROWS if few else CHOICE_ROWS)
+        # Torques of coupled axes count by the spread of the logged ones: the same numbers are compared.
         spread = self._spread if meaning.tau_from is None else self._spread[meaning.tau_from]
         spread = spread if meaning.tau_factor is None else spread * np.abs(meaning.tau_factor)
         joints = np.flatnonzero(spread > 0)
@@ -113,13 +118,16 @@ class CandidateFits:
 
     def _meant(self, meaning: Meaning, most: int) -> Rows:
         rows = self._moved(meaning, most)
-        if meaning.tau_from is None and meaning.tau_factor is None and not meaning.compensated:
+        plain = meaning.tau_from is None and meaning.tau_factor is None
+        if plain and not meaning.compensated and not meaning.coupled_torques:
             return rows
         excerpts = []
         for part in rows.excerpts:
             assert part.raw is not None
             raw = part.raw if meaning.tau_from is None else part.raw[:, meaning.tau_from]
             raw = raw if meaning.tau_factor is None else raw * meaning.tau_factor
+            if meaning.coupled_torques and meaning.coupling is not None:
+                raw = raw @ meaning.coupling
             excerpts.append(replace(part, raw=raw + self._weight(part.q) if meaning.compensated else raw))
         # The regressor does not depend on the torques, nor do its products.
         changed = replace(rows, excerpts=tuple(excerpts))
@@ -133,7 +141,7 @@ class CandidateFits:
 
     def _moved(self, meaning: Meaning, most: int) -> Rows:
         """Gives the rows with other positions or another gravity; the last ones are kept."""
-        parts = (meaning.q_from, meaning.q_factor, meaning.gravity)
+        parts = (meaning.q_from, meaning.q_factor, meaning.gravity, meaning.coupling)
         key = (most, *(None if part is None else part.tobytes() for part in parts))
         if key not in self._kept:
             stride = max(1, len(self._rows.q) // most)
@@ -144,7 +152,8 @@ class CandidateFits:
                 for name in ("q", "dq", "ddq"):
                     values = getattr(thin, name)
                     values = values if meaning.q_from is None else values[:, meaning.q_from]
-                    changed[name] = values if meaning.q_factor is None else values * meaning.q_factor
+                    values = values if meaning.q_factor is None else values * meaning.q_factor
+                    changed[name] = values if meaning.coupling is None else values @ np.linalg.inv(meaning.coupling).T
                 excerpts.append(replace(thin, **changed))
             self._kept = {key: Rows.of(self.robot, tuple(excerpts), gravity=meaning.gravity)}
         return self._kept[key]

@@ -1,8 +1,7 @@
-"""One cause that explains why the torques do not fit: exchanged columns, a joint's unit, the base, missing gravity."""
+"""One cause that explains why the torques do not fit: columns, a unit, coupled axes, the base, missing gravity."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from itertools import combinations
 from typing import ClassVar
 
@@ -10,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from estimation.gate.candidates.candidate_fits import STANDARD, CandidateFits, Meaning
+from estimation.gate.candidates.causes import Cause, coupled, gravities, signs, units
 from estimation.gate.candidates.torque_evidence import joint_evidence
 from estimation.gate.candidates.torque_hypotheses import hypotheses
 from estimation.gate.check import Check
@@ -32,23 +32,6 @@ FOLLOWED, SNAP = 0.01, 0.02
 BETTER, CERTAIN, OTHER_COLUMNS = 0.15, 0.4, 0.4
 # Findings that explain a bad fit already.
 EXPLAINED = ("motor_side_position", "static_poses", "unit_of_position", "unit_of_time", "wrapped_angle")
-# A direction of gravity within this angle [rad] of the described one is the described one.
-SAME = 0.03
-
-
-@dataclass(frozen=True, eq=False)
-class _Cause:
-    """A meaning of the log, and what kind of cause it would be.
-
-    Attributes:
-        kind: ``gravity``, ``weightless``, ``order``, ``unit``; or ``sign`` and ``size``, which other checks report.
-        meaning: of the log.
-        joint: counted from 0, for a unit.
-    """
-
-    kind: str
-    meaning: Meaning
-    joint: int = 0
 
 
 class LikelyCauses(Check):
@@ -71,11 +54,11 @@ class LikelyCauses(Check):
             return []
         fits = CandidateFits(context.fitted)
         before = fits.cost(Meaning())
-        causes = _gravities(fits)
+        causes = gravities(fits)
         if doubtful:
             bad = np.flatnonzero(context.fitted.unexplained > DOUBTFUL).tolist()
-            causes += _sizes(context)
-            causes += [_ordered(fits, before, bad), *_units(context.robot, bad), *_signs(context.robot, bad)]
+            causes += _sizes(context) + coupled(context.robot, bad)
+            causes += [_ordered(fits, before, bad), *units(context.robot, bad), *signs(context.robot, bad)]
         found = _best(fits, causes, before)
         if found is None:
             return []
@@ -86,25 +69,7 @@ class LikelyCauses(Check):
         return [_finding(context, cause, before - after, float(np.exp(after)))]
 
 
-def _gravities(fits: CandidateFits) -> list[_Cause]:
-    """Lists other directions of gravity, none, and the described one that a controller has subtracted."""
-    described = np.asarray(fits.robot.chain.gravity, dtype=float)
-    size = float(np.linalg.norm(described))
-    if not size > 0:
-        return []
-    directions = [sign * STANDARD * axis for axis in np.eye(3) for sign in (1.0, -1.0)]
-    estimated = fits.described_gravity()
-    if estimated is not None and np.linalg.norm(estimated) > 0.5 * STANDARD:
-        directions.append(STANDARD * estimated / np.linalg.norm(estimated))
-    others = [g for g in directions if _angle(g, described) > SAME]
-    return [
-        *(_Cause("gravity", Meaning(gravity=direction)) for direction in others),
-        _Cause("weightless", Meaning(gravity=np.zeros(3))),
-        *([_Cause("weightless", Meaning(compensated=True))] if fits.robot.has_masses else []),
-    ]
-
-
-def _ordered(fits: CandidateFits, before: float, bad: list[int]) -> _Cause:
+def _ordered(fits: CandidateFits, before: float, bad: list[int]) -> Cause:
     """Finds the order of the columns with the smallest error, by exchanging two joints at a time.
 
     The columns of positions, of torques, or of both are exchanged. One of the joints must be a bad one. The search
@@ -138,31 +103,10 @@ def _ordered(fits: CandidateFits, before: float, bad: list[int]) -> _Cause:
             allowed = (kind,)
         if cost < lowest:
             best, lowest = (q, tau), cost
-    return _Cause("order", Meaning(q_from=best[0], tau_from=best[1]))
+    return Cause("order", Meaning(q_from=best[0], tau_from=best[1]))
 
 
-def _units(robot: Robot, joints: list[int]) -> list[_Cause]:
-    """Lists other units of one joint's position: degrees or millimetres, or radians or metres twice."""
-    causes = []
-    for joint in joints:
-        for factor in (np.pi / 180, 180 / np.pi) if robot.chain.kinds[joint] == "revolute" else (1e-3, 1e3):
-            factors = np.ones(robot.n)
-            factors[joint] = factor
-            causes.append(_Cause("unit", Meaning(q_factor=factors), joint))
-    return causes
-
-
-def _signs(robot: Robot, joints: list[int]) -> list[_Cause]:
-    causes = []
-    for joint in joints:
-        sign = np.ones(robot.n)
-        sign[joint] = -1.0
-        for q, tau in ((sign, sign), (sign, None), (None, sign)):
-            causes.append(_Cause("sign", Meaning(q_factor=q, tau_factor=tau), joint))
-    return causes
-
-
-def _sizes(context: Context) -> list[_Cause]:
+def _sizes(context: Context) -> list[Cause]:
     """Lists torques of the described size, if the description has links and some joints are far from it."""
     if not context.robot.has_masses:
         return []
@@ -171,17 +115,17 @@ def _sizes(context: Context) -> list[_Cause]:
         if best.odds > 0 and best.kind in ("current", "motor", "percent", "unit"):
             factors = np.ones(context.robot.n)
             factors[list(best.joints)] = 1.0 / np.array(best.factors)
-            return [_Cause("size", Meaning(tau_factor=factors))]
+            return [Cause("size", Meaning(tau_factor=factors))]
     return []
 
 
-def _best(fits: CandidateFits, causes: list[_Cause], before: float) -> tuple[_Cause, float] | None:
+def _best(fits: CandidateFits, causes: list[Cause], before: float) -> tuple[Cause, float] | None:
     """Gives the cause with the smallest error, if that is clearly smaller than before."""
     few = np.array([fits.cost(cause.meaning, few=True) for cause in causes])
     found = None
     for place in np.argsort(few)[:3]:
         after = fits.cost(causes[place].meaning)
-        least = OTHER_COLUMNS if causes[place].kind in ("order", "unit") else BETTER
+        least = OTHER_COLUMNS if causes[place].kind in ("order", "unit", "coupled") else BETTER
         if before - after > least and (found is None or after < found[1]):
             found = causes[place], after
     weightless = [cause for cause in causes if cause.kind == "weightless"]
@@ -193,7 +137,7 @@ def _best(fits: CandidateFits, causes: list[_Cause], before: float) -> tuple[_Ca
     return found
 
 
-def _refined(fits: CandidateFits, cause: _Cause, after: float) -> tuple[_Cause, float]:
+def _refined(fits: CandidateFits, cause: Cause, after: float) -> tuple[Cause, float]:
     """Refines a direction of gravity; one along an axis of the base frame is preferred if it explains as much."""
     if cause.kind != "gravity":
         return cause, after
@@ -207,10 +151,10 @@ def _refined(fits: CandidateFits, cause: _Cause, after: float) -> tuple[_Cause, 
     costs = [fits.cost(Meaning(gravity=axis)) for axis in axes]
     if min(costs) < cost + SNAP:
         refined = axes[int(np.argmin(costs))]
-    return _Cause("gravity", Meaning(gravity=refined)), cost
+    return Cause("gravity", Meaning(gravity=refined)), cost
 
 
-def _finding(context: Context, cause: _Cause, better: float, error: float) -> Finding:
+def _finding(context: Context, cause: Cause, better: float, error: float) -> Finding:
     smaller = 100 * float(1 - np.exp(-better))
     severity = "refuse" if better > CERTAIN else "warning"
     if cause.kind == "gravity":
@@ -229,6 +173,8 @@ def _finding(context: Context, cause: _Cause, better: float, error: float) -> Fi
         return without_gravity(
             f"errors are {smaller:.3g} % smaller if the torques carry no gravity", smaller, "%", better > CERTAIN
         )
+    if cause.kind == "coupled":
+        return _coupling_finding(context.robot, cause, severity, smaller)
     if cause.kind == "unit":
         assert cause.meaning.q_factor is not None
         factor = float(cause.meaning.q_factor[cause.joint])
@@ -247,6 +193,26 @@ def _finding(context: Context, cause: _Cause, better: float, error: float) -> Fi
             joint=cause.joint + 1,
         )
     return _order_finding(cause.meaning, severity, smaller, context.cleaned.columns.prefix)
+
+
+def _coupling_finding(robot: Robot, cause: Cause, severity: str, smaller: float) -> Finding:
+    assert cause.meaning.coupling is not None
+    outer = cause.joint
+    row = cause.meaning.coupling[outer]
+    (inner,) = (k for k in np.flatnonzero(row) if k != outer)
+    sign = "+" if row[inner] > 0 else "-"
+    torques = " and `coupled_torques: true`" if cause.meaning.coupled_torques else ""
+    return Finding(
+        name="coupled_axes",
+        severity=severity,  # type: ignore[arg-type]
+        text=f"the position of joint {outer + 1} seems to be q{outer + 1} {sign} q{inner + 1}, as of an axis that is "
+        f"driven by a parallelogram or counted against the base: errors are then {smaller:.3g} % smaller",
+        action=f"state `coupling: {{{outer + 1}: {{{inner + 1}: {row[inner]:g}}}}}`{torques} in a mapping (--mapping)",
+        value=smaller,
+        unit="%",
+        column=f"q{outer + 1}",
+        joint=outer + 1,
+    )
 
 
 def _order_finding(meaning: Meaning, severity: str, smaller: float, prefix: str) -> Finding:
@@ -279,8 +245,3 @@ def without_gravity(why: str, value: float, unit: str, certain: bool) -> Finding
         value=value,
         unit=unit,
     )
-
-
-def _angle(one: Array, other: Array) -> float:
-    cosine = float(one @ other) / float(np.linalg.norm(one) * np.linalg.norm(other))
-    return float(np.arccos(np.clip(cosine, -1.0, 1.0)))

@@ -8,7 +8,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from estimation.logs.mapping import LogMapping, Single
+from estimation.logs.mappings.mapping import LogMapping, Single
 from estimation.logs.recorders.recorder import Recognised, Recorder, first_of, missing, numbered, span
 from estimation.logs.torque_source import TorqueSource
 from robots.common.tables.table import Table

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import ClassVar
 
-from estimation.logs.mapping import LogMapping, PerJoint
+from estimation.logs.mappings.mapping import LogMapping, PerJoint
 from estimation.logs.torque_source import TorqueSource
 from robots.common.errors import InputError
 from robots.common.tables.table import Table

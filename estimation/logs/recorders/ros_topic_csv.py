@@ -6,7 +6,7 @@ import re
 from collections.abc import Sequence
 from typing import ClassVar
 
-from estimation.logs.mapping import LogMapping, PerJoint, Single
+from estimation.logs.mappings.mapping import LogMapping, PerJoint, Single
 from estimation.logs.readers.joint_names import places
 from estimation.logs.recorders.recorder import Recognised, Recorder, numbered, span
 from estimation.logs.torque_source import TorqueSource

@@ -6,7 +6,7 @@ import re
 from collections.abc import Sequence
 from typing import ClassVar
 
-from estimation.logs.mapping import LogMapping, Single
+from estimation.logs.mappings.mapping import LogMapping, Single
 from estimation.logs.recorders.recorder import Recognised, Recorder, first_of, missing, span
 from estimation.logs.torque_source import TorqueSource
 from robots.common.tables.table import Table

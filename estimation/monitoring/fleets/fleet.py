@@ -10,7 +10,7 @@ from os import PathLike
 from pathlib import Path
 from typing import Any
 
-from estimation.logs.mapping import read_mapping
+from estimation.logs.mappings.mapping import read_mapping
 from estimation.monitoring.fleets.members import Member, find_members
 from estimation.monitoring.fleets.result import FleetResult
 from estimation.monitoring.fleets.robot_row import RobotRow

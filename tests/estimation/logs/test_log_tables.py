@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from estimation.logs import read_log
-from estimation.logs.mapping_suggestions import suggest_mapping
+from estimation.logs.mappings.suggestions import suggest_mapping
 from robots.common.errors import InputError
 
 ROWS = ((0.0, 0.1, 0.2, 3.0, -4.0), (0.5, 0.2, 0.4, 4.0, -5.5), (1.0, 0.3, 0.6, 5.0, -6.0))

@@ -44,6 +44,36 @@ def test_motor_side_and_torque_constants(tmp_path):
     np.testing.assert_allclose(log.tau, [[0.05 * 20, 0.01 * 5], [0.1 * 20, -0.01 * 5]])
 
 
+COUPLED = "t,q1,q2,q3,tau1,tau2,tau3\n0,1,2,5,7,8,9\n1,2,3,7,8,9,10\n"
+
+
+def test_coupled_axes_become_joints(tmp_path):
+    """Axis 3 counts q3 + q2. With torques of the axes, the torque of joint 2 has that of axis 3, too."""
+    path, mapping = files(tmp_path, COUPLED, "coupling: {3: {2: 1}}\n")
+    log = read_log(path, mapping=mapping)
+    np.testing.assert_allclose(log.q, [[1, 2, 3], [2, 3, 4]])
+    np.testing.assert_allclose(log.tau, [[7, 8, 9], [8, 9, 10]])
+    path, mapping = files(tmp_path, COUPLED, "coupling: {3: {2: -1}}\ncoupled_torques: true\n")
+    log = read_log(path, mapping=mapping)
+    np.testing.assert_allclose(log.q, [[1, 2, 7], [2, 3, 10]])
+    np.testing.assert_allclose(log.tau, [[7, -1, 9], [8, -1, 10]])
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("coupling: {4: {2: 1}}", "axis 4 with joint 2; allowed: two different numbers from 1 to 3"),
+        ("coupling: {2: {2: 1}}", "axis 2 with joint 2"),
+        ("coupling: {3: {2: 1}, 2: {3: 1}}", "does not determine the joints"),
+    ],
+)
+def test_couplings_that_mean_nothing_are_refused(tmp_path, text, said):
+    """A joint that is not there, an axis with itself, and readings without a solution."""
+    path, mapping = files(tmp_path, COUPLED, text + "\n")
+    with pytest.raises(InputError, match=said):
+        read_log(path, 3, mapping=mapping)
+
+
 def test_order_scale_and_offset(tmp_path):
     """The list of columns is the robot's order; scales and offsets are one for all or one a joint."""
     path, mapping = files(

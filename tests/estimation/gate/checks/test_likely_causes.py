@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from estimation import identify
+from estimation import identify, read_log, write_log
 from estimation.gate import check_log
 from robots.plants import Sensors, nominal_plant, simulate
 from tests.estimation.gate.findings_of import found
@@ -74,6 +74,24 @@ def test_exchanged_columns_are_named_in_their_order(er3a, good, kind, order):
     straight = list(range(6))
     mended_q, mended_tau = q[:, places.get("position", straight)], tau[:, places.get("torque", straight)]
     assert check_log(er3a, replace(log, q=mended_q, tau=mended_tau)).findings == ()
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("axis", "joint", "factor", "torques"), [(3, 2, 1, False), (3, 2, -1, False), (6, 5, 1, True)])
+def test_coupled_axes_are_named(er3a, good, axis, joint, factor, torques, tmp_path):
+    """The mapping in the advice gives the joints' positions and torques back."""
+    log = good()
+    coupling = np.eye(6)
+    coupling[axis - 1, joint - 1] = factor
+    tau = log.tau @ np.linalg.inv(coupling) if torques else log.tau
+    read = replace(log, q=log.q @ coupling.T, tau=tau)
+    (finding,) = found(check_log(er3a, read), "coupled_axes")
+    assert (finding.severity, finding.joint) == ("refuse", axis)
+    (tmp_path / "mapping.yaml").write_text("\n".join(re.findall(r"`([^`]+)`", finding.action)))
+    write_log(tmp_path / "log.csv", read)
+    mended = read_log(tmp_path / "log.csv", mapping=tmp_path / "mapping.yaml")
+    np.testing.assert_allclose(mended.q, log.q, atol=1e-9)
+    np.testing.assert_allclose(mended.tau, log.tau, atol=1e-9)
 
 
 @pytest.mark.slow

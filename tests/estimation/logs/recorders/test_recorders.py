@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from estimation.logs import LogMapping, read_log
-from estimation.logs.mapping import PerJoint
+from estimation.logs.mappings.mapping import PerJoint
 from estimation.logs.recorders import RECORDERS, recorder_of
 from robots.common.errors import InputError
 from tests.estimation.logs.recordings import FORMATS, UR_NAMES, T, franka_printed, motion, table, ur_rtde

@@ -99,6 +99,9 @@ class LogMapping(Config):
         topic: of a ROS bag, where it holds several with joint states.
         torque_is: what the torque columns hold, if not joint torques: ``current``, ``motor`` or ``without-gravity``; of
             some joints only as ``motor:2,5``. It is converted by the robot's description.
+        coupling: of an axis whose reading contains other joints, those joints with their factors: ``{3: {2: 1}}`` if
+            axis 3 counts q3 + q2, as with a parallelogram.
+        coupled_torques: whether the torques are those of the coupled axes, which do the joints' work together.
     """
 
     time: Single | None = None
@@ -117,6 +120,8 @@ class LogMapping(Config):
     torque_constant: list[float] | None = None
     topic: str | None = None
     torque_is: str | None = None
+    coupling: dict[int, dict[int, float]] | None = None
+    coupled_torques: bool = False
 
 
 def read_mapping(path: str | PathLike[str]) -> LogMapping:

@@ -7,7 +7,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from estimation.logs.columns import BY_FIELD, Quantity, column_name, refuse_text, suits, unit_factor, units_note
-from estimation.logs.mapping import LogMapping, PerJoint, Single
+from estimation.logs.mappings.coupled_axes import uncouple
+from estimation.logs.mappings.mapping import LogMapping, PerJoint, Single
 from robots.common.errors import InputError
 from robots.common.tables.table import Column, Table
 
@@ -114,6 +115,8 @@ def map_table(table: Table, mapping: LogMapping, joints: int, kinds: Sequence[st
             columns[name] = table.columns[name]
             if name in table.units:
                 units[name] = table.units[name]
+    if mapping.coupling is not None:
+        uncouple(columns, mapping, joints, table)
     metadata = {key: value for key, value in table.metadata.items() if key != "units" or units}
     if left:
         metadata[UNIT_NOTES] = [units_note(BY_FIELD[field], unit, which) for (field, unit), which in left.items()]

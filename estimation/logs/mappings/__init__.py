@@ -1,0 +1,1 @@
+"""Mapping files: the meaning of a foreign log's columns."""
