@@ -20,6 +20,7 @@ from robots.signals import Log
 UNITS = ("unit_of_time", "unit_of_position", "motor_side_position")
 # Causes, those of them that count as warnings, too, and findings of the fits that they explain.
 CAUSES = (
+    "coupled_axes",
     "gravity_direction",
     "static_poses",
     "swapped_columns",

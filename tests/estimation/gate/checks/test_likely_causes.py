@@ -85,7 +85,8 @@ def test_coupled_axes_are_named(er3a, good, axis, joint, factor, torques, tmp_pa
     coupling[axis - 1, joint - 1] = factor
     tau = log.tau @ np.linalg.inv(coupling) if torques else log.tau
     read = replace(log, q=log.q @ coupling.T, tau=tau)
-    (finding,) = found(check_log(er3a, read), "coupled_axes")
+    (finding,) = check_log(er3a, read).findings
+    assert finding.name == "coupled_axes"
     assert (finding.severity, finding.joint) == ("refuse", axis)
     (tmp_path / "mapping.yaml").write_text("\n".join(re.findall(r"`([^`]+)`", finding.action)))
     write_log(tmp_path / "log.csv", read)
