@@ -11,7 +11,7 @@ Row = dict[str, Any]
 
 # Parameter of each effect that states the plant's size, and that size per unit of the parameter.
 STATED = {
-    "backlash": ("half_play", 2.0),
+    "backlash": ("gap_crossed", 1.0),
     "joint_elasticity": ("compliance", 1.0),
     "base_compliance": ("compliance_1", 1.0),
     "spring": ("stiffness", 1.0),

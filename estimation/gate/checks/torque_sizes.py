@@ -61,10 +61,10 @@ class TorqueSizes(Check):
 def _compare(fit: JointFit, described: Array) -> tuple[float, float] | None:
     """Gives the factor between a torque and that of described parameters (p,), and the correlation; None without any.
 
-    Friction and offset are no part of the description: what they can explain is left out.
+    Rotor inertia, friction and offset are no part of the described links: what they can explain is left out.
     """
     tau = fit.Y @ fit.values + fit.residual
-    own = fit.Y[:, -OWN + 1 :]
+    own = fit.Y[:, -OWN:]
     expected = fit.Y[:, :-OWN] @ (fit.scale[:-OWN] * described[fit.used])
     both = np.column_stack([expected, tau])
     both = both - own @ np.linalg.lstsq(own, both, rcond=None)[0]

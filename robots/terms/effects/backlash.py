@@ -172,11 +172,11 @@ class Backlash(Effect):
         force: str = "N m",
         length: str = "rad",
     ) -> str:
-        """Describes the values in one sentence."""
+        """Describes the values in one sentence: the gap by its crossing times, which know it better than the impacts."""
+        gap = shape[0] if shape else 2 * coefficients[0]
         return (
-            f"The gear of joint {joint} has {2 * coefficients[0]:.3g} {length} of backlash; the link moves through it "
-            f"when "
-            "the load changes sign."
+            f"The gear of joint {joint} has {gap:.3g} {length} of backlash; the link moves through it when the load "
+            "changes sign."
         )
 
     def coordinate(self, situation: Situation, joint: Place, shape: tuple[float, ...] = ()) -> tuple[str, Array]:
