@@ -77,6 +77,6 @@ def test_what_is_as_small_as_formulas_leave_is_reported_all_the_same() -> None:
     assert "A small error in the formula of a friction can produce the same residual." in note
     assert max(len(sentence.split()) for sentence in note.split(". ")) <= 25
     (note,) = beside_larger(delay, [friction])
-    assert note.startswith("a delay is significant too, but not reported as a finding. The formula error of a friction")
+    assert note.startswith("a delay is significant too, but not reported as a finding. A small error in the formula")
     assert beside_larger(None, [friction]) == ()
     assert beside_larger(step, []) == ()
