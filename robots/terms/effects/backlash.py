@@ -172,7 +172,7 @@ class Backlash(Effect):
         force: str = "N m",
         length: str = "rad",
     ) -> str:
-        """Describes the values in one sentence: the gap by its crossing times, which know it better than the impacts."""
+        """Describes the values in one sentence: the gap by its crossing times, which determine it best."""
         gap = shape[0] if shape else 2 * coefficients[0]
         return (
             f"The gear of joint {joint} has {gap:.3g} {length} of backlash; the link moves through it when the load "
