@@ -8,13 +8,12 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from estimation.payloads.intervals import AXES, Quantity
-from robots.base_parameters import find_base_parameters
 from robots.common.errors import InputError, NotIdentifiableError
 from robots.geometry.chain import Chain
 from robots.regressor import TorqueModel
 from robots.robot import Robot
 from robots.terms import RigidBody
-from robots.terms.situations.flange_body import last_link
+from robots.terms.situations.flange_body import last_link, payload_part
 from robots.terms.situations.sensitivities import moved_body
 
 Array = NDArray[np.float64]
@@ -31,6 +30,8 @@ LITTLE, WRIST = 0.8, 3
 STEADY = 0.2
 # Poses that are looked at.
 POSES = 300
+# Quantities without which a payload is refused, unless no motion of the robot shows them.
+SHOWABLE = ("mass", *(f"centre_{axis}" for axis in AXES))
 # A parameter is in the torques of a robot if its unit vector lies in the space of those that are, but for this part.
 SHOWN = 1e-6
 
@@ -64,18 +65,20 @@ def require_determined(found: Sequence[Quantity], robot: Robot, q: ArrayLike, gr
             f"the payload has a mass of {free:.3g} kg: the robot carries less in the log with the payload",
             remedy="swap --log and --without, or check which log has the payload",
         )
+    open_ = [name for name in SHOWABLE if not known[name]]
+    if not open_:
+        return
     shown = f"{free:.3g} ({free - mass.half_width:.3g} to {free + mass.half_width:.3g}) kg"
     never = never_shown(robot, gravity)
     missing = missing_motion(robot, q, gravity)
     if not known["mass"]:
-        structural = f"no motion of {robot.name} shows the mass of a payload" if "mass" in never else ""
+        if "mass" in never:
+            missing = f"no motion of {robot.name} shows the mass of a payload"
         raise NotIdentifiableError(
             f"the log does not determine the payload's mass: {shown}",
-            remedy=structural
-            or missing
-            or "check that the payload was on the flange; record a longer log, or a heavier payload",
+            remedy=missing or "check that the payload was on the flange; record a longer log, or a heavier payload",
         )
-    axes = [axis for axis in AXES if not known[f"centre_{axis}"] and f"centre_{axis}" not in never]
+    axes = [name[-1] for name in open_ if name not in never]
     if axes:
         raise NotIdentifiableError(
             f"the log does not determine the payload's centre of mass along {', '.join(axes)} of the flange (the mass "
@@ -97,13 +100,10 @@ def never_shown(robot: Robot, gravity: Array | None) -> frozenset[str]:
         Of ``mass``, ``centre_x``, ``centre_y`` and ``centre_z`` in the flange frame, those that no motion shows.
     """
     model = TorqueModel(robot.under(gravity), (RigidBody(),))
-    columns = last_link(model)
-    base = find_base_parameters(model, columns=columns)
-    grouping = base.grouping[:, list(columns)] @ moved_body(robot.chain.tip)
+    grouping = payload_part(model).grouping[:, list(last_link(model))] @ moved_body(robot.chain.tip)
     space = np.linalg.qr(grouping.T)[0]
     parts = np.linalg.norm(space[:4], axis=1)  # of the unit vectors of mass and first moments
-    names = ("mass", *(f"centre_{axis}" for axis in AXES))
-    return frozenset(name for name, part in zip(names, parts, strict=True) if part < 1 - SHOWN)
+    return frozenset(name for name, part in zip(SHOWABLE, parts, strict=True) if part < 1 - SHOWN)
 
 
 def missing_motion(robot: Robot, q: ArrayLike, gravity: Array | None) -> str:

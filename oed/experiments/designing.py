@@ -15,7 +15,7 @@ from oed.experiments.assembly import assemble, rest_pose
 from oed.experiments.checks import check_period, usable_limits
 from oed.experiments.options import LimitOptions, ModelOptions, SearchOptions, TrajectoryOptions, WeightOptions
 from oed.experiments.problems.criterion_weighting import choose_weighting
-from oed.experiments.problems.essential import essential_part, payload_part
+from oed.experiments.problems.essential import essential_part
 from oed.experiments.problems.problem import FourierProblem
 from oed.experiments.quality import measure
 from oed.experiments.results.outcome import Outcome
@@ -35,7 +35,7 @@ from robots.loading import load_robot
 from robots.regressor import default_model
 from robots.robot import Robot
 from robots.signals import Motion
-from robots.terms.situations.flange_body import carrying
+from robots.terms.situations.flange_body import carrying, payload_part
 
 Array = NDArray[np.float64]
 

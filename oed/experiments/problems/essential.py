@@ -8,10 +8,8 @@ from dataclasses import replace
 import numpy as np
 
 from oed.experiments.problems.problem import FourierProblem
-from robots.base_parameters import BaseParameters, find_base_parameters
+from robots.base_parameters import BaseParameters
 from robots.common.errors import InputError
-from robots.regressor import TorqueModel
-from robots.terms.situations.flange_body import last_link
 
 # Random motions on which the shares are measured: enough that every joint moves in all of its range and speed.
 MOTIONS = 20
@@ -46,14 +44,6 @@ def essential_part(problem: FourierProblem, share: float) -> BaseParameters:
     if not kept:
         raise InputError(f"no parameter reaches the threshold {share}", remedy="use a smaller threshold")
     return restricted(base, kept)
-
-
-def payload_part(model: TorqueModel) -> BaseParameters:
-    """Gives what the torques show of a body on the flange if all else is known: the last link's parameters.
-
-    A body on the flange and the last link move alike, so that their ten columns are the same but for the frame.
-    """
-    return find_base_parameters(model, columns=last_link(model))
 
 
 def restricted(base: BaseParameters, kept: Sequence[int]) -> BaseParameters:

@@ -10,7 +10,7 @@ import numpy as np
 
 from oed.criteria import Criterion
 from oed.criteria import criterion as choose_criterion
-from oed.experiments.problems.essential import payload_part, restricted
+from oed.experiments.problems.essential import restricted
 from oed.experiments.quality import Quality, design_model
 from oed.experiments.results.outcome import Outcome
 from oed.experiments.safety_checks.margins import margin_from
@@ -21,7 +21,7 @@ from robots.common.errors import InputError
 from robots.common.files import existing_file
 from robots.loading import load_robot
 from robots.robot import Robot
-from robots.terms.situations.flange_body import carrying
+from robots.terms.situations.flange_body import carrying, payload_part
 
 TRAJECTORY, DESIGN = "trajectory.csv", "design.json"
 

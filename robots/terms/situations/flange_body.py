@@ -8,6 +8,7 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from robots.base_parameters import BaseParameters, find_base_parameters
 from robots.common.errors import InputError
 from robots.regressor import TorqueModel
 from robots.robot import Robot
@@ -46,6 +47,14 @@ def with_body(model: TorqueModel, parameters: Array, body: Array) -> Array:
 def last_link(model: TorqueModel) -> tuple[int, ...]:
     """Gives the indices of the last link's ten columns; none of a model without links."""
     return tuple(i for i, column in enumerate(model.columns) if column.term == "rigid_body")[-10:]
+
+
+def payload_part(model: TorqueModel) -> BaseParameters:
+    """Gives what the torques show of a body on the flange if all else is known: the last link's parameters.
+
+    A body on the flange and the last link move alike, so that their ten columns are the same but for the frame.
+    """
+    return find_base_parameters(model, columns=last_link(model))
 
 
 def carrying(robot: Robot, body: ArrayLike | None) -> Robot:

@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pinocchio as pin
 import pytest
+from scipy.signal import lfilter
 
 from estimation.payloads import identify_payload
 from estimation.payloads.determination import missing_motion, never_shown
@@ -62,9 +63,7 @@ def log(description: Path, body: pin.Inertia | None, seed: int) -> Log:
     ddq = -size * (rate**2 * np.sin(argument)).sum(axis=2) / 2
     tau = np.array([pin.rnea(model, data, *row) for row in zip(q, dq, ddq, strict=True)])
     tau += np.array([4.0, 2.0, 6.0, 0.5]) * np.tanh(dq / 0.002) + np.array([3.0, 1.5, 30.0, 0.1]) * dq
-    noise = rng.normal(size=tau.shape)
-    for k in range(1, len(noise)):
-        noise[k] = 0.9 * noise[k - 1] + np.sqrt(1 - 0.81) * noise[k]
+    noise = lfilter([np.sqrt(1 - 0.81)], [1.0, -0.9], rng.normal(size=tau.shape), axis=0)
     return Log(t=t, q=q, tau=tau + 0.01 * tau.std(axis=0) * noise)
 
 

@@ -10,14 +10,13 @@ import pytest
 
 from oed.experiments import Design, LimitOptions, ModelOptions, SearchOptions, TrajectoryOptions
 from oed.experiments import design as run
-from oed.experiments.problems.essential import payload_part
 from robots.catalog import __path__ as catalog
 from robots.common.errors import InputError
 from robots.geometry.inertia import inertial_parameters
 from robots.loading import load_robot
 from robots.regressor import default_model
 from robots.robot import Robot
-from robots.terms.situations.flange_body import FLANGE, carrying, point_mass
+from robots.terms.situations.flange_body import FLANGE, carrying, payload_part, point_mass
 from tests.oed.experiments.conftest import TINY
 
 BODY = inertial_parameters(4.0, [0.05, -0.02, 0.1], np.diag([0.02, 0.03, 0.01]), np.eye(4))
