@@ -64,13 +64,12 @@ def made(key: str, kind: str, place: int, size: float, seed: int, folder: Path) 
         return dict(stored)
 
 
-def run(key: str, kind: str, place: int, size: float, seed: int, folder: Path) -> dict[str, Any]:
-    """Diagnoses one case."""
+def run(key: str, kind: str, place: int, size: float, seed: int, case: dict[str, Any]) -> dict[str, Any]:
+    """Diagnoses one case, as `made` returns it."""
     from estimation import diagnose
     from robots import load_robot
     from robots.signals import Log
 
-    case = made(key, kind, place, size, seed, folder)
     logs = [
         Log(t=case[f"{name}t"], q=case[f"{name}q"], tau=case[f"{name}tau"], name=name or "log")
         for name in ("", "unseen_")
@@ -117,7 +116,7 @@ def main() -> int:
             if kind != "none" and not size / FAR < case["shown"] < size * FAR:
                 print(f"{key}: left out, because {100 * float(case['shown']):.1f} % of the torque shows at best")
                 continue
-            row = run(key, kind, place, size, seed, options.logs)
+            row = run(key, kind, place, size, seed, case)
             with options.out.open("a") as file:
                 file.write(json.dumps(row, default=float) + "\n")
             named = ", ".join(

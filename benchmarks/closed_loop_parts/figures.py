@@ -9,12 +9,12 @@ import numpy as np
 
 Row = dict[str, Any]
 
-# Parameter of each effect that states the plant's size, and that size per unit of the parameter.
+# Parameter of each effect that states the plant's size.
 STATED = {
-    "backlash": ("gap_crossed", 1.0),
-    "joint_elasticity": ("compliance", 1.0),
-    "base_compliance": ("compliance_1", 1.0),
-    "spring": ("stiffness", 1.0),
+    "backlash": "gap_crossed",
+    "joint_elasticity": "compliance",
+    "base_compliance": "compliance_1",
+    "spring": "stiffness",
 }
 QUANTILE = 1.96
 
@@ -31,14 +31,14 @@ def stated(row: Row) -> tuple[float, float, float] | None:
     """Returns the estimate of the plant's size and its 95 % interval; None if it is not named."""
     if not is_right(row) or row["kind"] not in STATED:
         return None
-    name, factor = STATED[row["kind"]]
+    name = STATED[row["kind"]]
     if row["kind"] == "base_compliance":  # the softer axis
         name = "compliance_2" if row["place"] == 3 else "compliance_1"
     for parameter in row["findings"][0]["parameters"]:
         if parameter["name"] == name:
             low, high = parameter["ci95"]
             low, high = (-np.inf if low is None else low), (np.inf if high is None else high)
-            return factor * parameter["value"], factor * low, factor * high
+            return parameter["value"], low, high
     return None
 
 
