@@ -63,8 +63,7 @@ def urdf_text(model: Model, robot: Robot | None = None) -> str:
         # A URDF has no rotors: what belongs to a rotor and a link together is the link's.
         model, moved = nearest_feasible(model, described, np.zeros(known.n))
         inertia = standard_parameters(model, described)
-        text = f"{known.name}: {NEAREST.format(moved)}; --method consistent fits bodies that can exist"
-        warnings.warn(NearestBodiesWarning(text), stacklevel=2)
+        warnings.warn(NearestBodiesWarning(f"{known.name}: {NEAREST.format(moved)}; {REMEDY}"), stacklevel=2)
     if not (inertia[:, 0] > 0).all():
         raise InfeasibleError("a link's identified mass is not positive", remedy=REMEDY)
     friction = linear_friction(model)
