@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import re
+from collections.abc import Iterable, Sequence
 from os import PathLike
 from pathlib import Path
 
@@ -14,8 +15,22 @@ from robots.signals import Log
 MAPPING = "mapping.yaml"
 
 
+def in_natural_order(paths: Iterable[Path]) -> list[Path]:
+    """Sorts files by name, numbers in them by value: `run7` comes before `run10`.
+
+    Args:
+        paths: of the files.
+    """
+
+    def key(path: Path) -> list[str | int]:
+        # Text and numbers take turns, so that like is compared with like.
+        return [int(part) if k % 2 else part for k, part in enumerate(re.split(r"(\d+)", str(path)))]
+
+    return sorted(paths, key=key)
+
+
 def log_files(folder: str | PathLike[str]) -> list[Path]:
-    """Lists the logs in a folder, by name.
+    """Lists the logs in a folder, in natural order of their names.
 
     Args:
         folder: of files of any known format, or of folders of rosbag 2.
@@ -25,7 +40,7 @@ def log_files(folder: str | PathLike[str]) -> list[Path]:
     """
     place = Path(folder)
     try:
-        entries = sorted(place.iterdir())
+        entries = in_natural_order(place.iterdir())
     except OSError as error:
         raise InputError(f"cannot be read ({error.strerror or error})", file=place) from error
     found = [

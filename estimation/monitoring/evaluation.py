@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from estimation.monitoring.control_charts.bursts import BurstChart
-from estimation.monitoring.control_charts.quantities import Quantity, Sample
+from estimation.monitoring.control_charts.quantities import Quantity, Sample, start_limit
 from estimation.monitoring.events import Event, contact_finding
 from estimation.monitoring.findings import Finding
 from estimation.monitoring.history import History
@@ -25,7 +25,7 @@ from robots.terms.base import force_unit
 
 Array = NDArray[np.float64]
 
-# Windows whose residual gives the colour of the noise.
+# Windows whose residual gives the colour of the noise, the last ones with more weight.
 COLOUR_WINDOWS = 30
 # A friction factor with a larger relative standard error is not used in its window.
 UNSURE = 0.25
@@ -114,6 +114,9 @@ class Evaluation:
         self._observe(window, len(logs) - 1, skip=short)
         if short:
             self._note_force(window, len(logs) - 1)
+        if self.bursts_in_row == LASTING:
+            # It comes with each window: the model errs on this motion.
+            self.forces = [force for force in self.forces if force[0] < start - LASTING * self.settings.window]
         self.heat.advance(cold * factors, (end - start) / 2, found.ambient)
         self.end = end
         if self.event is None and (last or len(self.history.rows) % STEP_TESTS == 0):
@@ -121,9 +124,12 @@ class Evaluation:
         self._settle(logs)
 
     def _test_steps(self, log: int) -> None:
-        """Opens an event where the last windows of a quantity hold a step; they have confirmed it already."""
-        sources = [index for index, q in enumerate(self.quantities) if q.step_alarm()]
-        if sources and self.end is not None:
+        """Opens an event where the windows of a quantity hold a step; they have confirmed it already."""
+        if self.end is None or self.first is None:
+            return
+        first, limit = self.first, start_limit(len(self.quantities))
+        sources = [i for i, q in enumerate(self.quantities) if q.step_alarm() or q.differs_from_start(first, limit)]
+        if sources:
             self.event = Event(time=self.end, log=log, sources=sources, windows=self.settings.confirm)
 
     def _expected(self) -> Array:
@@ -138,6 +144,10 @@ class Evaluation:
         return found
 
     def _project(self, found: WindowRows, start: float, end: float) -> Window:
+        def with_window(covariances: Array, rows: Array) -> Colour:
+            # On a motion that was not seen before, the model may err more.
+            return Colour.fit((self.colour_sum + covariances) / (self.colour_count + 1), self.colour_rows + rows)
+
         colour = Colour.fit(self.colour_sum / self.colour_count, self.colour_rows) if self.colour_count else None
         speeds = self.baseline.speeds
         usual = np.where(np.isfinite(speeds), speeds, np.abs(found.dq).max(axis=0))
@@ -147,14 +157,18 @@ class Evaluation:
             found.tau,
             found.directions,
             colour=colour,
+            with_window=with_window,
             expected=self._expected(),
             usual_speed=usual,
             edges=(start, end),
         )
-        if self.colour_count < COLOUR_WINDOWS:
-            self.colour_sum += window.colour
-            self.colour_rows += window.rows
-            self.colour_count += 1
+        if self.colour_count >= COLOUR_WINDOWS:
+            keep = 1 - 1 / COLOUR_WINDOWS
+            self.colour_sum, self.colour_rows = keep * self.colour_sum, keep * self.colour_rows
+            self.colour_count -= 1
+        self.colour_sum = self.colour_sum + window.colour
+        self.colour_rows = self.colour_rows + window.rows
+        self.colour_count += 1
         return window
 
     def _known(self, window: Window) -> NDArray[np.bool_]:

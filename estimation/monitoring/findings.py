@@ -109,7 +109,7 @@ class Finding:
         }[self.kind]
         text = where + (what if where else what[0].upper() + what[1:])
         if self.from_start:
-            return f"{text}. The first window already differs from the model."
+            return f"{text}. The first log already differs from the model."
         return f"{text}. Since {self.date(origin)}."
 
     def date(self, origin: float) -> str:

@@ -15,6 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 from estimation.models.model import model_from_dict
 from estimation.monitoring.evaluation import Evaluation
 from estimation.monitoring.findings import Finding
+from estimation.monitoring.log_row import LogRow
 from estimation.monitoring.settings import MonitorSettings
 from estimation.monitoring.windows.baseline import Baseline, baseline_of
 from estimation.monitoring.windows.stream_windows import StreamWindows
@@ -51,6 +52,8 @@ class Monitor:
         self._windows = StreamWindows(self.settings.window, settling(baseline.cutoff), 2 + 3 * n)
         self._evaluation: Evaluation | None = None
         self.logs: list[str] = []
+        # Stored logs that it has decided on; those that were used in the order of `logs`.
+        self.rows: list[LogRow] = []
 
     @property
     def findings(self) -> tuple[Finding, ...]:
@@ -195,6 +198,7 @@ class Monitor:
                 "confirm": s.confirm,
             },
             "logs": self.logs,
+            "rows": [row.to_dict() for row in self.rows],
             "payload": None if self._payload is None else self._payload.tolist(),
             "gravity": None if self._gravity is None else self._gravity.tolist(),
             "stream": self._windows.to_dict(),
@@ -227,6 +231,9 @@ class Monitor:
                 raise InputError("is not a state of a monitor of this version", file=file)
             found = cls(baseline_of(model_from_dict(data["model"]), data["model"]), MonitorSettings(**data["settings"]))
             found.logs = list(data["logs"])
+            # A state of an older version has no rows.
+            old = [LogRow(name=name) for name in found.logs]
+            found.rows = [LogRow.from_dict(row) for row in data["rows"]] if "rows" in data else old
             found._payload = None if data["payload"] is None else np.array(data["payload"], dtype=float)
             found._gravity = None if data["gravity"] is None else np.array(data["gravity"], dtype=float)
             found._windows.restore(data["stream"])

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from scipy.stats import chi2
 
 from estimation.monitoring.control_charts.change_fit import StepFit
-from estimation.monitoring.control_charts.quantities import Quantity
+from estimation.monitoring.control_charts.quantities import Quantity, start_limit
 from estimation.monitoring.findings import NORMAL_95, Finding, Kind, relative
 from estimation.monitoring.windows.baseline import PAYLOAD
 
@@ -64,9 +64,15 @@ def changes_at(quantities: Sequence[Quantity], sources: Sequence[Quantity], begi
         The changes; none where the alarm is not confirmed.
     """
     fits = [(q, q.steps()) for q in quantities if len(q.samples) > 1]
-    critical = float(chi2.isf(BESIDE / max(len(fits), 1), 1))
-    own = [(q, fit, int(np.argmax(fit.gains))) for q, fit in fits if any(q is s for s in sources)]
-    own = [(q, fit, k) for q, fit, k in own if fit.exceeding(q.margin)[k] > critical]
+    critical, limit = float(chi2.isf(BESIDE / max(len(fits), 1), 1)), start_limit(len(quantities))
+
+    def changed(q: Quantity, fit: StepFit, k: int) -> bool:
+        if k == 0 and q.is_whole(begin):
+            return q.starts_beyond(fit, limit)
+        return bool(fit.exceeding(q.margin)[k] > critical)
+
+    own = [(q, fit, _first_window(q, fit, begin)) for q, fit in fits if any(q is s for s in sources)]
+    own = [(q, fit, k) for q, fit, k in own if changed(q, fit, k)]
     if not own:
         return []
     quantity, _, k = max(own, key=lambda item: float(item[1].gains[item[2]]))
@@ -81,11 +87,15 @@ def changes_at(quantities: Sequence[Quantity], sources: Sequence[Quantity], begi
             if place >= len(starts):
                 continue
             alarmed = fit.best(max(place - NEAR, 0), min(place + NEAR, len(starts) - 1))
-        # A body has mass and moments together: small moments belong to a mass that changed.
-        margin = 0.0 if carried and q.group == "payload" else q.margin
-        if fit.exceeding(margin)[alarmed] > critical:
+        # A body has mass and moments together: those of a mass that changed count, however small.
+        if (carried and q.group == "payload") or changed(q, fit, alarmed):
             found.append(_change(q, fit, alarmed, begin))
     return found
+
+
+def _first_window(q: Quantity, fit: StepFit, begin: float) -> int:
+    """The window with which a step begins; the first of all where the step may begin there."""
+    return 0 if q.is_whole(begin) and fit.interval()[0] == 0 else int(np.argmax(fit.gains))
 
 
 def _change(q: Quantity, fit: StepFit, k: int, begin: float) -> Change:
@@ -100,7 +110,7 @@ def _change(q: Quantity, fit: StepFit, k: int, begin: float) -> Change:
         gain=float(fit.gains[k]),
         earliest=earliest,
         latest=q.samples[last].end,
-        first=k == 0 and q.samples[0].start <= begin + 1e-6,
+        first=k == 0 and q.is_whole(begin),
         window=k,
     )
 
@@ -110,7 +120,8 @@ def name_changes(
 ) -> list[Finding]:
     """Gives changes their names.
 
-    A payload explains offsets. A residual that grows beside a named change belongs to it.
+    A payload explains offsets. A residual that grows beside a named change belongs to it. One that grows in most joints
+    does not: then the named change does not explain the torques.
 
     Args:
         changes: of one event.
@@ -125,7 +136,8 @@ def name_changes(
         for group in ("friction", "offset", "payload", "common", "residual")
     }
     # One cause damages one joint or two; what all joints share is taken out before.
-    if len(by_group["friction"]) >= max(3, joints / 2):
+    grown = [c for c in by_group["residual"] if c.size > 0]
+    if max(len(by_group["friction"]), len(grown)) >= max(3, joints / 2):
         worst = max(changes, key=lambda c: c.gain)
         text = f": {len(changes)} quantities differ from the model at once"
         return [_finding(worst, "misfit", None, (0.0, 0.0, 0.0), "", detected, log, text)]
@@ -156,14 +168,20 @@ def name_changes(
 def _payload(changes: Sequence[Change], detected: float, log: str) -> Finding:
     main = max(changes, key=lambda c: c.gain)
     mass = next((c for c in changes if PAYLOAD[c.quantity.index] == PAYLOAD[0]), None)
-    if mass is None:
+    if mass is None or abs(mass.sigmas) < NORMAL_95:
         return _finding(main, "unknown", None, (0.0, 0.0, 0.0), "", detected, log, ": a moment at the flange changed")
-    moments = {c.quantity.index: c.size for c in changes}
-    centre = [moments.get(axis, 0.0) / mass.size for axis in (1, 2, 3)]
-    text = f", centre near ({', '.join(f'{value:.2f}' for value in centre)}) m in the flange frame"
-    size = _interval(mass)
-    found = _finding(main, "payload", None, size, "kg", detected, log, text)
-    return found
+    moments = {PAYLOAD[c.quantity.index][-1]: c for c in changes if c is not mass}
+    text = f", centre {', '.join(_centre(mass, axis, moments.get(axis)) for axis in 'xyz')} in the flange frame"
+    return _finding(main, "payload", None, _interval(mass), "kg", detected, log, text)
+
+
+def _centre(mass: Change, axis: str, moment: Change | None) -> str:
+    """One coordinate of the centre with its 95 % interval; mass and moment are taken as independent."""
+    if moment is None:
+        return f"{axis} not seen"
+    centre = moment.size / mass.size
+    error = np.hypot(moment.error, centre * mass.error) / abs(mass.size)
+    return f"{axis} {centre:.3f} ({centre - NORMAL_95 * error:.3f} to {centre + NORMAL_95 * error:.3f}) m"
 
 
 def _with_margin(c: Change) -> float:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 
 from estimation.monitoring.change_points import ChangePoints, find_change_points
 from estimation.monitoring.findings import LIGHTS, Finding, Severity, when, worst
+from estimation.monitoring.log_row import UNFIT, LogRow
 from robots.common.files import write_atomic
-from robots.common.plain import finite
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -31,36 +31,6 @@ HEAT_WORDS = {
     "common": "heat states with assumed time constants, fitted to the logs",
     "none": "nothing",
 }
-
-
-@dataclass(frozen=True, kw_only=True)
-class LogRow:
-    """One log.
-
-    Attributes:
-        name: of the log.
-        start: on the monitor's clock [s]; NaN of a log that was left out.
-        end: likewise.
-        used: whether it counts.
-        findings: kinds that were detected in it.
-        note: why it was left out.
-    """
-
-    name: str
-    start: float = np.nan
-    end: float = np.nan
-    used: bool = True
-    findings: tuple[str, ...] = ()
-    note: str = ""
-
-    @classmethod
-    def left_out(cls, name: str, note: str) -> LogRow:
-        """A log that does not count."""
-        return cls(name=name, used=False, note=note)
-
-    def to_dict(self) -> dict[str, Any]:
-        """Gives the row as plain data."""
-        return {**asdict(self), "start": finite(self.start), "end": finite(self.end), "findings": list(self.findings)}
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -92,7 +62,7 @@ class MonitorResult:
     change_points: ChangePoints | None
 
     @classmethod
-    def of(cls, monitor: Monitor, logs: tuple[LogRow, ...], notes: tuple[str, ...]) -> MonitorResult:
+    def of(cls, monitor: Monitor, notes: Sequence[str]) -> MonitorResult:
         """Makes a result of a monitor's state.
 
         Raises:
@@ -107,8 +77,8 @@ class MonitorResult:
             heat=evaluation.heat.kind,
             false_alarm_hours=monitor.settings.false_alarm_hours,
             findings=monitor.findings,
-            logs=logs,
-            notes=notes,
+            logs=tuple(monitor.rows),
+            notes=tuple(notes),
             history=history,
             origin=evaluation.begin,
             change_points=find_change_points(history),
@@ -116,8 +86,9 @@ class MonitorResult:
 
     @property
     def severity(self) -> Severity:
-        """The most urgent finding's."""
-        return worst([f.severity for f in self.findings])
+        """The most urgent finding's; a last log that does not fit is to be watched."""
+        undecided: list[Severity] = ["watch"] if any(row.undecided for row in self.logs) else []
+        return worst([*(f.severity for f in self.findings), *undecided])
 
     @property
     def light(self) -> str:
@@ -137,19 +108,27 @@ class MonitorResult:
             return 0.0, 0.0
         return float(100 * np.expm1(np.nanmin(heat))), float(100 * np.expm1(np.nanmax(heat)))
 
+    @property
+    def headline(self) -> Finding | None:
+        """The most significant of the most urgent findings; None without one that asks for attention."""
+        urgent = [f for f in self.findings if f.severity == self.severity != "info"]
+        return max(urgent, key=lambda f: f.sigmas, default=None)
+
+    def sentence(self) -> str:
+        """Says what the headline is."""
+        undecided = next((row.name for row in self.logs if row.undecided), None)
+        if self.headline is not None:
+            return self.headline.sentence(self.origin)
+        if undecided is not None:
+            return f"Log {undecided} {UNFIT}. The next log shows which."
+        return "No change beyond what temperature explains."
+
     def verdict(self) -> str:
-        """Says in one or two sentences what was found."""
-        urgent = [f for f in self.findings if f.severity == "act"]
+        """Says in some sentences what was found, and how much temperature explains."""
         low, high = self.heat_range
+        start = {"act": "Action needed. ", "watch": "Watch this robot. ", "info": ""}[self.severity]
         heat = f" Temperature explains changes of friction of {low:+.0f} to {high:+.0f} %."
-        if self.heat == "none":
-            heat = ""
-        if urgent:
-            return f"Action needed. {urgent[-1].sentence(self.origin)}{heat}"
-        watched = [f for f in self.findings if f.severity == "watch"]
-        if watched:
-            return f"Watch this robot. {watched[-1].sentence(self.origin)}{heat}"
-        return f"No change beyond what temperature explains.{heat}"
+        return start + self.sentence() + ("" if self.heat == "none" else heat)
 
     def summary(self) -> str:
         """Gives verdict, findings, what to do, and what was left out."""

@@ -13,6 +13,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 from numpy.typing import NDArray
 
+from estimation.logs.campaigns import in_natural_order
 from estimation.logs.parquet_streams.parquet_parts import Part, open_part
 from robots.common.errors import InputError
 from robots.common.files import sha256
@@ -152,7 +153,9 @@ def parquet_parts(path: str | PathLike[str]) -> list[Path]:
     place = Path(path)
     if not place.is_dir():
         return [place] if place.suffix.lower() == ".parquet" and place.is_file() else []
-    return sorted(entry for entry in place.iterdir() if entry.suffix.lower() == ".parquet" and entry.is_file())
+    return in_natural_order(
+        entry for entry in place.iterdir() if entry.suffix.lower() == ".parquet" and entry.is_file()
+    )
 
 
 def is_large(paths: Sequence[str | PathLike[str]]) -> bool:

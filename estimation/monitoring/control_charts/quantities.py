@@ -23,6 +23,13 @@ SHARE = 0.5
 PAUSE = 30.0
 # Windows kept for dating and sizing a change.
 KEPT = 150
+# Probability that any quantity of a healthy robot differs from the model at the start.
+START = 0.05
+
+
+def start_limit(count: int) -> float:
+    """Chi-square of one degree of freedom that none of some healthy quantities exceeds at the start."""
+    return float(chi2.isf(START / count, 1))
 
 
 @dataclass(frozen=True, eq=False)
@@ -96,6 +103,26 @@ class Quantity:
         if not len(begins):
             return False
         return bool(self.steps(begins).exceeding(self.margin).max() > chi2.isf(1.0 / self.chart.run_length, 1))
+
+    def differs_from_start(self, first: float, limit: float) -> bool:
+        """Tests whether all windows so far differ from the prior level, which is that of the model.
+
+        Args:
+            first: start of the first of all windows [s].
+            limit: see `start_limit`.
+        """
+        return self.is_whole(first) and self.starts_beyond(self.steps(np.zeros(1, dtype=np.intp)), limit)
+
+    def is_whole(self, first: float) -> bool:
+        """Whether its windows begin with the first of all windows, which starts at a time [s]."""
+        return len(self.samples) > 0 and self.samples[0].start <= first + 1e-6
+
+    def starts_beyond(self, fit: StepFit, limit: float) -> bool:
+        """Whether a step with the first window is beyond what models get wrong.
+
+        The prior of the level contains that error: no margin is taken off. Steps up to the margin are no finding.
+        """
+        return bool(fit.gains[0] > limit and abs(fit.sizes[0]) > self.margin)
 
     def steps(self, begins: NDArray[np.intp] | None = None) -> StepFit:
         """Fits a step at each of the last windows, or at some of them."""

@@ -14,18 +14,18 @@ from estimation.logs.mappings.mapping import read_mapping
 from estimation.monitoring.fleets.members import Member, find_members
 from estimation.monitoring.fleets.result import FleetResult
 from estimation.monitoring.fleets.robot_row import RobotRow
-from estimation.monitoring.log_files import read_each
-from estimation.monitoring.log_monitoring import monitor_logs
+from estimation.monitoring.log_row import LogRow
 from estimation.monitoring.monitor import Monitor
-from estimation.monitoring.result import LogRow
 from estimation.monitoring.settings import MonitorSettings
+from estimation.monitoring.stored_logs.log_files import read_each
+from estimation.monitoring.stored_logs.log_monitoring import monitor_logs
 from estimation.monitoring.windows.baseline import Baseline, read_baseline
 from robots.common.errors import InputError, OedError
 from robots.common.files import sha256, write_atomic
 from robots.common.parallel import parallel_map
 from robots.common.progress import Progress
 
-KEPT_VERSION = 1
+KEPT_VERSION = 2
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -106,7 +106,12 @@ def monitor_fleet(
         robot_row, tasks, executor=executor, workers=workers, progress=progress, task="monitoring the fleet"
     )
     ordered = sorted((row for row, _ in rows), key=lambda row: row.order)
-    return FleetResult(rows=tuple(ordered), resumed=sum(done for _, done in rows))
+    top = Path(folder).absolute()
+    return FleetResult(
+        rows=tuple(ordered),
+        resumed=sum(done for _, done in rows),
+        single=sum(m.files == (m.files[0],) and m.files[0].parent == top for m in members),
+    )
 
 
 def robot_row(task: Task) -> tuple[RobotRow, bool]:
@@ -175,12 +180,11 @@ def _monitored(
             monitor = Monitor(_baseline(task.model, task.digest), task.settings)
         else:
             old, monitor, files = RobotRow.from_state(kept["row"]), Monitor.load(_kept_files(task)[1]), files[seen:]
-        earlier = () if old is None else old.logs
         logs, refused = read_each(files, monitor.baseline.robot, task.mapping)
         if logs:
-            return RobotRow.of(name, monitor_logs(monitor, logs, refused=refused, earlier=earlier)), monitor
+            return RobotRow.of(name, monitor_logs(monitor, logs, refused=refused)), monitor
         if old is not None:
-            return replace(old, logs=(*earlier, *refused)), monitor
+            return replace(old, logs=(*old.logs, *refused)), monitor
         return RobotRow.failed(name, refused[0].note, tuple(refused)), None
     except OedError as error:
         return RobotRow.failed(name, str(error), tuple(LogRow.left_out(path.stem, str(error)) for path in files)), None

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from os import PathLike
 from pathlib import Path
 
+from estimation.logs.campaigns import in_natural_order
 from estimation.logs.formats import SUFFIXES, is_bag_folder
 from robots.common.errors import InputError
 
@@ -20,7 +21,7 @@ class Member:
 
     Attributes:
         name: of the robot.
-        files: its logs, by name.
+        files: its logs, in natural order of their names.
         model: its own model, where its folder holds one.
     """
 
@@ -57,7 +58,7 @@ def find_members(folder: str | PathLike[str]) -> list[Member]:
         if _is_log(entry):
             members.append(Member(name=entry.stem, files=(entry,)))
         elif entry.is_dir():
-            files = tuple(sorted(_logs_below(entry)))
+            files = tuple(in_natural_order(_logs_below(entry)))
             if files:
                 own = entry / MODEL
                 name = entry.name.removeprefix(PARTITION)

@@ -25,10 +25,12 @@ class FleetResult:
     Attributes:
         rows: worst first.
         resumed: robots that an earlier run had done.
+        single: robots that are a log directly in the folder.
     """
 
     rows: tuple[RobotRow, ...]
     resumed: int = 0
+    single: int = 0
 
     def count(self, light: str) -> int:
         """Number of robots with a light."""
@@ -60,6 +62,11 @@ class FleetResult:
             lines.append(f"  and {len(shown) - LISTED} more")
         count, left_out = sum(len(row.logs) for row in self.rows), sum(row.left_out for row in self.rows)
         lines.append(f"  {count} logs, {left_out} left out; {self.resumed} robots were done before")
+        if self.single > 1:
+            lines.append(
+                f"  {self.single} logs lie directly in the folder. Each was taken as a robot of its own. For the logs "
+                "of one robot use oed monitor --log-dir."
+            )
         return "\n".join(lines)
 
     def to_dict(self) -> dict[str, Any]:

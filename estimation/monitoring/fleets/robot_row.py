@@ -8,7 +8,8 @@ from typing import Any
 import numpy as np
 
 from estimation.monitoring.findings import Finding, when
-from estimation.monitoring.result import LogRow, MonitorResult
+from estimation.monitoring.log_row import LogRow
+from estimation.monitoring.result import MonitorResult
 
 # Points of a trend that are kept of each robot.
 POINTS = 240
@@ -68,13 +69,12 @@ class RobotRow:
     @classmethod
     def of(cls, name: str, result: MonitorResult) -> RobotRow:
         """Makes the row of a robot that was monitored."""
-        urgent = sorted(result.findings, key=lambda f: (("act", "watch", "info").index(f.severity), -f.sigmas))
-        worst = next((f for f in urgent if f.severity != "info"), None)
+        worst = result.headline
         return cls(
             name=name,
             light=result.light,
-            text=worst.sentence(result.origin) if worst else "No change beyond what temperature explains.",
-            advice=worst.advice() if worst else "",
+            text=result.sentence(),
+            advice=worst.advice() if worst else "" if result.light == "green" else "Check of which robot this log is.",
             since=when(worst.earliest, result.origin) if worst else "",
             logs=result.logs,
             findings=result.findings,
@@ -119,28 +119,17 @@ class RobotRow:
     def to_state(self) -> dict[str, Any]:
         """Gives all fields, for the file that a later run reads."""
         data = asdict(self)
-        for row in data["logs"]:
-            row["start"], row["end"] = (None if np.isnan(row[key]) else row[key] for key in ("start", "end"))
+        data["logs"] = [row.to_dict() for row in self.logs]
         return data
 
     @classmethod
     def from_state(cls, data: dict[str, Any]) -> RobotRow:
         """Reads `to_state`."""
-        logs = tuple(
-            LogRow(
-                **{
-                    **row,
-                    "findings": tuple(row["findings"]),
-                    **{key: np.nan if row[key] is None else row[key] for key in ("start", "end")},
-                }
-            )
-            for row in data["logs"]
-        )
         trend = data["trend"]
         return cls(
             **{
                 **data,
-                "logs": logs,
+                "logs": tuple(map(LogRow.from_dict, data["logs"])),
                 "findings": tuple(Finding(**item) for item in data["findings"]),
                 "notes": tuple(data["notes"]),
                 "heat": (float(data["heat"][0]), float(data["heat"][1])),

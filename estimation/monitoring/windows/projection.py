@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -13,6 +14,8 @@ from estimation.uncertainty.autoregressive import autocovariance, levinson
 
 Array = NDArray[np.float64]
 
+# Median of the square of a standard normal variable.
+NORMAL_MEDIAN = 0.4549
 HIGHEST_ORDER = 12
 # Rows below this share of the usual speed say more of presliding than of friction.
 SLOWEST = 0.03
@@ -103,6 +106,7 @@ def project(
     directions: Directions,
     *,
     colour: Colour | None,
+    with_window: Callable[[Array, Array], Colour] = Colour.fit,
     expected: Array,
     usual_speed: Array,
     edges: tuple[float, float],
@@ -115,6 +119,8 @@ def project(
         tau: torques (N, n) [N m or N].
         directions: the model's torques.
         colour: of the noise; None where it is not known: then the window's own, from a first fit.
+        with_window: gives the colour by which short forces are judged, of the window's autocovariances (n, lags + 1)
+            and rows (n,); the window's own by default.
         expected: friction factors that are expected (n,).
         usual_speed: highest usual speed (n,) [rad/s or m/s].
         edges: start and end of the window [s].
@@ -130,7 +136,7 @@ def project(
     values, covariance, prior = _solve(y, directions, live, colour, expected, scale)
     residual = y - _fitted(values, directions)
     covariances, rows = _colour(residual, live)
-    at, burst, joints = _burst(t, residual, live, colour)
+    at, burst, joints = _burst(t, residual, live, with_window(covariances, rows))
     return Window(
         t=float(t.mean()),
         start=edges[0],
@@ -219,6 +225,8 @@ def _burst(t: Array, residual: Array, live: NDArray[np.bool_], colour: Colour) -
     if count == 0:
         return float(t[0]), 0.0, np.zeros(n)
     sums = white[: count * length].reshape(count, length, n).sum(axis=1) / np.sqrt(length)
+    # A motion on which the model errs more fills the window, a short force only few blocks.
+    sums /= np.sqrt(np.maximum(np.median(sums**2, axis=0) / NORMAL_MEDIAN, 1.0))
     chi = (sums**2).sum(axis=1)
     worst = int(np.argmax(chi))
     return float(t[min(worst * length + length // 2, len(t) - 1)]), float(chi[worst]), sums[worst]

@@ -104,7 +104,7 @@ def _read(paths: list[Path], folder: Path | None, robot: Robot, mapping: Path | 
     """
     from estimation import read_log
     from estimation.logs.campaigns import log_files
-    from estimation.monitoring.log_files import read_each
+    from estimation.monitoring.stored_logs.log_files import read_each
     from robots.common.errors import InputError
 
     named = [file for path in paths for file in (log_files(path) if path.is_dir() else [path])]

@@ -35,6 +35,7 @@ class Arm:
         self.machine = dataclasses.replace(machine, known=machine.model, known_rotor=machine.rotor, friction=friction)
         self.robot = load_robot(str(write_description(self.machine, place)))
         t = np.arange(round(PERIOD / STEP)) * STEP
+        self.t = t
         self.q, self.v, self.a = draw_periodic(machine, rng, period=PERIOD, cycles=1).at(t)
         rigid = rigid_torque(machine.model, self.q, self.v, self.a)
         self.rigid = rigid + machine.rotor * self.a + machine.offset

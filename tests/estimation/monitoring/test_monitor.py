@@ -7,6 +7,7 @@ import pytest
 
 from estimation.monitoring import Monitor, MonitorSettings
 from robots.common.errors import InputError
+from tests.estimation.monitoring.arm import NOISE
 
 pytestmark = pytest.mark.slow
 
@@ -52,7 +53,8 @@ def test_payload_is_not_damage(arm, monitor):
     (found,) = send(monitor, logs)
     assert found.kind == "payload"
     assert found.low <= 1.0 <= found.high
-    assert "0.1" in found.text
+    assert "z 0.1" in found.text
+    assert "x 0.0" in found.text or "x -0.0" in found.text
 
 
 def test_contact_is_short(arm, monitor):
@@ -66,6 +68,14 @@ def test_contact_is_short(arm, monitor):
     assert found.kind == "contact"
     assert found.earliest <= 335.45 <= found.latest
     assert found.severity == "watch"
+
+
+@pytest.mark.parametrize("amount", [2.0, 4.0])
+def test_an_error_that_comes_in_each_cycle_is_no_contact(arm, monitor, amount):
+    """A new motion on which the model errs at one place for 0.3 s: it comes again in each cycle of 10 s."""
+    bump = amount * NOISE * arm.size * np.exp(-(((arm.t - 4.0) / 0.3) ** 2))[:, None]
+    logs = [arm.log(0.0, 120.0), arm.log(300.0, 120.0, extra=lambda t, i: bump[i])]
+    assert [f.kind for f in send(monitor, logs) if f.kind == "contact"] == []
 
 
 def test_healthy_robot_is_green(arm, monitor):

@@ -78,3 +78,14 @@ def test_folders_that_are_no_fleet(tmp_path):
         (tmp_path / name / "log.csv").write_text("t")
     with pytest.raises(InputError, match="two robots of the name a"):
         find_members(tmp_path)
+
+
+@pytest.mark.slow
+def test_logs_of_one_robot_are_no_fleet(place, arm, tmp_path):
+    """Logs directly in the folder are robots of their own; the summary says so, and which command takes them as one."""
+    for k in range(2):
+        write(arm.log(300.0 * k, 30.0), tmp_path / "logs" / f"day{k}.csv")
+    found = monitor_fleet(tmp_path / "logs", place / "model.json", kept=tmp_path / "kept", settings=SETTINGS, workers=1)
+    assert "Each was taken as a robot of its own" in found.summary()
+    folders = monitor_fleet(place / "logs", place / "model.json", kept=tmp_path / "k", settings=SETTINGS, workers=1)
+    assert "robot of its own" not in folders.summary()

@@ -12,9 +12,10 @@ import pytest
 from estimation.external_forces.contacts import Contact
 from estimation.external_forces.localisation import Place
 from estimation.external_forces.result import ForceEstimate
+from estimation.monitoring import LogRow
 from estimation.monitoring.findings import Finding
 from estimation.monitoring.fleets import FleetResult, RobotRow
-from estimation.monitoring.result import LogRow, MonitorResult
+from estimation.monitoring.result import MonitorResult
 from estimation.payloads import PayloadEstimate
 from estimation.payloads.body import Body
 from estimation.payloads.result import JointEvidence

@@ -8,7 +8,7 @@ from pathlib import Path
 
 from estimation.logs.mappings.mapping import LogMapping
 from estimation.logs.reading import read_log
-from estimation.monitoring.result import LogRow
+from estimation.monitoring.log_row import LogRow
 from robots.common.errors import InputError
 from robots.robot import Robot
 from robots.signals import Log

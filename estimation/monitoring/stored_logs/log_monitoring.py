@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from hashlib import sha256
 
 import numpy as np
 
 from estimation.gate import check_log
 from estimation.monitoring.findings import Finding
-from estimation.monitoring.log_clock import Placed, missing_days, place_logs
+from estimation.monitoring.log_row import UNFIT, LogRow
 from estimation.monitoring.monitor import Monitor
-from estimation.monitoring.result import LogRow, MonitorResult
+from estimation.monitoring.result import MonitorResult
+from estimation.monitoring.stored_logs.log_clock import Placed, missing_days, place_logs
 from estimation.monitoring.windows.baseline import Baseline
 from estimation.regressions.preparation import torque_of
 from estimation.regressions.torque_meanings import as_joint_torque
@@ -33,19 +35,18 @@ def monitor_logs(
     logs: Sequence[Log],
     *,
     refused: Sequence[LogRow] = (),
-    earlier: Sequence[LogRow] = (),
     progress: Progress | None = None,
 ) -> MonitorResult:
     """Sends logs through a monitor, in the given order.
 
-    A log in which most joints change at its first window does not fit. If a later log fits again, it was of another
-    robot, and is left out. If none does, the model does not fit this robot any more.
+    Logs that the monitor has counted before are not counted again. A log in which most joints change at its first
+    window does not fit. If a later log fits again, it was of another robot, and is left out. If none does, the model
+    does not fit this robot any more.
 
     Args:
         monitor: new, or with what it has seen before; it is changed.
         logs: with torque or current, in the order in which they were recorded.
         refused: logs that could not be read, for the result.
-        earlier: rows of logs that the monitor has seen before, for the result.
         progress: receives the progress.
 
     Returns:
@@ -57,40 +58,84 @@ def monitor_logs(
     bar = progress or SILENT
     bar.start("monitoring", float(max(len(logs), 1)))
     usable, rows = _checked(monitor.baseline, logs)
-    placed, notes = place_logs(usable, monitor.last)
+    if not usable and not any(row.used for row in monitor.rows):
+        first = f": {rows[0].note}" if rows else ""
+        raise InputError(f"no log can be used{first}", remedy="give logs of the model's robot")
+    new, notes = _not_counted(monitor, usable)
+    placed, remarks = place_logs(new, monitor.last)
     spans: list[tuple[float, float]] = []
     pending: _Pending | None = None
     for number, item in enumerate(placed, start=1):
         bar.update(float(number), item.log.name)
+        spans.append(_span(item))
         if pending is not None:
             trial = pending.before.copy()
-            new = _send(trial, item)
-            if not any(f.kind == "misfit" for f in new):
+            found = _send(trial, item)
+            if not any(f.kind == "misfit" for f in found):
                 rows += [_foreign(monitor.baseline, other.log) for other in pending.logs]
                 monitor.take(trial)
                 pending = None
-                spans.append(_span(item))
-                rows.append(_row(item, new))
+                rows.append(_row(item, found))
                 continue
         before = monitor.copy() if pending is None else pending.before
-        new = _send(monitor, item)
-        misfit = any(f.kind == "misfit" and not f.from_start for f in new)
-        if misfit and pending is None:
+        found = _send(monitor, item)
+        misfit = [f for f in found if f.kind == "misfit"]
+        reason = _refusal(monitor.baseline, item.log) if misfit else ""
+        if reason and pending is None:
+            monitor.take(before)
+            rows.append(LogRow.left_out(item.log.name, reason, _digest(item.log)))
+        elif pending is None and any(not f.from_start for f in misfit):
             pending = _Pending([item], before)
         elif pending is not None:
             pending.logs.append(item)
         else:
-            rows.append(_row(item, new))
-        spans.append(_span(item))
+            rows.append(_row(item, found))
     if pending is not None:
-        if len(pending.logs) == 1 and len(placed) > 1:
-            # A single log does not show whether it is of another robot. It is left out.
+        # A single log does not show whether it is of another robot. It is left out until another one follows.
+        name = pending.logs[0].log.name
+        followed = len(pending.logs) > 1 or any(row.undecided and row.name != name for row in monitor.rows)
+        if not followed:
             monitor.take(pending.before)
-            rows += [_foreign(monitor.baseline, other.log) for other in pending.logs]
+            rows += [replace(_foreign(monitor.baseline, other.log), digest="") for other in pending.logs]
         else:
             rows += [_row(other, ()) for other in pending.logs]
     bar.finish()
-    return MonitorResult.of(monitor, (*earlier, *rows, *refused), (*notes, *missing_days(spans)))
+    again = {row.name for row in (*rows, *refused)}
+    monitor.rows = [row for row in monitor.rows if row.used or row.digest or row.name not in again]
+    monitor.rows += [*rows, *refused]
+    return MonitorResult.of(monitor, [*notes, *remarks, *missing_days(spans)])
+
+
+def _not_counted(monitor: Monitor, logs: Sequence[Log]) -> tuple[list[Log], list[str]]:
+    """Logs that the monitor has not decided on before, and a line on the others."""
+    known = {row.digest for row in monitor.rows if row.digest}
+    new: list[Log] = []
+    before, copies = 0, list[str]()
+    seen: dict[str, str] = {}
+    for log in logs:
+        digest = _digest(log)
+        if digest in known:
+            before += 1
+        elif digest in seen:
+            copies.append(f"{log.name or 'A log'} is a copy of {seen[digest] or 'another log'}. It is counted once.")
+        else:
+            seen[digest] = log.name
+            new.append(log)
+    notes = (
+        [f"{before} of {len(logs)} logs were counted in an earlier run. They are not counted again."] if before else []
+    )
+    return new, notes + copies
+
+
+def _digest(log: Log) -> str:
+    """By which a log is known again, under any name."""
+    found = sha256()
+    found.update(np.ascontiguousarray(log.t, dtype=float).tobytes())
+    found.update(np.ascontiguousarray(log.q, dtype=float).tobytes())
+    if log.tau is not None:
+        # Torque constants may be estimated anew in each run: the signs do not depend on them.
+        found.update(np.packbits(np.asarray(log.tau) > 0).tobytes())
+    return found.hexdigest()
 
 
 def _checked(baseline: Baseline, logs: Sequence[Log]) -> tuple[list[Log], list[LogRow]]:
@@ -106,9 +151,6 @@ def _checked(baseline: Baseline, logs: Sequence[Log]) -> tuple[list[Log], list[L
             usable.append(as_joint_torque(robot, log))
         except InputError as error:
             rows.append(LogRow.left_out(log.name, str(error)))
-    if not usable:
-        first = f": {rows[0].note}" if rows else ""
-        raise InputError(f"no log can be used{first}", remedy="give logs of the model's robot")
     return usable, rows
 
 
@@ -126,14 +168,18 @@ def _send(monitor: Monitor, item: Placed) -> tuple[Finding, ...]:
     return monitor.findings[before:]
 
 
+def _refusal(baseline: Baseline, log: Log) -> str:
+    """Why the gate refuses a log, such as positions in degrees; empty for a log that passes."""
+    try:
+        check_log(baseline.robot, log).raise_if_refused()
+    except InputError as error:
+        return str(error)
+    return ""
+
+
 def _foreign(baseline: Baseline, log: Log) -> LogRow:
     """A row for a log that does not fit, with the reason of the gate where it has one."""
-    gate = check_log(baseline.robot, log)
-    try:
-        gate.raise_if_refused()
-    except InputError as error:
-        return LogRow.left_out(log.name, str(error))
-    return LogRow.left_out(log.name, "does not fit the model: a log of another robot, or a robot after major service")
+    return LogRow.left_out(log.name, _refusal(baseline, log) or UNFIT, _digest(log))
 
 
 def _row(item: Placed, found: Sequence[Finding]) -> LogRow:
@@ -143,6 +189,7 @@ def _row(item: Placed, found: Sequence[Finding]) -> LogRow:
         start=start,
         end=end,
         used=True,
+        digest=_digest(item.log),
         findings=tuple(f.kind if f.joint is None else f"{f.kind} of joint {f.joint}" for f in found),
     )
 

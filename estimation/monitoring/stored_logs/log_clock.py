@@ -14,6 +14,7 @@ from robots.signals import UNKNOWN_PAUSE, Log
 
 # Logs that all begin within this time [s] have clocks of their own.
 SAME_START = 1.0
+LISTED = 12
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -51,8 +52,8 @@ def place_logs(logs: Sequence[Log], last: float | None = None) -> tuple[list[Pla
         return [Placed(log=log, shift=date - float(log.t[0])) for log, date in zip(logs, known, strict=True)], notes
     if anew:
         notes.append(
-            f"Each log has its own clock: the logs are taken {UNKNOWN_PAUSE:.0f} s apart, in the given order. The "
-            "heat at their start is uncertain."
+            f"Each log has its own clock: the logs are taken {UNKNOWN_PAUSE:.0f} s apart, in the order "
+            f"{_listed([log.name for log in logs])}. The heat at their start is uncertain."
         )
     placed: list[Placed] = []
     end, shift = last, 0.0
@@ -94,6 +95,12 @@ def missing_days(spans: Sequence[tuple[float, float]]) -> list[str]:
                 "time is dated to the whole of it."
             )
     return found
+
+
+def _listed(names: Sequence[str]) -> str:
+    """Names in their order; the middle of a long list is left out."""
+    shown = names if len(names) <= LISTED else [*names[: LISTED - 2], "...", names[-1]]
+    return ", ".join(shown)
 
 
 def _duration(seconds: float) -> str:

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from estimation.monitoring.findings import DAY
-from estimation.monitoring.log_clock import missing_days, place_logs
+from estimation.monitoring.stored_logs.log_clock import missing_days, place_logs
 from robots.signals import UNKNOWN_PAUSE, Log
 
 

@@ -1,0 +1,1 @@
+"""Stored logs: read, put on one clock, and sent through a monitor."""
