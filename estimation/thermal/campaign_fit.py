@@ -118,7 +118,7 @@ class _AlternatingFit:
                 if not self.moves[j]:
                     continue
                 runs = self._runs(j, sums)
-                fit = fit_thermal(runs, starts=3 if rounds == 1 else 1, **options)
+                fit = fit_thermal(runs, starts=3 if rounds == 1 else 1, bounds=False, **options)
                 factor = self._factor(fit, runs) / fit.model.beta
                 change = max(change, float(np.abs(factor / self.factors[j] - 1.0).max()))
                 fits[j], self.factors[j] = fit, factor
@@ -134,6 +134,10 @@ class _AlternatingFit:
             if change < SETTLED
             else [f"The alternating fit stopped before it converged (last relative change {change:.1e})."]
         )
+        fits = [
+            None if fit is None else fit_thermal(self._runs(j, sums), starts=1, **options)
+            for j, (fit, sums) in enumerate(zip(fits, self.condensed.joints, strict=True))
+        ]
         notes += sorted({note for fit in fits if fit is not None for note in fit.notes})
         notes += self._warm(fits, options)
         final = [None if fit is None else self._unit(fit) for fit in fits]
@@ -164,7 +168,7 @@ class _AlternatingFit:
         found = []
         for j, (sums, fit) in enumerate(zip(self.condensed.joints, fits, strict=True)):
             if fit is not None:
-                tried = fit_thermal(self._runs(j, sums), starts=1, **{**options, "start": "auto"})
+                tried = fit_thermal(self._runs(j, sums), starts=1, bounds=False, **{**options, "start": "auto"})
                 found += [note for note in tried.notes if "does not start at ambient temperature" in note]
         return found
 

@@ -121,14 +121,14 @@ def _held_out_errors(
     fitted(0)
     if how == "runs":
         for number, run in enumerate(data, start=1):
-            rest = fit_thermal([other for other in data if other is not run], starts=1, **options)
+            rest = fit_thermal([other for other in data if other is not run], starts=1, bounds=False, **options)
             start = next(fit.start for fit in whole.runs if fit.name == run.name)
             parts.append(predict_run(rest.model, run, start)[1])
             fitted(number)
     else:
         cuts = [max(3, round(2 * len(run.t) / 3)) for run in data]
         short = [run.rows(slice(0, cut)) for run, cut in zip(data, cuts, strict=True)]
-        rest = fit_thermal(short, starts=1, **options)
+        rest = fit_thermal(short, starts=1, bounds=False, **options)
         for run, cut in zip(data, cuts, strict=True):
             start = next(fit.start for fit in rest.runs if fit.name == run.name)
             ambient = next(fit.ambient for fit in rest.runs if fit.name == run.name)

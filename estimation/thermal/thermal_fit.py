@@ -30,6 +30,7 @@ def fit_thermal(
     start: str = "auto",
     starts: int = 3,
     seed: int = 0,
+    bounds: bool = True,
     progress: Progress | None = None,
 ) -> ThermalEstimate:
     """Fits one thermal model to all runs of a joint at once, by direct collocation (models: thesis chapter 4).
@@ -45,6 +46,8 @@ def fit_thermal(
             ``auto`` to let the data say.
         starts: how many times the search begins anew.
         seed: of where it begins.
+        bounds: whether a time constant that the runs do not determine gets its lower bound (profile likelihood), which
+            takes longer than the fit.
         progress: receives the progress.
 
     Returns:
@@ -72,7 +75,7 @@ def fit_thermal(
         solution, warm = fit.warm_starts(solution) if start == "auto" else (solution, ())
         solution = fit.refined(solution)
         bar.update(3.0, "standard errors")
-        return report(fit, solution, warm)
+        return report(fit, solution, warm, bounds=bounds)
     finally:
         bar.finish()
 

@@ -19,7 +19,7 @@ from robots.thermal import ThermalModel
 Array = NDArray[np.float64]
 
 
-def report(search: Search, solution: Solution, warm: tuple[int, ...]) -> ThermalEstimate:
+def report(search: Search, solution: Solution, warm: tuple[int, ...], *, bounds: bool = True) -> ThermalEstimate:
     """Collects values, standard errors, combinations and remarks."""
     info = gather(search.problem, solution, search.free, search.weights, search.prior)
     count = len(search.kind.parameters)
@@ -30,7 +30,7 @@ def report(search: Search, solution: Solution, warm: tuple[int, ...]) -> Thermal
     combinations = derive(search.model_at, at, covariance, powers, friction=friction, heat_known=search.heat_known)
     scales = _slopes(search, at)
     parameters = _parameters(search, model, np.sqrt(np.maximum(np.diag(covariance), 0.0)) * np.abs(scales))
-    bounds, notes = _slow(search, solution, info, combinations, powers)
+    lowest, notes = _slow(search, solution, info, combinations, powers) if bounds else ({}, [])
     notes = [*search.structure.notes, *notes, *_notes(search, solution, parameters, warm)]
     predicted = search.problem.predict(solution.coordinates, solution.states)
     white = search.weights * (predicted - search.problem.measured)
@@ -39,7 +39,7 @@ def report(search: Search, solution: Solution, warm: tuple[int, ...]) -> Thermal
         model=model,
         parameters=parameters,
         combinations=combinations,
-        bounds=bounds,
+        bounds=lowest,
         covariance=covariance * scales[:, None] * scales,
         runs=_run_fits(search, solution, predicted),
         noise=dict(search.levels.levels),
