@@ -1,10 +1,12 @@
 """Whether `oed monitor` finds damage under heat and nothing else, on virtual robots that share no code with it.
 
-Run it with ``python benchmarks/monitoring.py FOLDER [thesis|night|healthy|weeks|speed|table] [COUNT]``. Rows go to
-files in FOLDER; a second run goes on where the first one ended. ``table`` prints the figures of all rows.
+Run it with ``python benchmarks/monitoring.py FOLDER [STUDY] [COUNT]``, with one of the studies below or ``table``. Rows
+go to files in FOLDER; a second run goes on where the first one ended. ``table`` prints the figures of all rows.
 
 - thesis: friction of one joint rises by 32 % after 60 min of the second day, while heat changes the friction of all.
 - night: the same change in the night before the second day: the first log of that day must show it.
+- start: three logs, cold or warm, with known or other motions: of a healthy robot, or of one that had 30 % more
+  friction of one joint before its first log.
 - healthy: 100 h of heating and cooling without any change.
 - weeks: five days of six 5 min cycles, with mixed causes.
 - speed: a stream of 6 joints at 250 Hz, how many times faster than real time it is followed.
@@ -45,7 +47,12 @@ LOGGED, CYCLE, REST = 60.0, 300.0, 5.0
 DAMAGE = 0.32
 VARIANTS = {"thermal model": ("thermal", "model"), "assumed heat": ("plain", "common"), "no heat": ("plain", "none")}
 # Variants of each study: more cost time.
-STUDIED = {"thesis": tuple(VARIANTS), "healthy": ("thermal model",), "weeks": ("thermal model",)}
+STUDIED = {
+    "thesis": tuple(VARIANTS),
+    "start": ("thermal model", "assumed heat"),
+    "healthy": ("thermal model",),
+    "weeks": ("thermal model",),
+}
 
 
 def robot_of(seed: int) -> VirtualRobot:
@@ -132,6 +139,38 @@ def thesis(folder: Path, seed: int, joint: int, *, night: bool = False) -> dict[
             "heat": float(np.median(100 * np.expm1(np.nanmax(table[:144], 0) - np.nanmin(table[:144], 0)))),
         }
     return found
+
+
+def start(folder: Path, number: int) -> dict[str, Any]:
+    """Three logs of a minute, 5 min apart; every second robot is damaged before the first one."""
+    rng = np.random.default_rng([number, 91])
+    seed, damaged = ROBOTS[number // 20 % len(ROBOTS)], number % 2 == 1
+    models, robot = trained(folder, seed), robot_of(seed)
+    robot.rng = np.random.default_rng([seed, number])
+    robot.swing = float(rng.uniform(0.0, 6.0))
+    motions = [robot.add_motion() for _ in range(2)] if number % 4 > 1 else [0, 1]
+    robot.rest(float(rng.uniform(0.2, 1.0)) * DAY)
+    robot.warm_up(float(rng.choice([0.0, 300.0, 1800.0])))
+    joint = int(rng.integers(1, robot.n + 1))
+    if damaged:
+        robot.causes = [Cause(kind="damage", time=robot.clock - 1.0, joint=joint, amount=0.3)]
+    monitors, begin = monitors_of(models, "start"), robot.clock
+    for k in range(3):
+        send(list(monitors.values()), robot.log(LOGGED, motions[k % 2], f"log {k}"))
+        robot.warm_up(CYCLE - LOGGED - REST)
+        robot.rest(REST)
+    row: dict[str, Any] = {"seed": seed, "damaged": damaged, "joint": joint}
+    for name, monitor in monitors.items():
+        monitor.finish()
+        found = [f for f in monitor.findings if f.severity != "info"]
+        right = [f for f in found if f.kind == "damage" and f.joint == joint and damaged]
+        row[name] = {
+            "found": bool(right),
+            "covered": [f.low <= 30.0 <= f.high for f in right[:1]],
+            "false": [f.sentence(begin) for f in found if f not in right],
+            "act": sum(f.severity == "act" for f in found if f not in right),
+        }
+    return row
 
 
 def healthy(folder: Path, seed: int, hours: float = 100.0) -> dict[str, Any]:
@@ -260,16 +299,18 @@ def run(folder: Path, study: str, count: int) -> None:
     for number in range(count):
         if str(number) in done:
             continue
-        start = time.perf_counter()
+        began = time.perf_counter()
         if study in ("thesis", "night"):
             row = thesis(folder, ROBOTS[number // 6 % len(ROBOTS)], number % 6 + 1, night=study == "night")
+        elif study == "start":
+            row = start(folder, number)
         elif study == "healthy":
             row = healthy(folder, ROBOTS[number % len(ROBOTS)])
         elif study == "weeks":
             row = week(folder, number)
         else:
             row = speed(folder)
-        row = {"key": str(number), "seconds": time.perf_counter() - start, **row}
+        row = {"key": str(number), "seconds": time.perf_counter() - began, **row}
         with file.open("a") as stream:
             stream.write(json.dumps(row) + "\n")
         print(f"{study} {number}: {row['seconds']:.0f} s", flush=True)
@@ -277,7 +318,7 @@ def run(folder: Path, study: str, count: int) -> None:
 
 def table(folder: Path) -> None:
     """Prints the figures of all rows."""
-    for study in ("thesis", "night", "healthy", "weeks", "speed"):
+    for study in ("thesis", "night", "start", "healthy", "weeks", "speed"):
         file = folder / f"{study}.jsonl"
         rows = [json.loads(line) for line in file.read_text().splitlines()] if file.exists() else []
         if not rows:
@@ -303,6 +344,16 @@ def table(folder: Path) -> None:
                     f"points: {len(good)}; without any other finding: {clean}; sizes "
                     f"{_range([f['size'] for f in seen])} %; delays {_range([f['delay'] for f in seen])} s; intervals "
                     f"hold 32 %: {sum(bool(f['covered']) for f in seen)}; heat {_range([f['heat'] for f in found])} %"
+                )
+            elif study == "start":
+                ill = [row[name] for row in rows if row["damaged"]]
+                well = [row[name] for row in rows if not row["damaged"]]
+                held = [held for f in ill for held in f["covered"]]
+                print(
+                    f"  {name:14} damaged: found in {sum(f['found'] for f in ill)} of {len(ill)}, intervals hold "
+                    f"30 % in {sum(held)} of {len(held)}; healthy: red {sum(f['act'] > 0 for f in well)}, amber "
+                    f"{sum(bool(f['false']) and not f['act'] for f in well)} of {len(well)}; beside a damage: "
+                    f"{sum(len(f['false']) for f in ill)} other findings"
                 )
             elif study == "healthy":
                 hours, motion = sum(row["hours"] for row in rows), sum(row["motion"] for row in rows)
@@ -336,7 +387,7 @@ def main() -> int:
         return 2
     folder, study = Path(sys.argv[1]), sys.argv[2] if len(sys.argv) > 2 else "table"
     folder.mkdir(parents=True, exist_ok=True)
-    counts = {"thesis": 6, "night": 6, "healthy": 1, "weeks": 200, "speed": 1}
+    counts = {"thesis": 6, "night": 6, "start": 100, "healthy": 1, "weeks": 200, "speed": 1}
     if study == "table":
         table(folder)
         return 0

@@ -25,7 +25,7 @@ from robots.terms.base import force_unit
 
 Array = NDArray[np.float64]
 
-# Windows whose residual gives the colour of the noise, the last ones with more weight.
+# Windows whose residual gives the colour of the noise.
 COLOUR_WINDOWS = 30
 # A friction factor with a larger relative standard error is not used in its window.
 UNSURE = 0.25
@@ -33,6 +33,8 @@ UNSURE = 0.25
 STEP_TESTS = 30
 # Windows in a row with a short force that are no short force any more.
 LASTING = 3
+# A short force with more than this share of its chi-square in one of the next three windows is none.
+AGAIN = 0.25
 
 
 class Evaluation:
@@ -58,7 +60,7 @@ class Evaluation:
         self.history = History(self.n)
         self.findings: list[Finding] = []
         self.event: Event | None = None
-        self.forces: list[tuple[float, float, int, int, int]] = []
+        self.forces: list[tuple[float, float, int, int, float]] = []
         self.colour_sum = np.zeros((self.n, HIGHEST_ORDER + 1))
         self.colour_rows = np.zeros(self.n)
         self.colour_count = 0
@@ -112,11 +114,10 @@ class Evaluation:
         self.bursts_in_row = self.bursts_in_row + 1 if burst else 0
         short = burst and self.bursts_in_row < LASTING
         self._observe(window, len(logs) - 1, skip=short)
+        # What comes again in the next cycles is an error of the model on this motion.
+        self.forces = [force for force in self.forces if window.burst < AGAIN * force[4]]
         if short:
             self._note_force(window, len(logs) - 1)
-        if self.bursts_in_row == LASTING:
-            # It comes with each window: the model errs on this motion.
-            self.forces = [force for force in self.forces if force[0] < start - LASTING * self.settings.window]
         self.heat.advance(cold * factors, (end - start) / 2, found.ambient)
         self.end = end
         if self.event is None and (last or len(self.history.rows) % STEP_TESTS == 0):
@@ -144,10 +145,6 @@ class Evaluation:
         return found
 
     def _project(self, found: WindowRows, start: float, end: float) -> Window:
-        def with_window(covariances: Array, rows: Array) -> Colour:
-            # On a motion that was not seen before, the model may err more.
-            return Colour.fit((self.colour_sum + covariances) / (self.colour_count + 1), self.colour_rows + rows)
-
         colour = Colour.fit(self.colour_sum / self.colour_count, self.colour_rows) if self.colour_count else None
         speeds = self.baseline.speeds
         usual = np.where(np.isfinite(speeds), speeds, np.abs(found.dq).max(axis=0))
@@ -157,18 +154,14 @@ class Evaluation:
             found.tau,
             found.directions,
             colour=colour,
-            with_window=with_window,
             expected=self._expected(),
             usual_speed=usual,
             edges=(start, end),
         )
-        if self.colour_count >= COLOUR_WINDOWS:
-            keep = 1 - 1 / COLOUR_WINDOWS
-            self.colour_sum, self.colour_rows = keep * self.colour_sum, keep * self.colour_rows
-            self.colour_count -= 1
-        self.colour_sum = self.colour_sum + window.colour
-        self.colour_rows = self.colour_rows + window.rows
-        self.colour_count += 1
+        if self.colour_count < COLOUR_WINDOWS:
+            self.colour_sum += window.colour
+            self.colour_rows += window.rows
+            self.colour_count += 1
         return window
 
     def _known(self, window: Window) -> NDArray[np.bool_]:
@@ -212,12 +205,7 @@ class Evaluation:
         """Keeps a short force until later windows show whether a lasting change began."""
         felt = np.flatnonzero(np.abs(window.burst_joints) > 3.0)
         link = int(felt.max()) + 1 if len(felt) else 0
-        self.forces.append((window.start, window.burst_at, log, link, self.heat_windows))
-
-    @property
-    def heat_windows(self) -> int:
-        """Windows so far."""
-        return len(self.history.rows)
+        self.forces.append((window.start, window.burst_at, log, link, window.burst))
 
     def _settle(self, logs: Sequence[str]) -> None:
         if self.event is not None and self.event.windows >= self.settings.confirm:

@@ -25,12 +25,12 @@ class Event:
     windows: int = 0
 
 
-def contact_finding(force: tuple[float, float, int, int, int], logs: Sequence[str]) -> Finding:
+def contact_finding(force: tuple[float, float, int, int, float], logs: Sequence[str]) -> Finding:
     """The finding of a short force.
 
     Args:
         force: start of its window [s], its time [s], number of the log from 0, highest joint that felt it (0 for
-            none), and number of the window.
+            none), and its chi-square.
         logs: names of the logs.
     """
     _, at, log, link, _ = force

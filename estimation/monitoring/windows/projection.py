@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -106,7 +105,6 @@ def project(
     directions: Directions,
     *,
     colour: Colour | None,
-    with_window: Callable[[Array, Array], Colour] = Colour.fit,
     expected: Array,
     usual_speed: Array,
     edges: tuple[float, float],
@@ -119,8 +117,6 @@ def project(
         tau: torques (N, n) [N m or N].
         directions: the model's torques.
         colour: of the noise; None where it is not known: then the window's own, from a first fit.
-        with_window: gives the colour by which short forces are judged, of the window's autocovariances (n, lags + 1)
-            and rows (n,); the window's own by default.
         expected: friction factors that are expected (n,).
         usual_speed: highest usual speed (n,) [rad/s or m/s].
         edges: start and end of the window [s].
@@ -136,7 +132,7 @@ def project(
     values, covariance, prior = _solve(y, directions, live, colour, expected, scale)
     residual = y - _fitted(values, directions)
     covariances, rows = _colour(residual, live)
-    at, burst, joints = _burst(t, residual, live, with_window(covariances, rows))
+    at, burst, joints = _burst(t, residual, live, colour)
     return Window(
         t=float(t.mean()),
         start=edges[0],
