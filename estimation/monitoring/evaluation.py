@@ -66,6 +66,7 @@ class Evaluation:
         self.colour_count = 0
         self.bursts_in_row = 0
         self.bursts = BurstChart(self._run_length(1))
+        self.noise_threshold = self.bursts.threshold
 
     def _run_length(self, count: int) -> float:
         """Windows between false alarms of each of all tests: three of each quantity, and that of short forces."""
@@ -116,7 +117,8 @@ class Evaluation:
         self._observe(window, len(logs) - 1, skip=short)
         # What comes again in the next cycles is an error of the model on this motion.
         self.forces = [force for force in self.forces if window.burst < AGAIN * force[4]]
-        if short:
+        # A motion on which the model errs more fills the window with error. A short force stands above it.
+        if short and float(np.sum((window.burst_joints / window.burst_scatter) ** 2)) > self.noise_threshold:
             self._note_force(window, len(logs) - 1)
         self.heat.advance(cold * factors, (end - start) / 2, found.ambient)
         self.end = end

@@ -43,6 +43,7 @@ class Window:
         burst: largest chi-square of the whitened residual in a block.
         burst_at: time of that block [s].
         burst_joints: whitened residual of each joint in it (n,).
+        burst_scatter: that of all blocks (n,), one for noise: more where the model errs on this motion.
         colour: autocovariances of the residual (n, lags + 1); zero for a joint that rests throughout.
         rows: rows behind them (n,).
     """
@@ -61,6 +62,7 @@ class Window:
     burst: float
     burst_at: float
     burst_joints: Array
+    burst_scatter: Array
     colour: Array
     rows: Array
 
@@ -132,7 +134,7 @@ def project(
     values, covariance, prior = _solve(y, directions, live, colour, expected, scale)
     residual = y - _fitted(values, directions)
     covariances, rows = _colour(residual, live)
-    at, burst, joints = _burst(t, residual, live, colour)
+    at, burst, joints, scatter = _burst(t, residual, live, colour)
     return Window(
         t=float(t.mean()),
         start=edges[0],
@@ -148,6 +150,7 @@ def project(
         burst=burst,
         burst_at=at,
         burst_joints=joints,
+        burst_scatter=scatter,
         colour=covariances,
         rows=rows,
     )
@@ -207,8 +210,12 @@ def _colour(residual: Array, live: NDArray[np.bool_]) -> tuple[Array, Array]:
     return padded, rows
 
 
-def _burst(t: Array, residual: Array, live: NDArray[np.bool_], colour: Colour) -> tuple[float, float, Array]:
-    """The block with the largest whitened residual: its time, chi-square over the joints, and each joint's value."""
+def _burst(t: Array, residual: Array, live: NDArray[np.bool_], colour: Colour) -> tuple[float, float, Array, Array]:
+    """The block with the largest whitened residual.
+
+    Returns:
+        Its time, chi-square over the joints and each joint's value (n,), and the scatter of all blocks (n,).
+    """
     n = residual.shape[1]
     white = np.zeros_like(residual)
     for j, a in enumerate(colour.coefficients):
@@ -219,10 +226,10 @@ def _burst(t: Array, residual: Array, live: NDArray[np.bool_], colour: Colour) -
     length = max(1, round(BLOCK / float(t[1] - t[0])))
     count = len(t) // length
     if count == 0:
-        return float(t[0]), 0.0, np.zeros(n)
+        return float(t[0]), 0.0, np.zeros(n), np.ones(n)
     sums = white[: count * length].reshape(count, length, n).sum(axis=1) / np.sqrt(length)
-    # A motion on which the model errs more fills the window, a short force only few blocks.
-    sums /= np.sqrt(np.maximum(np.median(sums**2, axis=0) / NORMAL_MEDIAN, 1.0))
     chi = (sums**2).sum(axis=1)
     worst = int(np.argmax(chi))
-    return float(t[min(worst * length + length // 2, len(t) - 1)]), float(chi[worst]), sums[worst]
+    # Of the median: a short force fills few blocks.
+    scatter = np.sqrt(np.maximum(np.median(sums**2, axis=0) / NORMAL_MEDIAN, 1.0))
+    return float(t[min(worst * length + length // 2, len(t) - 1)]), float(chi[worst]), sums[worst], scatter
