@@ -127,7 +127,9 @@ def _contact(
     # The first and the last step hold a part of the contact only.
     inner = slice(start + 1, end - 1) if end - start > 2 else rows
     torque = signals.external[inner].mean(axis=0)
-    jacobian = signals.jacobian[inner, :3].mean(axis=0)
+    # As the torque, the mean of each step: a fast arm turns within one.
+    before = slice(max(inner.start - 1, 0), max(inner.stop - 1, 1))
+    jacobian = (signals.jacobian[inner, :3].mean(axis=0) + signals.jacobian[before, :3].mean(axis=0)) / 2.0
     # The filter's noise is that of a mean over two time constants; the model's error is alike over the contact.
     shorter = max(2.0 * calibration.constant / (signals.period * (inner.stop - inner.start)), 1.0)
     mean = shorter * errors.covariance(observed.deviation[inner]).mean(axis=0)
