@@ -22,9 +22,9 @@ WIDTHS = np.geomspace(1e-3, 0.3, 16)
 ROUNDS, MOST_ROWS = 4, 20_000
 # Speeds [rad/s or m/s] that are compared: below such a one the sign of the friction is open.
 HOLDING = (SLOWEST, 2 * SLOWEST, 5 * SLOWEST, 10 * SLOWEST)
-# Seconds of new healthy motion that count as much as the fit's band of other motions: with fewer the virtual arms of
-# `benchmarks/forces.py --arms` have more false alarms than stated, with more they miss pushes.
-PRIOR = 20.0
+# Seconds of new healthy motion that count as much as the fit's band of other motions. On arms that
+# `benchmarks/force_motions.py` draws, the residual of motions that neither has seen is then as large as stated.
+PRIOR = 10.0
 # Quantile that counts as the largest of the healthy logs.
 LARGEST = 0.999
 # Smallest variance as a share of the mean one, and smallest eigenvalue of the correlation.
