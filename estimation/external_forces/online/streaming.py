@@ -186,7 +186,7 @@ class ForceObserver:
         self._t, self._momentum, self._other, self._dq, self._before = t, momentum, other, speed, friction
         deviation = errors.deviation(self._amplitudes)
         statistic = errors.statistic(self._residual, deviation) / self._threshold
-        if not fresh:
+        if step is not None and not fresh:
             b = math.exp(-min(step, 2.0 * self.calibration.period) / MEMORY)
             counts = (1.0 - b) * float(contact_weight(statistic))
             self._cross = b * self._cross - counts * external * mean
