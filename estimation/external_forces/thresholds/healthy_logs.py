@@ -66,6 +66,11 @@ def calibrate_signals(
     # The filter begins with zero, and its first moments know little of the residual.
     settled = _since(whole) > SETTLING * time_constant(bandwidth)
     counts = settled.copy()
+    if not (counts & new).any():
+        raise InputError(
+            f"the healthy log of {whole.t[-1] - whole.t[0]:.3g} s is too short for the observer to settle",
+            remedy="give a longer healthy log with --healthy: a minute or more",
+        )
     for number in range(ROUNDS if own else 1):
         first = own and number == 0
         residual = lag(whole.external, from_zero=True)
