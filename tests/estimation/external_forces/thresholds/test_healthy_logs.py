@@ -58,7 +58,7 @@ def test_log_of_the_fit_leaves_the_whole_band_open(banded, pushed_log):
 
 
 def test_short_healthy_log_serves_but_does_not_test_the_rate(exact, pushed_log):
-    """Of a log of four seconds no half settles the observer: it gives a threshold, and says that nothing confirms it."""
+    """A log of four seconds gives a threshold. Its halves hardly settle the observer, so that nothing confirms it."""
     found = estimate_forces(exact, pushed_log(12), healthy=[pushed_log(11, duration=4.0)])
     assert found.calibration.check is not None
     assert found.calibration.check.hours < 4.0 / 3600
