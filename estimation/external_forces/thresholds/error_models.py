@@ -215,7 +215,9 @@ def band_growth(model: Model) -> Array:
 def _variance_fit(columns: Array, square: Array, added: Array) -> tuple[Array, float]:
     """Non-negative weights (4,) of the columns beside a known variance, and the mean negative log-likelihood."""
     mean = max(float(square.mean()), np.finfo(float).tiny)
-    scale = np.maximum(np.sqrt((columns**2).mean(axis=0)), np.finfo(float).tiny)
+    scale = np.sqrt((columns**2).mean(axis=0))
+    # A narrow reversal that no sample comes near, or no errors of the parameters: such a column has no weight.
+    scale = np.where(scale > np.sqrt(np.finfo(float).tiny), scale, np.inf)
     unit, variance, weights = columns / scale, np.full(len(square), mean) + added, np.zeros(columns.shape[1])
     for _ in range(ROUNDS):
         weighted = unit / variance[:, None]

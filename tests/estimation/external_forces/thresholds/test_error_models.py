@@ -83,6 +83,15 @@ def test_band_of_other_motions_counts_less_the_more_healthy_motion_there_is(exac
         np.testing.assert_allclose(seen, 0.08 * found.leverage[None], rtol=1e-9)
 
 
+def test_widths_that_no_sample_comes_near_have_no_weight(exact):
+    """Joints that never slow down below half their speed: narrow reversals are not seen, and the fit is finite."""
+    model, _, residual, dq, friction, variance = samples(exact, count=600)
+    fast = np.where(dq < 0, -1.0, 1.0) * np.clip(np.abs(dq), 0.5, None)
+    counts = np.ones(len(dq), dtype=bool)
+    found = fit_error_model(model, residual, fast, friction, variance, counts, lambda x: x, seconds=0.0)
+    assert all(np.isfinite(values).all() for values in found.to_dict().values())
+
+
 def test_resting_joint_may_hold_its_coulomb_friction(exact):
     """At rest the deviation is that of a torque anywhere between plus and minus Coulomb friction: a third squared."""
     _, truth, *_ = samples(exact, count=1)
