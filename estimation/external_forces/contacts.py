@@ -1,4 +1,4 @@
-"""Contacts: samples beyond the threshold, joined to events with time, force and place."""
+"""Contacts: samples beyond the threshold, joined to one event for one push, with time, force and place."""
 
 from __future__ import annotations
 
@@ -10,16 +10,19 @@ from numpy.typing import NDArray
 
 from estimation.external_forces.localisation import Place
 from estimation.external_forces.residuals.signals import Signals
-from estimation.external_forces.thresholds.calibrations import Calibration, Observed
+from estimation.external_forces.thresholds.calibrations import Calibration
+from estimation.external_forces.thresholds.observations import Observed
 from estimation.external_forces.wrenches import tool_load
 from robots.common.plain import all_finite, finite
-from robots.common.stretches import spans
+from robots.common.stretches import joined_spans
 from robots.geometry.chain import Chain
 
 Array = NDArray[np.float64]
 
 # Samples that stand for a longer contact where its first and last moment are sought.
 MOST_ROWS = 400
+# Half-width of a normal distribution's 95 % interval.
+NORMAL_95 = 1.96
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -31,8 +34,9 @@ class Contact:
         start: when the torque began [s], the most likely time.
         end: when it ended [s].
         peak: largest statistic over the threshold.
+        peak_time: when that is [s].
         force: mean force at the tool, in the base frame, if there is no moment (3,) [N].
-        covariance: of it (3, 3) [N2].
+        covariance: of it (3, 3) [N2], by noise and by the model's error.
         torque: mean external joint torque (n,) [N m or N].
         place: where it acts.
         extrapolates: whether the model extrapolates at that time.
@@ -42,6 +46,7 @@ class Contact:
     start: float
     end: float
     peak: float
+    peak_time: float
     force: Array
     covariance: Array
     torque: Array
@@ -61,6 +66,12 @@ class Contact:
         along = self.force / max(self.magnitude, np.finfo(float).tiny)
         return float(np.sqrt(max(float(along @ self.covariance @ along), 0.0)))
 
+    @property
+    def magnitude_interval(self) -> tuple[float, float]:
+        """95 % interval of the size [N]."""
+        half = NORMAL_95 * self.magnitude_deviation
+        return max(self.magnitude - half, 0.0), self.magnitude + half
+
     def to_dict(self) -> dict[str, Any]:
         """Writes it as plain data."""
         return {
@@ -68,10 +79,12 @@ class Contact:
             "start": self.start,
             "end": self.end,
             "peak_over_threshold": self.peak,
+            "peak_time": self.peak_time,
             "force": self.force.tolist(),
             "force_standard_deviation": all_finite(np.sqrt(np.diag(self.covariance))),
             "magnitude": self.magnitude,
             "magnitude_standard_deviation": finite(self.magnitude_deviation),
+            "magnitude_interval95": [finite(value) for value in self.magnitude_interval],
             "torque": self.torque.tolist(),
             "link": self.place.link,
             "reacting_joints": list(self.place.reacting),
@@ -92,25 +105,15 @@ def find_contacts(
         calibration: of a healthy robot.
 
     Returns:
-        Where (N,) the statistic is beyond the threshold, and the contacts. Exceedances closer than independent peaks
-        belong to one contact.
+        Where (N,) a contact is detected: from when the statistic passes the threshold until it has been below for the
+        observer's memory. And the contacts: exceedances closer than that belong to one.
     """
-    beyond = observed.statistic > calibration.threshold.value
-    contacts = []
-    for first, last in _joined(beyond, signals.t, max(calibration.threshold.separation, calibration.constant)):
-        contacts.append(_contact(chain, signals, observed, calibration, first, last))
-    return beyond, tuple(contacts)
-
-
-def _joined(beyond: NDArray[np.bool_], t: Array, separation: float) -> list[tuple[int, int]]:
-    """Runs of exceedances as (first, last + 1), those closer than `separation` [s] in one."""
-    runs: list[tuple[int, int]] = []
-    for first, last in spans(beyond):
-        if runs and t[first] - t[runs[-1][1] - 1] < separation:
-            runs[-1] = (runs[-1][0], last)
-        else:
-            runs.append((first, last))
-    return runs
+    beyond, t = observed.statistic > calibration.threshold.value, signals.t
+    runs = joined_spans(beyond, t, calibration.memory)
+    flagged = np.zeros(len(t), dtype=bool)
+    for first, last in runs:
+        flagged[first : int(np.searchsorted(t, t[last - 1] + calibration.memory, side="right"))] = True
+    return flagged, tuple(_contact(chain, signals, observed, calibration, *run) for run in runs)
 
 
 def _contact(
@@ -121,9 +124,15 @@ def _contact(
     covariance = errors.covariance(observed.deviation[peak])
     start, end = _window(signals, observed, calibration, first, last, peak, covariance)
     rows = slice(start, end)
-    torque = signals.external[rows].mean(axis=0)
-    jacobian = signals.jacobian[rows, :3].mean(axis=0)
-    mean = errors.covariance(observed.deviation[rows]).mean(axis=0)
+    # The first and the last step hold a part of the contact only.
+    inner = slice(start + 1, end - 1) if end - start > 2 else rows
+    torque = signals.external[inner].mean(axis=0)
+    # As the torque, the mean of each step: a fast arm turns within one.
+    before = slice(max(inner.start - 1, 0), max(inner.stop - 1, 1))
+    jacobian = (signals.jacobian[inner, :3].mean(axis=0) + signals.jacobian[before, :3].mean(axis=0)) / 2.0
+    # The filter's noise is that of a mean over two time constants; the model's error is alike over the contact.
+    shorter = max(2.0 * calibration.constant / (signals.period * (inner.stop - inner.start)), 1.0)
+    mean = shorter * errors.covariance(observed.deviation[inner]).mean(axis=0)
     force, spread = tool_load(torque[None], mean[None], jacobian[None])
     place = calibration.localiser.locate(
         chain, signals.q[peak], observed.residual[peak], covariance, signals.jacobian[peak]
@@ -134,6 +143,7 @@ def _contact(
         start=float(signals.t[max(start - 1, 0)]),
         end=float(signals.t[end - 1]),
         peak=float(observed.statistic[peak] / calibration.threshold.value),
+        peak_time=float(signals.t[peak]),
         force=force[0],
         covariance=spread[0],
         torque=torque,
@@ -155,7 +165,7 @@ def _window(
 
     It maximises (sum of the projected torque)^2 / length over all windows about the exceedances.
     """
-    around = max(round(3.0 * calibration.constant / signals.period), 1)
+    around = max(round(calibration.memory / signals.period), 1)
     low, high = max(first - around, 1), min(last + around // 3, len(signals.t))
     weights = np.linalg.solve(covariance, observed.residual[peak])
     series = signals.external[low:high] @ weights

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -11,8 +12,10 @@ from estimation.external_forces.residuals.dynamics import dynamics_of, require_i
 from estimation.external_forces.residuals.filters import filtered
 from estimation.external_forces.residuals.signals import Signals, Velocity, signals_of
 from estimation.external_forces.result import ForceEstimate
-from estimation.external_forces.thresholds.calibrations import Calibration, calibrate_signals, observe
+from estimation.external_forces.thresholds.calibrations import Calibration
 from estimation.external_forces.thresholds.fit_checks import check_fit
+from estimation.external_forces.thresholds.healthy_logs import calibrate_signals, check_rate
+from estimation.external_forces.thresholds.observations import Observed, observe_robustly
 from estimation.external_forces.wrenches import tool_load
 from estimation.logs.provenance import are_same_log, describe_logs
 from estimation.models.model import Model
@@ -77,52 +80,62 @@ def estimate_forces(
     bar.start("external forces", float(len(healthy) + 1))
     warnings: list[str] = []
 
-    def prepared(own: Log, done: int) -> Signals:
+    def prepared(own: Log, done: int) -> tuple[Signals, Callable[[Signals], str | None]]:
         bar.update(float(done), own.name)
         prediction = run(own)
         if prediction.measured is None:
             raise InputError("the log has no torque", file=own.metadata.get("file"), remedy="record tau1.. or i1..")
         dynamics = dynamics_of(model, gravity=own.gravity, payload=own.payload, tool=tool)
+        name = str(own.metadata.get("file") or own.name)
         signals = signals_of(model, dynamics, own, prediction, bandwidth, velocity)
-        found = check_fit(signals, prediction.band, str(own.metadata.get("file") or own.name))
-        if found and not done:
-            warnings.append(found)
-        return signals
+        return signals, lambda levelled: check_fit(levelled, prediction.band, name)
 
-    signals = prepared(log, 0)
+    signals, check = prepared(log, 0)
     known = model.provenance.get("logs", ())
     in_fit = any(are_same_log(own, other) for own in describe_logs(healthy) for other in known)
     if in_fit:
         warnings.append(
-            "the model was fitted to a log of --healthy: the parameters' errors are added to its residual; a log that "
+            "the model was fitted to a log of --healthy, which says nothing of its errors in other motions: a log that "
             "the fit has not seen gives a lower threshold"
         )
     if calibration is None:
+        normal = []
+        for k, own in enumerate(healthy, start=1):
+            part, check_part = prepared(own, k)
+            check_part(part)
+            normal.append(part)
         calibration = calibrate_signals(
             model,
-            [prepared(own, k) for k, own in enumerate(healthy, start=1)] or [signals],
+            normal or [signals],
             bandwidth=bandwidth,
             velocity=velocity,
             false_alarms=false_alarms,
             own=not healthy,
             in_fit=in_fit,
         )
+        if normal:
+            calibration = replace(calibration, check=check_rate(model, normal, calibration, in_fit=in_fit))
     if calibration.own:
         warnings.append("the threshold comes from this log itself: a contact in most of it would be missed (--healthy)")
+    signals, observed = observe_robustly(signals, calibration)
+    # A push must not look like a joint that the model does not fit: its level of friction is known only now.
+    misfit = check(signals)
     bar.finish()
-    return forces_of(model, signals, calibration, warnings)
+    return forces_of(model, signals, observed, calibration, [misfit, *warnings] if misfit else warnings)
 
 
-def forces_of(model: Model, signals: Signals, calibration: Calibration, warnings: Sequence[str] = ()) -> ForceEstimate:
+def forces_of(
+    model: Model, signals: Signals, observed: Observed, calibration: Calibration, warnings: Sequence[str] = ()
+) -> ForceEstimate:
     """Gives the forces and contacts of prepared signals.
 
     Args:
         model: the identified model.
         signals: of the log.
+        observed: the same, filtered and scaled.
         calibration: of a healthy robot.
         warnings: for the result.
     """
-    observed = observe(signals, calibration.errors, calibration.bandwidth)
     covariance = calibration.errors.covariance(observed.deviation)
     force, force_spread = tool_load(observed.residual, covariance, signals.jacobian[:, :3])
     wrench, wrench_spread = tool_load(observed.residual, covariance, signals.jacobian)

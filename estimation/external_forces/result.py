@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 
 FORMAT = "robot-oed forces"
-FORMAT_VERSION = 1
+FORMAT_VERSION = 2
 AXES = ("x", "y", "z")
 
 
@@ -42,7 +42,7 @@ class ForceEstimate:
         wrench: force and moment at the tool in the base frame (N, 6) [N, N m].
         wrench_deviation: standard deviation of its components (N, 6); infinite where the joints do not feel one.
         extrapolates: where (N,) the model extrapolates.
-        flagged: where (N,) the statistic is beyond the threshold.
+        flagged: where (N,) a contact is detected, see `find_contacts`.
         contacts: in the order of time.
         calibration: error model and threshold.
         warnings: limitations of the result.
@@ -70,25 +70,39 @@ class ForceEstimate:
         """From the first to the last sample [s]."""
         return float(self.t[-1] - self.t[0])
 
+    @property
+    def reliability(self) -> str:
+        """Says whether healthy motion confirms the false-alarm rate, and how much of the log extrapolates."""
+        check = self.calibration.check
+        rate = "the false-alarm rate is the model's claim: no healthy log tests it" if check is None else check.text()
+        share = 100 * float(self.extrapolates.mean())
+        return (
+            f"{rate}\n{share:.2g} % of the samples extrapolate from the fitted motions: the threshold is higher there"
+        )
+
     def summary(self) -> str:
         """Says what was found, a line per contact."""
         threshold = self.calibration.threshold
         count = len(self.contacts)
         found = "no contact" if not count else "one contact" if count == 1 else f"{count} contacts"
+        alarms = "1 false alarm" if threshold.rate == 1 else f"{threshold.rate:g} false alarms"
         lines = [
-            f"{found} in {self.duration:.4g} s; threshold for {threshold.rate:g} false alarms per hour, from "
-            f"{threshold.peaks} independent peaks in {threshold.seconds:.3g} s"
+            f"{found} in {self.duration:.4g} s; threshold for {alarms} per hour, from {threshold.peaks} independent "
+            f"peaks in {threshold.seconds:.3g} s of different motion",
+            self.reliability,
         ]
         if count:
-            lines.append("  start [s]  duration [s]  force at the tool [N]  x, y, z [N]            where")
+            lines.append("  start [s]  duration [s]  mean force at the tool [N]  x, y, z [N]            where")
         for contact in self.contacts:
-            sd = contact.magnitude_deviation
-            size = f"{contact.magnitude:.3g} ± {sd:.2g}" if np.isfinite(sd) else f"{contact.magnitude:.3g}"
+            low, high = contact.magnitude_interval
+            size = f"{contact.magnitude:.3g}" + (f" ({low:.3g} to {high:.3g})" if np.isfinite(high) else "")
             parts = ", ".join(f"{value:.3g}" for value in contact.force)
             where = contact.place.text(self.joint_names)
             lines.append(
-                f"  {contact.start:9.4g}  {contact.end - contact.start:12.3g}  {size:>21}  {parts:22}  {where}"
+                f"  {contact.start:9.4g}  {contact.end - contact.start:12.3g}  {size:>26}  {parts:22}  {where}"
             )
+        if count:
+            lines.append("  in parentheses: 95 % interval, by noise and the model's error")
         median = np.median(self.force_deviation, axis=0)
         if np.isfinite(median).any():
             words = ", ".join(f"{value:.2g}" if np.isfinite(value) else "unknown" for value in median)
@@ -109,6 +123,7 @@ class ForceEstimate:
             "contacts": [contact.to_dict() for contact in self.contacts],
             "flagged": float(self.flagged.mean()),
             "extrapolates": float(self.extrapolates.mean()),
+            "false_alarm_rate": None if self.calibration.check is None else self.calibration.check.summary(),
             "force_standard_deviation": [
                 None if np.isnan(column).all() else float(np.nanmedian(column)) for column in finite.T
             ],
@@ -125,7 +140,8 @@ class ForceEstimate:
     def save(self, folder: str | Path, *, force: bool = False) -> None:
         """Writes ``forces.csv`` and ``forces.json`` into a folder.
 
-        The table has t, contact (0 or 1), statistic (1 is the threshold), extrapolates, the force fx.. at the tool if
+        The table has t, contact (0 or 1, from when the statistic passes the threshold until it has been below for the
+        observer's memory), statistic (1 is the threshold), extrapolates, the force fx.. at the tool if
         there is no moment, force and moment wfx.., wmx.., each with _sd, and the external joint torques tau_ext1..
 
         Raises:

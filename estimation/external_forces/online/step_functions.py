@@ -7,7 +7,6 @@ from numpy.typing import NDArray
 
 from estimation.external_forces.residuals.dynamics import Dynamics, covariance_root
 from estimation.external_forces.thresholds.error_models import ErrorModel
-from robots.terms.friction import SLOWEST
 
 Array = NDArray[np.float64]
 
@@ -60,12 +59,11 @@ class StepErrors:
 
     def __init__(self, errors: ErrorModel) -> None:
         n = len(errors.level)
-        self._level, self._growth, self._reach2 = errors.level, errors.growth, errors.reach**2
+        self._errors, self._level, self._weights, self._holding = errors, errors.level, errors.weights, errors.holding
         self._narrow, self._hold = -0.5 / errors.width**2, errors.coulomb / np.sqrt(3.0)
-        self._weights = np.stack([errors.reversal, errors.friction, np.ones(n), np.ones(n)])
         self._inverse = np.linalg.inv(errors.correlation)
         self._now = np.zeros((4, n))
-        self.widens = bool(errors.growth.any())
+        self.widens = bool((errors.leverage + errors.inside + errors.beyond).any())
         """Whether the parameters' errors count at all."""
 
     def amplitudes(self, dq: Array, friction: Array, variance: Array | None) -> Array:
@@ -74,8 +72,8 @@ class StepErrors:
         np.exp(self._narrow * dq * dq, out=now[0])
         np.abs(friction, out=now[1])
         if variance is not None:
-            np.multiply(self._growth, np.sqrt(np.maximum(variance - self._reach2, 0.0)), out=now[2])
-        np.divide(self._hold, 1.0 + (dq / SLOWEST) ** 2, out=now[3])
+            now[2] = self._errors.parameter_amplitude(variance)
+        np.divide(self._hold, 1.0 + (dq / self._holding) ** 2, out=now[3])
         return now
 
     def deviation(self, amplitudes: Array) -> Array:

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from estimation.external_forces.online.step_functions import StepErrors, StepFunction
 from estimation.external_forces.residuals.dynamics import dynamics_of
-from estimation.external_forces.residuals.friction_levels import MEMORY
+from estimation.external_forces.residuals.friction_levels import MEMORY, contact_weight
 from estimation.external_forces.residuals.signals import SETTLING
 from estimation.external_forces.thresholds.calibrations import Calibration
 from estimation.external_forces.wrenches import tool_load
@@ -35,7 +35,7 @@ class Reading:
         torque: external joint torque (n,) [N m or N].
         deviation: its standard deviation on a healthy robot (n,) [N m or N].
         statistic: squared distance of the torque from zero, over the threshold.
-        contact: whether it exceeds 1, and the observer has settled.
+        contact: from when it exceeds 1, with the observer settled, until it has not for the observer's memory.
         jacobian: of the tool point in the base frame (6, n).
         q: positions (n,) [rad or m].
         calibration: of the observer.
@@ -135,7 +135,7 @@ class ForceObserver:
         self._square = np.array(self.calibration.friction_square)
         self._cross = self._square * (np.zeros(n) if friction_excess is None else np.asarray(friction_excess))
         self._t: float | None = None
-        self._begun = 0.0
+        self._begun, self._touched = 0.0, -math.inf
         self._residual, self._acceleration = np.zeros(n), np.zeros(n)
         self._amplitudes = np.zeros((4, n))
         self._momentum, self._other, self._dq, self._before = np.zeros((4, n))
@@ -169,20 +169,16 @@ class ForceObserver:
         if self._friction and step is not None:
             self._heat(friction * speed, step)
         if step is None or step > max(constant, 2.0 * self.calibration.period):
-            self._begun, fresh = t, True
+            self._begun, self._touched, fresh = t, -math.inf, True
             self._residual = np.zeros(self.n)
             self._acceleration = np.zeros(self.n)
         else:
             fresh = False
             a = math.exp(-step / constant)
             external = (momentum - self._momentum) / step - (other + self._other) / 2.0
-            b = math.exp(-min(step, 2.0 * self.calibration.period) / MEMORY)
-            cross, square = self._cross, self._square
             mean = (friction + self._before) / 2.0
-            self._cross = b * cross - (1.0 - b) * external * mean
-            self._square = b * square + (1.0 - b) * mean * mean
-            external += mean * cross / square
-            self._residual = a * self._residual + (1.0 - a) * external
+            levelled = external + mean * self._cross / self._square
+            self._residual = a * self._residual + (1.0 - a) * levelled
             self._acceleration = a * self._acceleration + (1.0 - a) * (speed - self._dq) / step
         variance = self._step.variance(at, speed, self._acceleration) if errors.widens else None
         now = errors.amplitudes(speed, friction, variance)
@@ -190,10 +186,15 @@ class ForceObserver:
         self._t, self._momentum, self._other, self._dq, self._before = t, momentum, other, speed, friction
         deviation = errors.deviation(self._amplitudes)
         statistic = errors.statistic(self._residual, deviation) / self._threshold
-        settled = t - self._begun > SETTLING * constant
-        return Reading(
-            t, self._residual, deviation, statistic, settled and statistic > 1.0, jacobian, at, self.calibration
-        )
+        if step is not None and not fresh:
+            b = math.exp(-min(step, 2.0 * self.calibration.period) / MEMORY)
+            counts = (1.0 - b) * float(contact_weight(statistic))
+            self._cross = b * self._cross - counts * external * mean
+            self._square = b * self._square + counts * mean * mean
+        if statistic > 1.0 and t - self._begun > SETTLING * constant:
+            self._touched = t
+        contact = t - self._touched <= self.calibration.memory
+        return Reading(t, self._residual, deviation, statistic, contact, jacobian, at, self.calibration)
 
     def _heat(self, power: Array, step: float) -> None:
         """Adds the energy of a step, and follows the temperatures once a second."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 from typing import Literal
 
@@ -40,8 +40,10 @@ class Signals:
         friction: by the model, cold (N, n) [N m or N].
         variance: of the torque by the parameters' errors (N, n) [(N m)^2].
         jacobian: of the tool point in the base frame (N, 6, n).
-        external: external torque by the momentum, not filtered (N, n) [N m or N].
-        direct: external torque by inverse dynamics, not filtered (N, n) [N m or N].
+        raw: external torque by the momentum and the model's own friction, not filtered (N, n) [N m or N].
+        mean_friction: of each step, as `raw` (N, n) [N m or N].
+        external: `raw` with the level of friction that is followed (N, n) [N m or N].
+        direct: the same by inverse dynamics (N, n) [N m or N].
         excess: of the friction over the model's, as a share of it (N, n).
         extrapolates: where (N, n) the prediction extrapolates.
         begins: where (N,) the observer begins anew.
@@ -54,6 +56,8 @@ class Signals:
     friction: Array
     variance: Array
     jacobian: Array
+    raw: Array
+    mean_friction: Array
     external: Array
     direct: Array
     excess: Array
@@ -64,6 +68,16 @@ class Signals:
     def period(self) -> float:
         """Usual time step [s]."""
         return float(np.median(np.diff(self.t)))
+
+    def levelled(self, weights: Array) -> Signals:
+        """Follows the level of friction anew, with weights (N,) of the samples."""
+        excess = friction_excess(self.t, self.raw, self.mean_friction, self.begins, weights)
+        return replace(
+            self,
+            external=np.where(self.begins[:, None], 0.0, self.raw + excess * self.mean_friction),
+            direct=self.direct + (excess - self.excess) * self.friction,
+            excess=excess,
+        )
 
 
 def signals_of(
@@ -102,11 +116,8 @@ def signals_of(
     # What the model adds to its terms, heat and extensions, acts at the joints as friction does.
     beta = rest + friction + (prediction.predicted - cold)
     external = external_torque(motion.t, momentum, prediction.measured - beta, begins)
-    # As the external torque, the mean of each step.
-    mean = np.concatenate([friction[:1], (friction[1:] + friction[:-1]) / 2.0])
-    excess = friction_excess(motion.t, external, mean, begins)
-    nothing = np.zeros(motion.q.shape, dtype=bool)
-    return Signals(
+    zeros = np.zeros(motion.q.shape)
+    signals = Signals(
         t=motion.t,
         q=q,
         dq=dq,
@@ -114,12 +125,16 @@ def signals_of(
         friction=friction,
         variance=dynamics.variance(q, dq, ddq),
         jacobian=jacobian,
-        external=np.where(begins[:, None], 0.0, external + excess * mean),
-        direct=prediction.predicted - prediction.measured + excess * friction,
-        excess=excess,
-        extrapolates=nothing if prediction.extrapolates is None else prediction.extrapolates,
+        raw=external,
+        # As the external torque, the mean of each step.
+        mean_friction=np.concatenate([friction[:1], (friction[1:] + friction[:-1]) / 2.0]),
+        external=external,
+        direct=prediction.predicted - prediction.measured,
+        excess=zeros,
+        extrapolates=zeros.astype(bool) if prediction.extrapolates is None else prediction.extrapolates,
         begins=begins,
     )
+    return signals.levelled(np.ones(len(motion.t)))
 
 
 def logged_motion(log: Log, t: Array) -> tuple[Array, Array]:

@@ -61,16 +61,17 @@ def force_page(forces: ForceEstimate, kinds: tuple[str, ...], logs: tuple[Record
         facts=(
             Fact(label="Contacts", value=count),
             Fact(label="Duration", value=f"{forces.duration:.4g} s"),
-            Fact(label="False alarms per hour", value=f"{threshold.rate:g}"),
+            Fact(label="False alarms per hour", value=f"{threshold.rate:g}", note=_verdict(forces)),
             Fact(label="Standard deviation of the force", value=level, note="median"),
         ),
         sections=(
             Section(
                 title="Contacts",
                 paragraphs=(
-                    f"The threshold is passed {threshold.rate:g} times per hour without a contact. It follows from "
-                    f"{threshold.peaks} independent peaks of the residual in {threshold.seconds:.3g} s of a healthy "
+                    f"The threshold is for {threshold.rate:g} false alarms per hour. It follows from {threshold.peaks} "
+                    f"independent peaks of the residual in {threshold.seconds:.3g} s of different motion of a healthy "
                     "robot.",
+                    *(f"{line[0].upper()}{line[1:]}." for line in forces.reliability.splitlines()),
                 ),
                 pictures=(statistic_picture(forces.t, forces.statistic, windows),),
                 tables=(_contacts(forces),) if count else (),
@@ -98,6 +99,14 @@ def force_page(forces: ForceEstimate, kinds: tuple[str, ...], logs: tuple[Record
     )
 
 
+def _verdict(forces: ForceEstimate) -> str:
+    """Whether healthy logs confirm the rate, in a word or two."""
+    check = forces.calibration.check
+    if check is None:
+        return "not tested"
+    return "confirmed" if check.confirmed else "contradicted" if check.contradicted else "not confirmed"
+
+
 def _findings(forces: ForceEstimate) -> tuple[Finding, ...]:
     return (
         *(
@@ -120,7 +129,7 @@ def _contacts(forces: ForceEstimate) -> Table:
             contact.start,
             contact.end - contact.start,
             contact.magnitude,
-            finite(contact.magnitude_deviation),
+            *(finite(value) for value in contact.magnitude_interval),
             *contact.force.tolist(),
             ", ".join(map(str, contact.place.reacting)) or None,
             contact.place.text(forces.joint_names),
@@ -130,9 +139,10 @@ def _contacts(forces: ForceEstimate) -> Table:
     ]
     return Table(
         headings=(
-            *("start [s]", "duration [s]", "force [N]", "standard deviation [N]", "x [N]", "y [N]", "z [N]"),
+            *("start [s]", "duration [s]", "force [N]", "95 % from [N]", "95 % to [N]", "x [N]", "y [N]", "z [N]"),
             *("joints that react", "where", "extrapolates"),
         ),
         rows=tuple(rows),
-        caption="Mean force at the tool along the axes of the base, as if no moment acts.",
+        caption="Mean force at the tool along the axes of the base, as if no moment acts. The 95 % interval of its "
+        "size holds noise and the model's error.",
     )

@@ -59,6 +59,10 @@ def test_stream_finds_what_the_log_has(found, readings):
     t = np.array([reading.t for reading in stream])
     assert t[flagged].min() == pytest.approx(found.contacts[0].detected, abs=0.03)
     assert ((t[flagged] > 7.9) & (t[flagged] < 8.5)).all()
+    # One event: the flag rises once, and falls an observer's memory after the last exceedance.
+    assert (np.diff(flagged.astype(int)) == 1).sum() == 1
+    last = max(reading.t for reading in stream if reading.statistic > 1)
+    assert t[flagged].max() == pytest.approx(last + found.calibration.memory, abs=0.01)
     at = int(np.searchsorted(t, 8.19))
     force, covariance = stream[at].force
     assert (np.abs(force - PUSH) < 5 * np.sqrt(np.diag(covariance)) + 0.2).all()

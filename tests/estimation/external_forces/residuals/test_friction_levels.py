@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from estimation.external_forces.residuals.friction_levels import MEMORY, friction_excess, steady_clock
+from estimation.external_forces.residuals.friction_levels import MEMORY, contact_weight, friction_excess, steady_clock
 
 
 def signals(seconds, excess):
@@ -34,6 +34,18 @@ def test_short_push_hardly_counts():
     external[push] -= friction[push]
     found = friction_excess(t, external, friction, begins)
     assert np.abs(found).max() == pytest.approx(0.2 / MEMORY, rel=0.05)
+
+
+def test_strong_push_counts_as_one_at_the_threshold():
+    """A push fifty times the threshold has a weight of a fiftieth; without a contact all samples count alike."""
+    t, external, friction, begins = signals(120.0, lambda t: 0 * t)
+    push = (t > 60.0) & (t <= 60.2)
+    external[push] -= 50.0 * friction[push]
+    weights = contact_weight(np.where(push, 50.0**2, 0.5))
+    found = friction_excess(t, external, friction, begins, weights)
+    assert np.abs(found).max() == pytest.approx(0.2 / MEMORY, rel=0.05)
+    t, external, friction, begins = signals(60.0, lambda t: 0.2 + 0 * t)
+    np.testing.assert_allclose(friction_excess(t, external, friction, begins, np.full(len(t), 0.3)), 0.2, atol=1e-9)
 
 
 def test_joint_without_friction_has_no_excess():

@@ -51,6 +51,7 @@ def forces() -> ForceEstimate:
         start=0.9,
         end=1.2,
         peak=1.1,
+        peak_time=1.0,
         force=np.array([30.0, 0.0, 5.0]),
         covariance=np.eye(3),
         torque=np.ones(2),
@@ -72,7 +73,7 @@ def forces() -> ForceEstimate:
         extrapolates=np.zeros(N, dtype=bool),
         flagged=np.zeros(N, dtype=bool),
         contacts=(contact,),
-        calibration=SimpleNamespace(threshold=SimpleNamespace(rate=1.0, peaks=25, seconds=43.0)),  # type: ignore[arg-type]
+        calibration=SimpleNamespace(check=None, threshold=SimpleNamespace(rate=1.0, peaks=25, seconds=43.0)),  # type: ignore[arg-type]
         warnings=("The model extrapolates in 3 % of the rows.",),
     )
 

@@ -1,0 +1,83 @@
+"""Whether healthy motion confirms a stated rate of false alarms: their count, and its Poisson interval."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass
+from typing import Any
+
+from scipy.stats import chi2
+
+from robots.common.plain import finite
+
+CONFIDENCE = 0.95
+
+
+@dataclass(frozen=True, kw_only=True)
+class RateCheck:
+    """False alarms in healthy motion that the threshold was not made of.
+
+    Attributes:
+        alarms: how many.
+        hours: of motion that the threshold has not seen; a repeated motion counts once.
+        rate: stated, false alarms an hour.
+    """
+
+    alarms: int
+    hours: float
+    rate: float
+
+    @property
+    def interval(self) -> tuple[float, float]:
+        """95 % interval of the rate an hour by the exact Poisson distribution (Garwood 1936)."""
+        if not self.hours > 0.0:
+            return 0.0, float("inf")
+        tail = (1.0 - CONFIDENCE) / 2.0
+        low = chi2.ppf(tail, 2 * self.alarms) / 2.0 if self.alarms else 0.0
+        return float(low / self.hours), float(chi2.ppf(1.0 - tail, 2 * self.alarms + 2) / 2.0 / self.hours)
+
+    @property
+    def confirmed(self) -> bool:
+        """Whether the interval is below the stated rate."""
+        return self.interval[1] <= self.rate
+
+    @property
+    def contradicted(self) -> bool:
+        """Whether the interval is above the stated rate."""
+        return self.interval[0] > self.rate
+
+    def text(self) -> str:
+        """Says it in a sentence."""
+        if not self.hours > 0.0:
+            return (
+                "the false-alarm rate is not confirmed: the healthy motion repeats, or is too short to test the "
+                "threshold of one part on another"
+            )
+        low, high = self.interval
+        verdict = "confirmed" if self.confirmed else "contradicted" if self.contradicted else "not confirmed"
+        count = f"{self.alarms} false alarm{'' if self.alarms == 1 else 's'} in {_duration(self.hours)}"
+        found = f"{self.alarms / self.hours:.2g} ({low:.2g} to {high:.2g}) per hour"
+        return f"the false-alarm rate is {verdict} by the healthy logs: {count} of new motion, {found}, 95 % interval"
+
+    def summary(self) -> dict[str, Any]:
+        """Gives count, time, interval and verdict as plain data."""
+        low, high = self.interval
+        return {
+            **self.to_dict(),
+            "interval95": [low, finite(high)],
+            "confirmed": self.confirmed,
+            "contradicted": self.contradicted,
+        }
+
+    def to_dict(self) -> dict[str, Any]:
+        """Writes it as plain data."""
+        return asdict(self)
+
+    @staticmethod
+    def from_dict(data: Mapping[str, Any]) -> RateCheck:
+        """Reads what `to_dict` wrote."""
+        return RateCheck(alarms=int(data["alarms"]), hours=float(data["hours"]), rate=float(data["rate"]))
+
+
+def _duration(hours: float) -> str:
+    return f"{hours:.2g} h" if hours >= 1.0 else f"{3600.0 * hours:.3g} s"
