@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from oed.controllers.clients.checks import check_start, check_status, check_trajectory, status_problem
+from oed.controllers.clients.checks import check_start, check_status, status_problem
 from oed.controllers.clients.ending import Ending
 from oed.controllers.clients.options import StreamOptions
 from oed.controllers.clients.requests import Requests
@@ -22,6 +22,8 @@ from oed.controllers.recording.clock import ClockAnchor
 from oed.controllers.recording.log_file import check_log_path
 from oed.controllers.recording.recorder import Recorder
 from oed.exports.simple_message import trajectory_points
+from oed.exports.simple_message.kinds import JOINTS
+from oed.exports.trajectory_checks import check_trajectory
 from robots.common.errors import InputError, OedError
 from robots.common.progress import SILENT, Progress
 from robots.robot import Robot
@@ -79,6 +81,8 @@ def stream(
     options = options or StreamOptions()
     metadata = metadata or {}
     check_trajectory(motion, robot, metadata, file)
+    if motion.n > JOINTS:
+        raise InputError(f"{motion.n} joints", file=file, allowed=f"up to {JOINTS}, as simple_message has")
     if not dry_run:
         if log is None:
             raise InputError("no log file for the feedback", remedy="give one")
