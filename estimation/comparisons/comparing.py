@@ -21,6 +21,7 @@ from estimation.comparisons.result import ModelComparison
 from estimation.comparisons.runs import Run, in_time_order, relabelled, run_of
 from estimation.models.model import Model
 from robots.common.errors import InputError
+from robots.common.plain import percent
 
 # Chance of any false alarm among all tests of a comparison.
 FALSE_ALARMS = 0.01
@@ -115,7 +116,7 @@ def _warnings(runs: Sequence[Run], common: CommonParameters) -> list[str]:
     if misfit > MISFIT:
         found.append(
             f"The friction curves have different shapes; converted to that of {runs[0].label} they miss by up to "
-            f"{100 * misfit:.2g} % of the friction. Compare the logs (oed compare --robot) for one common shape."
+            f"{percent(misfit)} of the friction. Compare the logs (oed compare --robot) for one common shape."
         )
     if common.unlike:
         joints = ", ".join(map(str, sorted(common.unlike)))
