@@ -31,7 +31,7 @@ class Console:
 
     @contextmanager
     def working(self, kept: str = "nothing was written") -> Iterator[Progress]:
-        """Shows a progress bar on a terminal and nothing in a pipe. Each note is printed once.
+        """Shows a progress bar on a terminal, and a line every ten seconds in a pipe. Each note is printed once.
 
         Args:
             kept: what an interrupted command has written so far, for its message.
@@ -43,8 +43,12 @@ class Console:
             warnings.simplefilter("default")
             warnings.showwarning = self._note
             try:
-                if self.quiet or self.json or not sys.stderr.isatty():
+                if self.quiet or self.json:
                     yield SILENT
+                elif not sys.stderr.isatty():
+                    from oed.cli.progress_lines import ProgressLines
+
+                    yield ProgressLines()
                 else:
                     from oed.cli.progress import RichProgress
 
