@@ -133,5 +133,13 @@ def export(
                 file=trajectory,
                 force=force,
             )
-    data = {"file": str(target), "form": to, "samples": len(motion), "joints": motion.n, "period": motion.period}
-    console.result(f"{len(motion)} samples of {motion.n} joints written to {target}", data)
+    has_samples = to == "csv" or CONTROLLER_FORMS[to].has_samples
+    data = {
+        "file": str(target),
+        "form": to,
+        "samples": len(motion) if has_samples else None,
+        "joints": motion.n,
+        "period": motion.period if has_samples else None,
+    }
+    content = f"{len(motion)} samples" if has_samples else "limits of velocity, acceleration and jerk"
+    console.result(f"{content} of {motion.n} joints written to {target}", data)

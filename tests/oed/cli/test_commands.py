@@ -202,3 +202,11 @@ def test_design_options_reach_the_design(run, robot: Path, tmp_path: Path) -> No
     }
     assert {key: settings[key] for key in expected} == expected
     assert done.data["criterion"] == "d"
+
+
+@pytest.mark.slow
+def test_an_export_of_limits_holds_no_samples(run, experiment: Path, tmp_path: Path) -> None:
+    """MoveIt's limits are limits: neither the line nor the JSON counts samples."""
+    words = ("export", experiment / "trajectory.csv", "--to", "moveit-limits", "--out", tmp_path / "limits.yaml")
+    assert "limits of velocity, acceleration and jerk of 2 joints written to" in run(*words).out
+    assert run(*words, "--force", "--json").data["samples"] is None
