@@ -48,25 +48,17 @@ def status_problem(status: Status | None) -> str | None:
     return None
 
 
-def check_start(first: Array, reported: Array, tolerance: float, unused: Array) -> None:
+def check_start(first: Array, reported: Array, tolerance: float) -> None:
     """Refuses a trajectory that begins elsewhere than the robot stands.
 
     Args:
         first: first point (n,) [rad or m].
         reported: positions of the robot (n,).
         tolerance: farthest distance of a joint.
-        unused: what the controller reports of further joints (m,); zero where there is none.
 
     Raises:
-        InputError: another pose, or a robot with more joints.
+        InputError: another pose.
     """
-    if np.abs(unused).max(initial=0.0) > 0:
-        joint = len(first) + int(np.abs(unused).argmax()) + 1
-        raise InputError(
-            f"the controller reports a joint {joint}, the robot has {len(first)}",
-            joint=joint,
-            remedy="the controller is of another robot",
-        )
     away = np.abs(reported - first)
     joint = int(away.argmax())
     if away[joint] > tolerance:
