@@ -13,6 +13,8 @@ Array = NDArray[np.float64]
 
 # Fewer rows a period do not show a noise's colour.
 LEAST_ROWS = 100
+# Smoothing takes the ends of a log of two periods.
+LEAST_PERIODS = 1.5
 # Steps of time that differ by more than this share make no uniform grid.
 UNEVEN = 0.5
 
@@ -38,7 +40,7 @@ def folded(part: Part, t: Array, period: float | None) -> Part:
     rows = round(period / step)
     begins = [round(k * period / step) for k in range(int(part.rows * step / period) + 1)]
     begins = [begin for begin in begins if begin < part.rows]
-    if rows < LEAST_ROWS or part.rows < 2 * rows:
+    if rows < LEAST_ROWS or part.rows < LEAST_PERIODS * rows:
         return part
     counts, errors = np.zeros((rows, part.mask.shape[1])), np.zeros((rows, part.mask.shape[1]))
     for begin in begins:

@@ -77,9 +77,9 @@ def test_the_score_of_a_fold_is_that_of_the_log() -> None:
 
 
 def test_what_is_not_folded() -> None:
-    """No period, less than two of them, a short one, or rows off a grid: the log stays as it is."""
+    """No period, hardly more than one, a short one, or rows off a grid: the log stays as it is."""
     Y = regressor(900)
     some, t = part(Y, np.ones((900, JOINTS)), np.ones((900, JOINTS))), STEP * np.arange(900)
     uneven = np.where(np.arange(900) > 500, t + 0.02, t)
-    for times, period in ((t, None), (t, 5.0), (t, 0.5), (uneven, 4.0)):
+    for times, period in ((t, None), (t, 7.0), (t, 0.5), (uneven, 4.0)):
         assert folded(some, times, period) is some
