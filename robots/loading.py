@@ -8,7 +8,7 @@ from difflib import get_close_matches
 from pathlib import Path
 
 from robots.assembly import robot_from_urdf, robot_from_yaml
-from robots.common.errors import AssumedValueWarning, InputError
+from robots.common.errors import DescriptionWarning, InputError
 from robots.common.files import existing_file
 from robots.geometry.xacro_ import is_description, split_arguments
 from robots.mujoco_models import is_mjcf, robot_from_mjcf
@@ -55,7 +55,7 @@ def load_robot(
             or joint; when a URDF branches and nothing says which chain is meant.
 
     Warns:
-        AssumedValueWarning: once per process and robot, when the description holds values that no source backs; for
+        DescriptionWarning: once per process and robot, when the description holds values that no source backs; for
             each of the robot's `notes`, if it is not of the catalogue.
     """
     if isinstance(spec, Robot):
@@ -78,7 +78,7 @@ def load_robot(
         if robot.assumed:
             notes = (f"these values are assumptions without a source: {', '.join(robot.assumed)}", *notes)
         for note in notes:
-            warnings.warn(f"{robot.name}: {note}", AssumedValueWarning, stacklevel=2)
+            warnings.warn(DescriptionWarning(f"{robot.name}: {note}", robot.origin), stacklevel=2)
     return robot
 
 

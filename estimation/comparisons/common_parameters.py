@@ -38,6 +38,8 @@ class CommonParameters:
         covariances: (k, b, b).
         determined: (b,), where all runs determine the parameter.
         same_motion: whether all runs recorded one motion.
+        unlike: joints whose friction has another width of the sign in some run. Single coefficients of such curves do
+            not compare: near standstill they make up for the width.
         misfit: largest difference of a friction curve that was converted to the first model's basis, as a share of the
             friction level; 0 where all have the same basis.
     """
@@ -48,6 +50,7 @@ class CommonParameters:
     determined: NDArray[np.bool_]
     same_motion: bool
     misfit: float
+    unlike: frozenset[int] = frozenset()
 
 
 def common_parameters(runs: Sequence[Run], speeds: Array) -> CommonParameters:
@@ -84,6 +87,7 @@ def common_parameters(runs: Sequence[Run], speeds: Array) -> CommonParameters:
         same_motion=same,
         determined=determined,
         misfit=misfit,
+        unlike=_unlike_signs(runs),
     )
 
 
@@ -205,6 +209,13 @@ def friction_table(model: Model, names: Sequence[str], speeds: Array, shares: Ar
         joints = [terms.columns[i].joint - 1 for i in chosen]
         found[:, friction] = Y[joints, :, range(len(chosen))].T
     return found
+
+
+def _unlike_signs(runs: Sequence[Run]) -> frozenset[int]:
+    terms = [friction_term_of(run.model) for run in runs]
+    n = runs[0].model.robot.n
+    widths = np.array([np.broadcast_to(0.0 if term is None else term.velocity_scale, n) for term in terms])
+    return frozenset((np.flatnonzero(np.ptp(widths, axis=0) > 0) + 1).tolist())
 
 
 def _conversion(model: Model, first: Model, speeds: Array, pi: Array) -> tuple[Array, float]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 from estimation.comparisons.common_parameters import (
     OTHER_MOTION,
@@ -10,15 +11,17 @@ from estimation.comparisons.common_parameters import (
     common_parameters,
     require_comparable,
 )
-from estimation.comparisons.differences import find_differences
+from estimation.comparisons.differences import Difference, find_differences
 from estimation.comparisons.drift import find_drifts
-from estimation.comparisons.friction_changes import friction_changes
-from estimation.comparisons.friction_curves import common_speeds, friction_curves
+from estimation.comparisons.friction_changes import FrictionChange, curve_difference, friction_changes
+from estimation.comparisons.friction_curves import FrictionCurves, common_speeds, friction_curves
 from estimation.comparisons.merging import merge
+from estimation.comparisons.payload_differences import PayloadDifference, find_payloads, without_payloads
 from estimation.comparisons.result import ModelComparison
 from estimation.comparisons.runs import Run, in_time_order, relabelled, run_of
 from estimation.models.model import Model
 from robots.common.errors import InputError
+from robots.common.plain import percent
 
 # Chance of any false alarm among all tests of a comparison.
 FALSE_ALARMS = 0.01
@@ -55,18 +58,51 @@ def compare(models: Sequence[Model | Run], *, alpha: float = FALSE_ALARMS) -> Mo
     common = common_parameters(runs, speeds)
     curves = friction_curves(runs, common, speeds)
     merged = merge(runs, common)
+    payloads = find_payloads(common, runs[0].model, alpha)
+    tested = without_payloads(common, payloads)
+    differences = find_differences(tested, curves)
+    friction = _with_curves(friction_changes(common, curves, alpha), curves, differences, runs[0].model, alpha)
     return ModelComparison(
         runs=tuple(runs),
         order=order,
         hours=hours,
         alpha=alpha,
         common=common,
-        differences=find_differences(common),
+        payloads=payloads,
+        tested=tested,
+        differences=differences,
         curves=curves,
-        friction=friction_changes(common, curves, alpha),
+        friction=friction,
         drifts=find_drifts(common, curves, hours, alpha),
         merged=merged,
-        warnings=(*_warnings(runs, common), *merged.notes),
+        warnings=(*_warnings(runs, common), *_payload_warnings(payloads), *merged.notes),
+    )
+
+
+def _with_curves(
+    changes: Sequence[FrictionChange],
+    curves: Sequence[FrictionCurves],
+    differences: Sequence[Difference],
+    model: Model,
+    alpha: float,
+) -> tuple[FrictionChange, ...]:
+    """Adds where the curve differs to the changes of joints whose friction differs significantly."""
+    significant = {(d.run, d.joint) for d in differences if d.friction and d.level == "part" and d.adjusted < alpha}
+    of_joint = {curve.joint: curve for curve in curves}
+    limits = model.robot.limits
+    return tuple(
+        replace(item, curve=curve_difference(of_joint[item.joint], item.run, limits.unit(item.joint - 1, "velocity")))
+        if (item.run, item.joint) in significant
+        else item
+        for item in changes
+    )
+
+
+def _payload_warnings(payloads: Sequence[PayloadDifference]) -> list[str]:
+    return (
+        ["Runs with and without a payload are merged: the merged model is of neither. Merge runs of one payload."]
+        if payloads
+        else []
     )
 
 
@@ -80,7 +116,13 @@ def _warnings(runs: Sequence[Run], common: CommonParameters) -> list[str]:
     if misfit > MISFIT:
         found.append(
             f"The friction curves have different shapes; converted to that of {runs[0].label} they miss by up to "
-            f"{100 * misfit:.2g} % of the friction. Compare the logs (oed compare --robot) for one common shape."
+            f"{percent(misfit)} of the friction. Compare the logs (oed compare --robot) for one common shape."
+        )
+    if common.unlike:
+        joints = ", ".join(map(str, sorted(common.unlike)))
+        found.append(
+            f"The sign of the friction has different widths in the models (joint {joints}): of these curves only the "
+            "mean is tested. Compare the logs (oed compare --robot) for one common shape."
         )
     extended = [run.label for run in runs if run.model.extensions]
     if extended:

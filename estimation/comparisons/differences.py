@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, Literal
 
@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from estimation.comparisons.common_parameters import CommonParameters
+from estimation.comparisons.friction_curves import FrictionCurves
 from estimation.comparisons.hypothesis_tests import adjust_holm, agreement_test
 from robots.common.plain import finite
 from robots.terms import Column
@@ -40,6 +41,7 @@ class Difference:
         error: its standard error.
         percent: change in per cent of the first run's value.
         unit: of the change.
+        friction: whether it is of a friction curve or one of its coefficients.
     """
 
     level: Level
@@ -54,6 +56,7 @@ class Difference:
     error: float = np.nan
     percent: float = np.nan
     unit: str = ""
+    friction: bool = False
 
     def to_dict(self, labels: Sequence[str], alpha: float) -> dict[str, Any]:
         """Gives plain data."""
@@ -97,16 +100,23 @@ def parts_of(common: CommonParameters) -> dict[tuple[str, int], list[int]]:
     return dict(sorted(found.items(), key=lambda item: (item[0][1], item[0][0])))
 
 
-def find_differences(common: CommonParameters) -> tuple[Difference, ...]:
+def find_differences(common: CommonParameters, curves: Sequence[FrictionCurves] = ()) -> tuple[Difference, ...]:
     """Tests each run against the first, and more than two runs together.
+
+    Of a joint whose friction has another width of the sign in some run, only the mean of the curve is tested.
 
     Each of the three levels is a family with a third of the family-wise rate (Bonferroni); within a family Holm's
     method adjusts. The chance of any false alarm is thus at most the rate that adjusted p-values are compared with.
 
     The covariances hold the scatter of the prior. Runs share the prior, whose pull is alike in all of them: their
     estimates then differ by less than the covariances say. Tests become conservative by this, never too eager.
+
+    Args:
+        common: parameters in one basis.
+        curves: friction of the joints, for the means.
     """
-    families: list[list[Difference]] = [list(_tests(common, level)) for level in ("whole", "part", "parameter")]
+    means = {curve.joint: curve.mean_row for curve in curves if curve.joint in common.unlike}
+    families: list[list[Difference]] = [list(_tests(common, means, level)) for level in ("whole", "part", "parameter")]
     found: list[Difference] = []
     for family in families:
         adjusted = np.minimum(LEVELS * adjust_holm([item.p_value for item in family]), 1.0)
@@ -114,26 +124,32 @@ def find_differences(common: CommonParameters) -> tuple[Difference, ...]:
     return tuple(found)
 
 
-def _tests(common: CommonParameters, level: Level) -> Iterator[Difference]:
-    parts, count = parts_of(common), len(common.values)
+def _tests(common: CommonParameters, means: Mapping[int, Array], level: Level) -> Iterator[Difference]:
+    unit, count = np.eye(len(common.columns)), len(common.values)
+    # What is compared, as rows (r, b) by which the parameters are multiplied.
+    parts = {
+        (part, joint): means[joint][None] if part == FRICTION and joint in means else unit[members]
+        for (part, joint), members in parts_of(common).items()
+    }
     runs: list[int | None] = [*range(1, count), *([None] if count > 2 else [])]
-    items: list[tuple[str, int | None, list[int]]]
+    items: list[tuple[str, int | None, Array]]
     if level == "whole":
-        items = [("whole model", None, sorted(i for members in parts.values() for i in members))]
+        items = [("whole model", None, np.concatenate(list(parts.values())))] if parts else []
     elif level == "part":
-        items = [(f"{part} of joint {joint}", joint, members) for (part, joint), members in parts.items()]
+        items = [(f"{part} of joint {joint}", joint, rows) for (part, joint), rows in parts.items()]
     else:
-        items = [(c.name, c.joint, [i]) for i, c in enumerate(common.columns) if common.determined[i]]
-    for name, joint, members in items:
-        if not members:
-            continue
+        items = [
+            (c.name, c.joint, unit[[i]])
+            for i, c in enumerate(common.columns)
+            if common.determined[i] and not (c.friction and c.joint in means)
+        ]
+    for name, joint, rows in items:
         for run in runs:
             chosen = [0, run] if run is not None else list(range(count))
-            at = np.ix_(chosen, members)
-            test = agreement_test(common.values[at], common.covariances[chosen][:, members][:, :, members])
+            test = agreement_test(common.values[chosen] @ rows.T, rows @ common.covariances[chosen] @ rows.T)
             single: dict[str, Any] = {}
             if level == "parameter" and run is not None:
-                i = members[0]
+                i = int(np.argmax(rows[0]))
                 change = float(common.values[run, i] - common.values[0, i])
                 base = abs(float(common.values[0, i]))
                 variance = common.covariances[run, i, i] + common.covariances[0, i, i]
@@ -151,5 +167,6 @@ def _tests(common: CommonParameters, level: Level) -> Iterator[Difference]:
                 statistic=test.statistic,
                 dof=test.dof,
                 p_value=test.p_value,
+                friction=joint is not None and all(common.columns[i].friction for i in np.flatnonzero(rows[0])),
                 **single,
             )

@@ -25,6 +25,50 @@ ROUNDS = 20
 
 
 @dataclass(frozen=True, kw_only=True)
+class CurveDifference:
+    """Where a friction curve differs most from that of the first run, for its errors.
+
+    Attributes:
+        speed: [rad/s or m/s].
+        unit: of the speed.
+        percent: difference of the friction there, in per cent of the first run's.
+        low: of its 95 % interval, simultaneous for the whole curve.
+        high: of that interval.
+    """
+
+    speed: float
+    unit: str
+    percent: float
+    low: float
+    high: float
+
+    def text(self) -> str:
+        """Says how much the curve differs, and where."""
+        return (
+            f"the curve differs, most at {self.speed:.2g} {self.unit}: {self.percent:+.1f} % "
+            f"({self.low:+.1f} to {self.high:+.1f} %)"
+        )
+
+
+def curve_difference(curve: FrictionCurves, run: int, unit: str) -> CurveDifference:
+    """Finds the speed at which the friction of a run differs most from that of the first, for its errors.
+
+    Args:
+        curve: friction of a joint.
+        run: index of the run.
+        unit: of the speed.
+    """
+    tiny = np.finfo(float).tiny
+    place = int(np.argmax(np.abs(curve.difference[run]) / np.maximum(curve.difference_error[run], tiny)))
+    base = 100 / max(abs(float(curve.torque[0, place])), tiny)
+    middle = float(curve.difference[run, place]) * base
+    half = float(curve.simultaneous[run] * curve.difference_error[run, place]) * base
+    return CurveDifference(
+        speed=float(curve.speed[place]), unit=unit, percent=middle, low=middle - half, high=middle + half
+    )
+
+
+@dataclass(frozen=True, kw_only=True)
 class FrictionChange:
     """Change of one joint's friction between two runs, mean over the speeds.
 
@@ -37,6 +81,7 @@ class FrictionChange:
         own: what this joint has beyond it.
         own_error: standard error of `own` by the noise.
         own_scatter: the same with the scatter that unequal heating makes.
+        curve: where the curve of friction over speed differs most for its errors, if its difference is significant.
         kind: unchanged; common to all joints; own; unequal: beyond the noise, but not beyond unequal heating; changed:
             too few joints to decide.
     """
@@ -50,12 +95,19 @@ class FrictionChange:
     own_error: float
     own_scatter: float
     kind: Kind
+    curve: CurveDifference | None = None
+
+    @property
+    def differs(self) -> bool:
+        """Whether the mean or the curve differs significantly."""
+        return self.kind != "unchanged" or self.curve is not None
 
     def sentence(self) -> str:
         """Says how much changed, how much of it all joints share, and how much this joint has alone."""
         head = f"Joint {self.joint}: friction {percent_of(self.total)} ({interval_of(self.total, self.total_error)})"
         if self.kind == "unchanged":
-            return f"{head}, not significant."
+            text = f"{head}, not significant"
+            return f"{text}." if self.curve is None else f"{text} in the mean; {self.curve.text()}."
         if self.kind == "changed":
             return f"{head}, significant; too few joints to separate heat from damage."
         common = f"{percent_of(self.common)} common to all joints"
@@ -83,6 +135,7 @@ class FrictionChange:
             "total": shown(self.total, self.total_error),
             "common": finite(_percent(self.common)),
             "own": shown(self.own, self.own_scatter),
+            "curve": None if self.curve is None else vars(self.curve),
             "sentence": self.sentence(),
         }
 

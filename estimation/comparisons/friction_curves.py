@@ -4,12 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from estimation.comparisons.common_parameters import CommonParameters, friction_table
 from estimation.comparisons.runs import Run
+from robots.common.plain import all_finite
 
 Array = NDArray[np.float64]
 
@@ -49,6 +51,28 @@ class FrictionCurves:
     level: Array
     level_error: Array
     mean_row: Array
+
+    def to_dict(self, labels: Sequence[str]) -> dict[str, Any]:
+        """Gives plain data.
+
+        Args:
+            labels: of the runs.
+        """
+        return {
+            "joint": self.joint,
+            "speed": self.speed.tolist(),
+            "runs": [
+                {
+                    "run": label,
+                    "torque": self.torque[k].tolist(),
+                    "standard_error": self.error[k].tolist(),
+                    "difference": self.difference[k].tolist(),
+                    "difference_standard_error": all_finite(self.difference_error[k]),
+                    "simultaneous_factor95": all_finite(self.simultaneous[k : k + 1])[0],
+                }
+                for k, label in enumerate(labels)
+            ],
+        }
 
 
 def common_speeds(runs: Sequence[Run]) -> Array:

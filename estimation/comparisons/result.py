@@ -17,9 +17,9 @@ from estimation.comparisons.drift import Drift
 from estimation.comparisons.friction_changes import FrictionChange, interval_of, percent_of
 from estimation.comparisons.friction_curves import FrictionCurves
 from estimation.comparisons.merging import MergedModel
+from estimation.comparisons.payload_differences import PayloadDifference
 from estimation.comparisons.runs import Run
 from robots.common.files import write_atomic
-from robots.common.plain import all_finite
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -43,6 +43,8 @@ class ModelComparison:
         hours: of each run since the first (k,); None without a common clock.
         alpha: chance of any false alarm among all tests.
         common: parameters of all runs in one basis.
+        payloads: bodies on the flange by which runs differ from the first.
+        tested: the parameters without these payloads, which the tests compare.
         differences: tests, each run against the first and all together.
         curves: friction of the joints.
         friction: change of each joint's friction, split into common and own.
@@ -56,6 +58,8 @@ class ModelComparison:
     hours: Array | None
     alpha: float
     common: CommonParameters
+    payloads: tuple[PayloadDifference, ...]
+    tested: CommonParameters
     differences: tuple[Difference, ...]
     curves: tuple[FrictionCurves, ...]
     friction: tuple[FrictionChange, ...]
@@ -95,17 +99,42 @@ class ModelComparison:
         """
         return tuple(item for item in self.differences if item.run == run and item.level == level)
 
+    @property
+    def compared(self) -> tuple[int | None, ...]:
+        """Indices of the runs that are compared with the first; None for all together, where there are more."""
+        return (*range(1, len(self.runs)), *([None] if len(self.runs) > 2 else []))
+
+    def parts(self, run: int | None) -> tuple[str, ...]:
+        """Names the parts in which a run differs significantly from the first, as `FrictionChange.sentence` does.
+
+        Args:
+            run: index of the run; None for all runs together.
+        """
+        found = [item for item in self.of_run(run, "part") if item.adjusted < self.alpha]
+        if run is None:
+            return tuple(item.name for item in found)
+        changes = {item.joint: item for item in self.friction if item.run == run and item.differs}
+        found = [item for item in found if not (item.friction and item.joint in changes)]
+        return (
+            *(item.name for item in found),
+            *(
+                f"friction of joint {joint}" if change.kind != "unchanged" else f"friction curve of joint {joint}"
+                for joint, change in changes.items()
+            ),
+        )
+
     def verdict(self) -> str:
         """Says in one or two sentences what differs."""
-        if not self.significant:
-            text = "No difference is significant: the runs agree within their errors."
+        carried = " ".join(item.sentence(self.labels) for item in self.payloads)
+        parts = sorted({name for run in self.compared for name in self.parts(run)})
+        if parts:
+            text = f"The runs differ significantly in {len(parts)} part{'s' * (len(parts) > 1)}: {_listed(parts)}."
+        elif self.significant:
+            text = "The runs differ significantly, but no single part of a joint does."
         else:
-            parts = {item.name for item in self.significant if item.level == "part"}
-            text = (
-                f"The runs differ significantly in {len(parts)} part{'s' * (len(parts) > 1)}: {_listed(sorted(parts))}."
-                if parts
-                else "The runs differ significantly, but no single part of a joint does."
-            )
+            text = "No difference is significant: the runs agree within their errors."
+        if carried:
+            text = f"{carried} Without the payload: {text[0].lower()}{text[1:]}"
         joints = sorted({item.joint for item in self.damaged})
         if joints:
             text += f" Friction changed on joint {_listed([str(j) for j in joints])} alone: inspect it."
@@ -148,12 +177,12 @@ class ModelComparison:
         yield self.verdict()
         yield f"  family-wise false-alarm rate {100 * self.alpha:g} % (Holm)"
         yield "  run                      chi-square    dof   adjusted p   parts that differ"
-        for run in (*range(1, len(self.runs)), *([None] if len(self.runs) > 2 else [])):
-            (whole, *_) = self.of_run(run, "whole") or (None,)
+        for compared in self.compared:
+            (whole, *_) = self.of_run(compared, "whole") or (None,)
             if whole is None:
                 continue
-            parts = [item.name for item in self.of_run(run, "part") if item.adjusted < self.alpha]
-            label = "all together" if run is None else self.labels[run]
+            parts = list(self.parts(compared))
+            label = "all together" if compared is None else self.labels[compared]
             yield (
                 f"  {label[:24]:24} {whole.statistic:10.1f} {whole.dof:6d} {whole.adjusted:12.2g}   "
                 f"{_listed(parts) if parts else 'none'}"
@@ -168,8 +197,10 @@ class ModelComparison:
         yield from (f"  {warning}" for warning in self.warnings)
 
     def _parameter_lines(self, run: int) -> Iterator[str]:
+        # The friction of a joint has a sentence, which its single coefficients would only repeat.
         found = sorted(
-            (item for item in self.of_run(run, "parameter") if item.adjusted < self.alpha), key=lambda i: -i.statistic
+            (i for i in self.of_run(run, "parameter") if i.adjusted < self.alpha and not i.friction),
+            key=lambda i: -i.statistic,
         )
         if found:
             yield f"  parameters that differ, {self.labels[run]} against {self.labels[0]}:"
@@ -213,26 +244,10 @@ class ModelComparison:
             "order": self.order,
             "hours": None if self.hours is None else self.hours.tolist(),
             "runs": [run.to_dict() for run in self.runs],
+            "payloads": [item.to_dict(labels) for item in self.payloads],
             "differences": [item.to_dict(labels, self.alpha) for item in self.differences],
             "friction": [item.to_dict(labels) for item in self.friction],
-            "friction_curves": [
-                {
-                    "joint": curve.joint,
-                    "speed": curve.speed.tolist(),
-                    "runs": [
-                        {
-                            "run": label,
-                            "torque": curve.torque[k].tolist(),
-                            "standard_error": curve.error[k].tolist(),
-                            "difference": curve.difference[k].tolist(),
-                            "difference_standard_error": all_finite(curve.difference_error[k]),
-                            "simultaneous_factor95": all_finite(curve.simultaneous[k : k + 1])[0],
-                        }
-                        for k, label in enumerate(labels)
-                    ],
-                }
-                for curve in self.curves
-            ],
+            "friction_curves": [curve.to_dict(labels) for curve in self.curves],
             "drift": [item.to_dict(labels, self.alpha) for item in self.drifts],
             "merged": {
                 "model": MODEL,

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from estimation.external_forces.contacts import Contact
 from estimation.external_forces.thresholds.calibrations import Calibration
 from robots.common.files import write_atomic
+from robots.common.plain import percent
 from robots.common.tables.table_files import write_table
 
 if TYPE_CHECKING:
@@ -75,10 +76,8 @@ class ForceEstimate:
         """Says whether healthy motion confirms the false-alarm rate, and how much of the log extrapolates."""
         check = self.calibration.check
         rate = "the false-alarm rate is the model's claim: no healthy log tests it" if check is None else check.text()
-        share = 100 * float(self.extrapolates.mean())
-        return (
-            f"{rate}\n{share:.2g} % of the samples extrapolate from the fitted motions: the threshold is higher there"
-        )
+        share = percent(float(self.extrapolates.mean()))
+        return f"{rate}\n{share} of the samples extrapolate from the fitted motions: the threshold is higher there"
 
     def summary(self) -> str:
         """Says what was found, a line per contact."""

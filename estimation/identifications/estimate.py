@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from estimation.gate import GateReport
 from estimation.identifications.choices import Choice
 from estimation.models.model import Model
-from robots.common.plain import finite
+from robots.common.plain import finite, percent
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -124,7 +124,7 @@ class Estimate:
         if (clash := self.choice.contradiction) is not None:
             found.append(
                 f"The logs contradict each other: the error of {clash.log} on joint {clash.joint} is "
-                f"{100 * clash.alone:.2g} % of the torque if it is fitted alone, and {100 * clash.together:.2g} % with "
+                f"{percent(clash.alone)} of the torque if it is fitted alone, and {percent(clash.together)} with "
                 f"the others. "
                 "If a payload or the base differs, state it (--payload, --gravity); else use oed diagnose."
             )

@@ -17,7 +17,7 @@ from estimation.regressions.braking_friction import with_braking_friction
 from estimation.regressions.joint_regressor import CHUNK, JointRegressor, chunks
 from estimation.regressions.moments import Moments
 from estimation.regressions.preparation import Prepared, Rows
-from estimation.uncertainty import Part, batch_factors, covariance
+from estimation.uncertainty import Part, batch_factors, covariance, repeated_covariance
 from robots.base_parameters import BaseParameters
 from robots.common.parallel import threaded
 
@@ -105,7 +105,10 @@ def fit(base: BaseParameters, logs: Sequence[Prepared], estimator: Estimator, ch
         fitted = [Fitted(*some) for some in zip(rows, predicted, factors, strict=True)]
         scores = _scores(regressor, fitted, solution.weights) if long else scores
     averaged = round(AVERAGED / float(np.median([log.positions.period for log in logs])))
-    full, white, prior_share = covariances(regressor, fitted, scores, moments, solution, choice.ridge, averaged, seed)
+    periods = [log.period for log in logs] if whole and not long else None
+    full, white, prior_share = covariances(
+        regressor, fitted, scores, moments, solution, choice.ridge, averaged, seed, periods=periods
+    )
     return Fit(
         base=base,
         choice=choice,
@@ -190,6 +193,7 @@ def covariances(
     averaged: int,
     seed: int,
     rows: int | None = None,
+    periods: Sequence[float | None] | None = None,
 ) -> tuple[Array, Array, Array | None]:
     """Covariance (b, b) by the noise and by the prior's own scatter.
 
@@ -205,6 +209,7 @@ def covariances(
         averaged: rows that are averaged at a time, in a long log.
         seed: of the drawn noise.
         rows: of the whole log, where `fitted` are stretches of it; None where they are all.
+        periods: of the motion of each of `fitted` [s], None where it does not repeat; None for none.
     """
     weights = solution.weights
     inverse = moments.inverse(weights, ridge)
@@ -220,7 +225,12 @@ def covariances(
     total = rows or sum(len(some.torque) for some in fitted)
     seen = sum(part.rows for part in parts)
     share = seen / total
-    full = covariance(parts, weights, inverse, seed, share=share, averaged=min(averaged, seen // LEAST_AVERAGES))
+    averaged = min(averaged, seen // LEAST_AVERAGES)
+    if periods is not None:
+        times = [some.rows.motion.t for some in fitted]
+        full = repeated_covariance(parts, times, periods, weights, inverse, seed, averaged)
+    else:
+        full = covariance(parts, weights, inverse, seed, share=share, averaged=averaged)
     if share < 1:
         factors = batch_factors(scores, inverse, full)
         full = full * factors[:, None] * factors

@@ -71,17 +71,18 @@ class Arm:
 
 @dataclass(frozen=True, eq=False)
 class Source:
-    """The rows of one log, and whether the payload is on the flange."""
+    """The rows of one log, whether the payload is on the flange, and the period of its motion [s]; None for none."""
 
     rows: Rows
     beyond: Array
     carries: bool
+    period: float | None = None
 
     @staticmethod
-    def of(arm: Arm, rows: Rows, carries: bool, extra: Array | None = None) -> Source:
+    def of(arm: Arm, rows: Rows, carries: bool, extra: Array | None = None, period: float | None = None) -> Source:
         """Takes the arm's torque, and an extra torque (N, n), off the measured one."""
         beyond = rows.tau - arm.torque(rows.motion, rows.gravity)
-        return Source(rows, beyond if extra is None else beyond - extra, carries)
+        return Source(rows, beyond if extra is None else beyond - extra, carries, period)
 
 
 class Equations:
@@ -90,6 +91,7 @@ class Equations:
     def __init__(self, arm: Arm, source: Source) -> None:
         self.arm, self.source = arm, source
         self.target, self.mask = source.beyond, source.rows.mask
+        self.t, self.period = source.rows.motion.t, source.period
 
     @property
     def rows(self) -> int:
@@ -120,6 +122,7 @@ class PairedEquations(Equations):
         self.target = _turned(loaded.beyond[self.first], free.beyond[self.second])
         both = loaded.rows.mask[self.first] * free.rows.mask[self.second]
         self.mask = np.concatenate([both, both], axis=1)
+        self.t, self.period = loaded.rows.motion.t[self.first], loaded.period
 
     def regressor(self, start: int, stop: int) -> Array:
         """Evaluates the columns of some rows (stop - start, 2 n, b + 10)."""

@@ -103,8 +103,8 @@ def identify_payload(
     carried, bare = _usable(machine, loaded), _usable(machine, free)
     prepared = _prepared(machine, carried, bare, known)
     sources = [
-        Source.of(arm, rows, k < len(carried), _extra(known, rows))
-        for k, rows in enumerate(log.rows(cutoff) for log in prepared)
+        Source.of(arm, rows, k < len(carried), _extra(known, rows), log.period)
+        for k, (log, rows) in enumerate((log, log.rows(cutoff)) for log in prepared)
     ]
     equations, match = _equations(arm, sources, len(carried))
     period = float(np.median([log.positions.period for log in prepared]))

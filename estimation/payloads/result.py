@@ -126,10 +126,14 @@ class PayloadEstimate:
             # A centre that another motion would show is refused by the identification.
             never = item.unit == "m"
             open_ = "no motion of this robot shows it" if never else "typical of a body of this mass"
-            mark = "" if known else f"  not determined; {open_}"
             title = TITLES.get(item.name, f"{item.name} about the centre of mass")
-            value = f"{item.value:.4g} ({item.lower:.4g} to {item.upper:.4g}) {item.unit}"
-            lines.append(f"  {title:28} {value}{mark}")
+            # An interval beside a value that no log determines would look like knowledge.
+            value = (
+                f"{item.value:.4g} ({item.lower:.4g} to {item.upper:.4g}) {item.unit}"
+                if known
+                else f"not determined; assumed {item.value:.4g} {item.unit}, {open_}"
+            )
+            lines.append(f"  {title:28} {value}")
         lines.append(
             "  joint                 torque RMS   without payload   with payload   (errors in % of torque RMS)"
         )
@@ -142,11 +146,11 @@ class PayloadEstimate:
         return "\n".join(lines)
 
     def to_frame(self) -> pd.DataFrame:
-        """Gives a row per quantity: value, lower, upper, unit, determined."""
+        """Gives a row per quantity: value, lower, upper, unit, determined; no bounds of what is not determined."""
         import pandas as pd
 
         rows = [
-            (item.value, item.lower, item.upper, item.unit, known)
+            (item.value, item.lower if known else np.nan, item.upper if known else np.nan, item.unit, known)
             for item, known in zip(self.quantities, self.determined, strict=True)
         ]
         index = pd.Index([item.name for item in self.quantities], name="quantity")
@@ -172,7 +176,7 @@ class PayloadEstimate:
                     "name": item.name,
                     "value": item.value,
                     "unit": item.unit,
-                    "ci95": [finite(item.lower), finite(item.upper)],
+                    "ci95": [finite(item.lower), finite(item.upper)] if known else [None, None],
                     "determined": known,
                 }
                 for item, known in zip(self.quantities, self.determined, strict=True)

@@ -5,9 +5,11 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from estimation.comparisons.common_parameters import friction_table
 from estimation.identifications.transfer import NORMAL_95
 from estimation.models.model import Model
 from estimation.regressions.joint_regressor import chunks
+from robots.common.plain import two_digits
 from robots.signals import Motion
 from robots.terms.base import length_unit
 
@@ -20,8 +22,9 @@ BEYOND = 1.1
 def band_of_motion(model: Model, motion: Motion, gravity: Array | None) -> tuple[Array, NDArray[np.bool_]] | None:
     """Half-widths (N, n) of the 95 % band, and where (N, n) the motion is an extrapolation; None without a band.
 
-    The width of the fitted logs' errors and that of the parameters' errors add up as independent ones do. The latter
-    grow with the distance from what the fit has seen: speeds, accelerations and places that its rows hardly held.
+    The width of the fitted logs' errors, that of the parameters' errors and that of friction beyond the fitted speeds
+    add up as independent ones do. The latter two grow with the distance from what the fit has seen: speeds,
+    accelerations and places that its rows hardly held.
     """
     known = model.provenance
     if known.get("band95") is None:
@@ -30,12 +33,46 @@ def band_of_motion(model: Model, motion: Motion, gravity: Array | None) -> tuple
     if "band_covariance" not in known:
         return level.copy(), np.zeros(motion.q.shape, dtype=bool)
     growth, covariance = (np.asarray(known[key], dtype=float) for key in ("band_growth", "band_covariance"))
-    torque_model, open_ = model.torque_model.under(gravity), np.zeros(motion.q.shape)
+    torque_model, open_, shape = model.torque_model.under(gravity), np.zeros(motion.q.shape), np.zeros(motion.q.shape)
+    friction = np.array([column.friction for column in model.parameters])
     for rows in chunks(len(motion)):
         Y = torque_model.regressor(motion.q[rows], motion.dq[rows], motion.ddq[rows], columns=model.columns)
         open_[rows] = np.sqrt(np.maximum(np.einsum("tjp,tjp->tj", Y @ covariance, Y), 0.0))
+        shape[rows] = _friction_beyond(model, Y[:, :, friction] @ model.values[friction], motion.dq[rows])
     reach = np.asarray(known["band_reach"], dtype=float)
-    return np.hypot(level, NORMAL_95 * growth * open_), open_ > reach
+    return np.hypot(level, NORMAL_95 * np.hypot(growth * open_, shape)), open_ > reach
+
+
+def _friction_beyond(model: Model, friction: Array, dq: Array) -> Array:
+    """Standard deviation (N, n) of friction beyond the fitted speeds, zero within them.
+
+    No log says how a friction curve goes on. It is the difference between two ways that the fitted speeds do not tell
+    apart: the model's own, and a straight line with the mean slope of the upper half of these speeds.
+
+    Args:
+        model: the model.
+        friction: by the model (N, n) [N m or N].
+        dq: velocities (N, n) [rad/s or m/s].
+    """
+    recorded = model.provenance.get("recorded")
+    if recorded is None:
+        return np.zeros(dq.shape)
+    fitted = np.asarray(recorded["velocity"][0], dtype=float)
+    names = [column.name for column in model.parameters if column.friction]
+    values = model.values[[column.friction for column in model.parameters]]
+    table = friction_table(model, names, fitted, np.array([0.5, 1.0]))
+    half, whole = (
+        np.array([sum(row[i] * values[i] for i in own) for own in _columns_by_joint(model)]) for row in table
+    )
+    slope = np.divide(2 * (whole - half), fitted, out=np.zeros_like(fitted), where=fitted > 0)
+    further = np.abs(dq) - fitted
+    return np.asarray(np.where(further > 0, np.abs(np.sign(dq) * friction - whole - slope * further), 0.0))
+
+
+def _columns_by_joint(model: Model) -> list[list[int]]:
+    """Places of each joint's columns among those of friction."""
+    joints = [column.joint for column in model.parameters if column.friction]
+    return [[i for i, own in enumerate(joints) if own == joint] for joint in range(1, model.robot.n + 1)]
 
 
 def beyond_the_recorded(model: Model, motion: Motion) -> tuple[str, ...]:
@@ -46,7 +83,7 @@ def beyond_the_recorded(model: Model, motion: Motion) -> tuple[str, ...]:
     lowest, highest = (np.asarray(bound, dtype=float) for bound in recorded["position"])
     for joint, name in enumerate(model.robot.joint_names):
         texts = [
-            f"{ratio:.2g} times the recorded {what}"
+            f"{two_digits(ratio)} times the recorded {what}"
             for what, key, signal in (("speed", "velocity", motion.dq), ("acceleration", "acceleration", motion.ddq))
             if (ratio := _ratio(signal[:, joint], recorded[key][0][joint])) > BEYOND
         ]

@@ -21,7 +21,7 @@ from estimation.preprocessing.smoothing import low_pass
 from estimation.regressions.preparation import torque_of
 from estimation.regressions.torque_meanings import as_joint_torque
 from robots.common.errors import InputError
-from robots.common.plain import all_finite, finite
+from robots.common.plain import all_finite, finite, percent
 from robots.common.tables.table_files import write_table
 from robots.signals import Log, Motion
 from robots.terms.effect_bases.capabilities import Persistence
@@ -133,9 +133,9 @@ class Prediction:
         """Says how much of the motion is beyond what the fit has seen."""
         if self.extrapolates is None or not (self.extrapolates.any() or self.beyond):
             return []
-        share = 100 * float(self.extrapolates.mean())
+        share = percent(float(self.extrapolates.mean()))
         return [
-            f"  {share:.2g} % of the torques extrapolate: the parameters' errors matter more than in any recorded row",
+            f"  {share} of the torques extrapolate: the parameters' errors matter more than in any recorded row",
             *(f"    {text}" for text in self.beyond),
         ]
 

@@ -32,6 +32,7 @@ class Averages:
         sums: per joint its rows' sum over each group (M, p_j).
         within: per joint the Gram matrix of the rows' deviations within their groups (p_j, p_j).
         variance: of the residual within the groups (n,).
+        repeats: how often the rows count.
     """
 
     rows: int
@@ -41,6 +42,7 @@ class Averages:
     sums: Sequence[Array]
     within: Sequence[Array]
     variance: Array
+    repeats: int = 1
 
     @staticmethod
     def of(

@@ -37,6 +37,7 @@ class Part:
         used: per joint the indices of the columns that act on it; None for all.
         split: (start, stop) -> each joint's own columns, n arrays (stop - start, p_j); None to take them out of Y.
         sums: (start, stop, size) -> the same summed over groups of `size` rows as they count; None to sum them.
+        repeats: how often the rows count.
     """
 
     rows: int
@@ -46,6 +47,7 @@ class Part:
     used: Sequence[NDArray[np.intp]] | None = None
     split: Callable[[int, int], Sequence[Array]] | None = None
     sums: Callable[[int, int, int], Sequence[Array]] | None = None
+    repeats: int = 1
 
     def columns(self, start: int, stop: int) -> list[tuple[Array, NDArray[np.intp]]]:
         """Evaluates each joint's columns (stop - start, p_j), with their indices."""
@@ -183,7 +185,7 @@ def _lost(parts: Sequence[Part], weights: Array, inverse: Array, noise: Noise, r
     for part, draws in zip(parts, drawn, strict=True):
         for rows in part.chunks():
             Y = part.regressor(rows.start, rows.stop)
-            weighted = draws[rows] * (part.mask[rows] * weights)[:, :, None]
+            weighted = draws[rows] * (part.mask[rows] * weights * part.repeats)[:, :, None]
             cross += Y.reshape(-1, Y.shape[2]).T @ weighted.reshape(-1, DRAWS)
     fitted = inverse @ cross
     lost = np.zeros((joints, HIGHEST_ORDER + 1))
@@ -220,7 +222,7 @@ def _meats(parts: Sequence[Part | Averages], weights: Array, noise: Noise, size:
             filtered, scores = np.empty((len(owner), rows.stop - rows.start)), np.zeros((size, rows.stop - rows.start))
             end = 0
             for j, (a, (Y, columns)) in enumerate(zip(noise.coefficients, found, strict=True)):
-                backward = (Y.T * (weights[j] * part.mask[rows, j]))[:, ::-1]
+                backward = (Y.T * (weights[j] * part.repeats * part.mask[rows, j]))[:, ::-1]
                 if len(a):
                     backward, states[j] = lfilter([1.0], np.concatenate([[1.0], -a]), backward, zi=states[j])
                 begin, end = end, end + len(columns)

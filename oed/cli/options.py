@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
@@ -10,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from robots.common.errors import InputError, OtherRobotWarning
+from robots.common.errors import InputError
 
 if TYPE_CHECKING:
     from concurrent.futures import Executor
@@ -141,8 +140,6 @@ def robot_of_file(
 ) -> Robot:
     """Loads the robot that an option names, else the one that a trajectory file names.
 
-    A note says when both name one, and not the same.
-
     Args:
         robot: of the option.
         metadata: of the file.
@@ -157,11 +154,7 @@ def robot_of_file(
     stated = str(metadata.get("robot") or "")
     if not robot and not stated:
         raise InputError("the file does not name its robot", file=file, remedy="give --robot")
-    found = robot_from(robot or stated, tip, joints, lock)
-    if robot and stated and Path(stated).stem not in (found.name, Path(robot).stem):
-        text = f"{file.name} was made for {stated}; {found.name} is used (--robot)"
-        warnings.warn(OtherRobotWarning(text), stacklevel=2)
-    return found
+    return robot_from(robot or stated, tip, joints, lock)
 
 
 @contextmanager

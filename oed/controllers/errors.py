@@ -11,3 +11,7 @@ class LinkError(OedError):
 
 class ControllerError(OedError):
     """The controller answers, but does not do what it was asked: a refusal, an error, a motion that does not end."""
+
+
+class PointRefusedError(ControllerError):
+    """The controller refuses a point; its state may say why."""

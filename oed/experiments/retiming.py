@@ -79,7 +79,7 @@ def retime(
     else:
         retimed = retime_with_stops(motion, limits, period=robot.period, tolerance=tolerance)
     if stops is not None:
-        retimed = replace(retimed, duration_before=stops.duration_after, usage_before=stops.usage)
+        retimed = replace(retimed, duration_before=stops.duration_after, usage_before=stops.usage, waypoints=True)
     return RetimedExperiment(
         robot=robot,
         base=base,

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from os import PathLike
 from pathlib import Path
+from typing import Any
 
 from oed.exports.forms import FORMS, ExportOptions
 from oed.exports.forms.sampling import at_period
+from oed.exports.trajectory_checks import check_trajectory
 from robots.common.errors import InputError
 from robots.common.files import write_atomic
 from robots.robot import Robot
@@ -21,6 +24,8 @@ def export_trajectory(
     *,
     period: float | None = None,
     options: ExportOptions | None = None,
+    metadata: Mapping[str, Any] | None = None,
+    file: str | PathLike[str] | None = None,
     force: bool = False,
 ) -> Motion:
     """Writes a motion in a form of a controller or simulator.
@@ -32,14 +37,16 @@ def export_trajectory(
         form: a name of `FORMS`.
         period: sample period [s]; that of the form or of the trajectory by default.
         options: choices that several forms share.
+        metadata: what the trajectory's file says of itself.
+        file: the trajectory's file, for messages.
         force: whether an existing file may be replaced.
 
     Returns:
         The motion as it was written: sampled at the period, from time zero.
 
     Raises:
-        InputError: another form or suffix, a trajectory of another robot, a robot that the controller cannot have, an
-            uneven trajectory without a period, or a file that cannot be written.
+        InputError: another form or suffix, a trajectory that this robot must not play (see `check_trajectory`), a robot
+            that the controller cannot have, an uneven trajectory without a period, or a file that cannot be written.
     """
     if form not in FORMS:
         raise InputError(f"form {form!r}", allowed=", ".join(FORMS))
@@ -52,8 +59,7 @@ def export_trajectory(
             allowed=" or ".join(chosen.suffixes),
             remedy="rename it",
         )
-    if motion.n != robot.n:
-        raise InputError(f"the trajectory has {motion.n} joints, {robot.name} has {robot.n}")
+    check_trajectory(motion, robot, metadata, file)
     step = period if period is not None else chosen.period if chosen.period is not None else motion.period
     if step is None:
         raise InputError("the motion is not uniform in time", remedy="give a period (--period)")

@@ -28,6 +28,7 @@ class Retimed:
         deviation: largest distance of any given point from the retimed path in any joint, in `unit`.
         stops: number of rests between the two ends.
         unit: of positions.
+        waypoints: whether waypoints were given, so that the timing before is that of straight moves that stop at each.
     """
 
     motion: Motion
@@ -39,6 +40,7 @@ class Retimed:
     deviation: float
     stops: int
     unit: str = "rad"
+    waypoints: bool = False
 
     @property
     def peak(self) -> tuple[str, int, float]:
@@ -60,6 +62,11 @@ class Retimed:
         if self.usage_before is None:
             return ""
         change = abs(self.duration_after - self.duration_before)
+        if self.waypoints:
+            moves = "straight moves that stop at each waypoint"
+            if change <= 1e-9:
+                return f"The path takes as long as {moves}."
+            return f"The path takes {change:.3f} s {'more' if self.slower else 'less'} than {moves}."
         if self.slower and self.given_keeps_limits:
             return f"The new timing is {change:.3f} s slower. The given timing respects all limits: keep it."
         if self.slower:

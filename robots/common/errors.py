@@ -87,3 +87,16 @@ class NearestBodiesWarning(UserWarning):
 
 class AssumedValueWarning(UserWarning):
     """A robot description contains values without a source; results that depend on them are uncertain."""
+
+
+class DescriptionWarning(AssumedValueWarning):
+    """A note on a robot's description: assumed or doubtful values, or parts that are not used.
+
+    Args:
+        text: the note.
+        origin: of the robot, as ``oed robot show`` takes it.
+    """
+
+    def __init__(self, text: str, origin: str = "") -> None:
+        super().__init__(text)
+        self.origin = origin

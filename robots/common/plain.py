@@ -1,4 +1,4 @@
-"""Numbers as plain data: unknown or infinite numbers become null in JSON."""
+"""Numbers as plain data and in sentences: unknown or infinite numbers become null in JSON."""
 
 from __future__ import annotations
 
@@ -19,3 +19,13 @@ def all_finite(values: Iterable[float]) -> list[float | None]:
 def number(value: float | None, missing: float = math.nan) -> float:
     """Gives back what `finite` made None."""
     return missing if value is None else float(value)
+
+
+def two_digits(value: float) -> str:
+    """Writes a number with two significant digits, as people do: 100 and not 1e+02."""
+    return f"{float(f'{value:.2g}'):g}"
+
+
+def percent(share: float) -> str:
+    """Writes a share in per cent with two significant digits."""
+    return f"{two_digits(100 * share)} %"

@@ -15,6 +15,7 @@ from estimation.gate.checks.likely_causes import without_gravity
 from estimation.gate.context import Context, Stage
 from estimation.gate.finding import Finding
 from estimation.gate.quick_fits.whole_fit import HOPELESS
+from robots.common.plain import percent
 from robots.robot import Robot
 
 # Log of the odds against joint torques, from which another meaning is a warning, and from which it is refused.
@@ -144,7 +145,7 @@ def _computed(context: Context, evidence: Sequence[JointEvidence]) -> Finding | 
         name="torque_meaning",
         severity="warning",
         text="the torques seem to be targets that a controller computed, not measurements: a rigid body without "
-        f"friction leaves {100 * worst:.2g} % of them unexplained at most",
+        f"friction leaves {percent(worst)} of them unexplained at most",
         action="log the measured torque or current; ignore this for a simulation without friction and noise",
         value=100 * worst,
         unit="%",

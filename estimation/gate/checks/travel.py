@@ -10,6 +10,7 @@ from estimation.gate.check import Check
 from estimation.gate.context import Context, Stage
 from estimation.gate.finding import Finding
 from estimation.gate.measurements.motion import HARDLY, travel_shares
+from robots.common.plain import percent
 
 
 class Travel(Check):
@@ -39,8 +40,7 @@ class Travel(Check):
             Finding(
                 name="hardly_moves",
                 severity="warning",
-                text=f"{robot.joint_names[joint]} moves by {travel[joint]:.3g}, "
-                f"{100 * share[joint]:.2g} % of its range",
+                text=f"{robot.joint_names[joint]} moves by {travel[joint]:.3g}, {percent(share[joint])} of its range",
                 action="this log does not determine inertia and friction of this joint: move it further",
                 value=float(travel[joint]),
                 unit="rad or m",

@@ -52,8 +52,8 @@ class CampaignEstimate:
     def summary(self) -> str:
         """Gives each joint's error with and without thermal model, its time constants, and notes."""
         lines = [
-            "  joint   torque error RMS  without   time constants slow / fast    cold / warm\n"
-            "          with thermal model          at the largest power          friction"
+            "  joint   torque error RMS  without   time constants slow / fast    cold friction over\n"
+            "          with thermal model          at the largest power          that in the steady state there"
         ]
         for j, fit in enumerate(self.thermal):
             head = f"  {j + 1:5} {self.residual_rms[j]:14.4g} {self.residual_without[j]:11.4g}"
@@ -61,12 +61,17 @@ class CampaignEstimate:
                 lines.append(f"{head}     does not move")
                 continue
             constants = [q for q in fit.combinations if "time constant" in q.name][: len(fit.model.zones)]
-            ratio = next((q.value for q in fit.combinations if q.name.startswith("friction cold")), float("nan"))
+            cold = next((q for q in fit.combinations if q.name.startswith("friction cold")), None)
+            ratio = (
+                f"{cold.value:.2f} ± {cold.standard_error:.2f} times"
+                if cold is not None and cold.determined
+                else "not determined"
+            )
             texts = " / ".join(
                 f"{q.value / 60:.1f} ± {q.standard_error / 60:.1f} min" if q.determined else "not determined"
                 for q in constants
             )
-            lines.append(f"{head}     {texts}   {ratio:.2f}")
+            lines.append(f"{head}     {texts}   {ratio}")
         return "\n".join([*lines, *(f"  {note}" for note in self.joint_notes)])
 
     @property

@@ -17,6 +17,7 @@ from oed.experiments.results.design_file import DESIGN, TRAJECTORY
 from oed.experiments.safety_checks.margins import margin_data, missing_limits
 from oed.exports import write_trajectory
 from robots.common.files import write_atomic
+from robots.common.plain import percent
 from robots.robot import Robot
 from robots.signals import Motion
 from robots.version import VERSION
@@ -139,7 +140,7 @@ class Discrimination:
         return (
             f"A {self.kind.replace('_', ' ')} experiment ({self.what}) distinguishes {first} from {second} with "
             f"probability "
-            f"{100 * self.resolves:.0f} %, for an effect size of {100 * self.size:.2g} % of the torque. "
+            f"{100 * self.resolves:.0f} %, for an effect size of {percent(self.size)} of the torque. "
             f"The reference motion alone reaches {100 * self.alone:.0f} %"
         )
 

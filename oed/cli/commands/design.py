@@ -157,7 +157,7 @@ def design(
 
     Writes trajectory.csv, design.json and report.html.
     """
-    console = Console(json=json, quiet=quiet)
+    console = Console(json=json, quiet=quiet, introduces=True)
     with console.working() as progress:
         if discriminate is not None:
             from oed.cli.discriminating import design_discriminating, refuse_others

@@ -17,7 +17,6 @@ from oed.cli.options import (
     LockOption,
     QuietOption,
     TipOption,
-    robot_from,
     robot_of_file,
 )
 
@@ -72,7 +71,15 @@ def export(
     """Writes a trajectory file for a robot controller or a simulator."""
     console = Console(json=json, quiet=quiet)
     with console.working():
-        from oed.exports import FORMS, ExportOptions, export_trajectory, read_trajectory, write_trajectory
+        from oed.exports import (
+            CONTROLLER_FORMS,
+            FORMS,
+            ExportOptions,
+            check_trajectory,
+            export_trajectory,
+            read_trajectory,
+            write_trajectory,
+        )
         from oed.exports.forms.sampling import at_period
         from robots.common.errors import AssumedValueWarning, InputError
 
@@ -81,8 +88,17 @@ def export(
         if to != "csv" and (degrees or positions_only or bare):
             raise InputError(f"--degrees, --positions-only or --bare with --to {to}", allowed="them with csv only")
         motion, metadata = read_trajectory(trajectory)
-        if to == "csv":
-            kinds = robot_from(robot, tip, joints, lock).chain.kinds if robot else metadata.get("kinds")
+        # Only the trajectory file itself can be written without knowing whose joints move.
+        unknown = to == "csv" and not robot and not metadata.get("robot")
+        described = None if unknown else robot_of_file(robot, metadata, trajectory, tip, joints, lock)
+        if described is None or to == "csv":
+            if described is None:
+                text = f"{trajectory} names no robot: the limits were not checked; state the robot with --robot"
+                warnings.warn(text, AssumedValueWarning, stacklevel=1)
+                kinds = metadata.get("kinds")
+            else:
+                check_trajectory(motion, described, metadata, trajectory)
+                kinds = described.chain.kinds
             if degrees and kinds is None:
                 text = (
                     f"{trajectory} states no units: all joints are taken as revolute; --robot states which axes are "
@@ -104,11 +120,26 @@ def export(
                 force=force,
             )
         else:
-            from oed.exports import CONTROLLER_FORMS
-
-            described = robot_of_file(robot, metadata, trajectory, tip, joints, lock)
             target = out or trajectory.with_name(f"{trajectory.stem}-export{CONTROLLER_FORMS[to].suffixes[0]}")
             options = ExportOptions(start_tolerance=start_tolerance, name=name)
-            motion = export_trajectory(target, motion, described, to, period=period, options=options, force=force)
-    data = {"file": str(target), "form": to, "samples": len(motion), "joints": motion.n, "period": motion.period}
-    console.result(f"{len(motion)} samples of {motion.n} joints written to {target}", data)
+            motion = export_trajectory(
+                target,
+                motion,
+                described,
+                to,
+                period=period,
+                options=options,
+                metadata=metadata,
+                file=trajectory,
+                force=force,
+            )
+    has_samples = to == "csv" or CONTROLLER_FORMS[to].has_samples
+    data = {
+        "file": str(target),
+        "form": to,
+        "samples": len(motion) if has_samples else None,
+        "joints": motion.n,
+        "period": motion.period if has_samples else None,
+    }
+    content = f"{len(motion)} samples" if has_samples else "limits of velocity, acceleration and jerk"
+    console.result(f"{content} of {motion.n} joints written to {target}", data)

@@ -90,7 +90,7 @@ def identify(
 
     Writes model.json and report.html.
     """
-    console = Console(json=json, quiet=quiet)
+    console = Console(json=json, quiet=quiet, introduces=True)
     with console.working() as progress:
         from estimation import identify as run
         from estimation import read_logs

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -56,9 +57,10 @@ def show(
     console = Console(json=json, quiet=quiet)
     with console.working():
         from estimation import read_log
-        from oed.exports import read_trajectory
+        from oed.exports import is_made_for, read_trajectory
         from oed.reports import animate, motion_page, render
         from oed.reports.rendering.provenance import recordings_from
+        from robots.common.errors import OtherRobotWarning
         from robots.common.files import existing_file, open_atomic
         from robots.signals import Log, Motion
 
@@ -71,6 +73,10 @@ def show(
             if planned:
                 played, stated = read_trajectory(motion)
             described = robot_of_file(robot, stated, motion, tip, joints, lock)
+            made_for = str(stated.get("robot") or described.name)
+            if not is_made_for(made_for, described):
+                text = f"{motion.name} was made for {made_for}; {described.name} is used (--robot)"
+                warnings.warn(OtherRobotWarning(text), stacklevel=1)
             if not planned:
                 played = read_log(
                     motion,

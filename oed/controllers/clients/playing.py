@@ -10,23 +10,28 @@ from typing import Any
 
 import numpy as np
 
-from oed.controllers.clients.checks import check_start, check_status, check_trajectory, status_problem
+from oed.controllers.clients.checks import check_start, check_status, status_problem
 from oed.controllers.clients.ending import Ending
 from oed.controllers.clients.options import StreamOptions
 from oed.controllers.clients.requests import Requests
 from oed.controllers.clients.result import StreamResult
-from oed.controllers.errors import ControllerError
+from oed.controllers.errors import ControllerError, PointRefusedError
 from oed.controllers.interrupts import signals_held
 from oed.controllers.links import Endpoint, open_link
 from oed.controllers.recording.clock import ClockAnchor
 from oed.controllers.recording.log_file import check_log_path
 from oed.controllers.recording.recorder import Recorder
+from oed.controllers.recording.reported_joints import require_no_further_joints
 from oed.exports.simple_message import trajectory_points
+from oed.exports.simple_message.kinds import JOINTS
+from oed.exports.trajectory_checks import check_trajectory
 from robots.common.errors import InputError, OedError
 from robots.common.progress import SILENT, Progress
 from robots.robot import Robot
 from robots.signals import Motion
 from robots.version import VERSION
+
+CLEAR = "clear it at the controller, move the robot to the start of the trajectory, and play it again"
 
 PINGS = 9
 """Pings from which the delay is measured."""
@@ -79,6 +84,8 @@ def stream(
     options = options or StreamOptions()
     metadata = metadata or {}
     check_trajectory(motion, robot, metadata, file)
+    if motion.n > JOINTS:
+        raise InputError(f"{motion.n} joints", file=file, allowed=f"up to {JOINTS}, as simple_message has")
     if not dry_run:
         if log is None:
             raise InputError("no log file for the feedback", remedy="give one")
@@ -92,7 +99,8 @@ def stream(
     rows, note, begin, ended = 0, "", time.monotonic(), "interrupted"
     try:
         pose = recorder.wait_for_feedback()
-        check_start(motion.q[0], pose[: robot.n], options.start_tolerance, pose[robot.n :])
+        require_no_further_joints(pose[robot.n :], robot)
+        check_start(motion.q[0], pose[: robot.n], options.start_tolerance)
         with open_link(endpoint, endpoint.motion_port) as link:
             if needs_torque and not recorder.has_torque:
                 raise ControllerError(
@@ -174,7 +182,7 @@ def _play(
         ending.watch()
         problem = None if options.ignore_status else status_problem(recorder.status)
         if problem is not None:
-            raise ControllerError(f"the controller reports {problem} after point {requests.traffic.sent}")
+            raise ControllerError(f"the controller reports {problem} after point {requests.traffic.sent}", remedy=CLEAR)
 
     def turn() -> None:
         watch()
@@ -185,5 +193,14 @@ def _play(
         requests.download(points, watch, lambda count: progress.update(float(count)))
     else:
         longest = float(np.diff(motion.t).max()) if len(motion) > 1 else 0.0
-        requests.stream(points, watch, lambda count: progress.update(float(count)), longest)
+        try:
+            requests.stream(points, watch, lambda count: progress.update(float(count)), longest)
+        except PointRefusedError as error:
+            # The reply comes before the next report of the state, which says why.
+            problem = status_problem(recorder.renewed_status())
+            if problem is None:
+                raise
+            raise ControllerError(
+                f"the controller reports {problem} after point {requests.traffic.sent}", remedy=CLEAR
+            ) from error
     ending.wait(turn)

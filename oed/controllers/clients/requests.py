@@ -9,7 +9,7 @@ from contextlib import suppress
 
 from oed.controllers.clients.options import StreamOptions
 from oed.controllers.clients.traffic import Request, Traffic
-from oed.controllers.errors import ControllerError, LinkError
+from oed.controllers.errors import ControllerError, LinkError, PointRefusedError
 from oed.controllers.links import Link
 from oed.exports.simple_message import (
     Bare,
@@ -104,7 +104,7 @@ class Requests:
             longest_step: of the trajectory [s]; a full buffer may keep a reply back for so long.
 
         Raises:
-            ControllerError: a point that is refused.
+            PointRefusedError: a point that is refused.
             LinkError: no reply within the patience, or a closed connection.
         """
         waiting: OrderedDict[int, Request] = OrderedDict()
@@ -230,7 +230,7 @@ class Requests:
         if number not in waiting:
             return None
         if frame.reply != Reply.SUCCESS:
-            raise ControllerError(
+            raise PointRefusedError(
                 f"the controller refuses point {number}",
                 remedy="see its display: a limit, an error, a lost point or an empty buffer are usual causes",
             )

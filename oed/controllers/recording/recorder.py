@@ -63,6 +63,9 @@ class Recorder:
         self._status_count = 0
         self.positions: Array | None = None
         """All ten reals of the last feedback."""
+        self.lowest: Array | None = None
+        self.highest: Array | None = None
+        """Extremes of the ten positions so far."""
         self.stamp: float | None = None
         """The controller's time of the last feedback, or ours where it sends none [s]."""
         self.rest_since = self.last_heard = time.monotonic()
@@ -239,6 +242,8 @@ class Recorder:
         if self.positions is None or np.abs(positions - self.positions).max() > REST:
             self.rest_since = now
         self.positions, self.stamp = positions, now if stamp is None else stamp
+        self.lowest = positions if self.lowest is None else np.minimum(self.lowest, positions)
+        self.highest = positions if self.highest is None else np.maximum(self.highest, positions)
         self._heard.set()
         with self._lock:
             if self._log is not None:

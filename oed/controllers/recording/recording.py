@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+import warnings
 from dataclasses import asdict, dataclass
 from os import PathLike, fspath
 from typing import Any
@@ -11,7 +12,8 @@ from oed.controllers.interrupts import signals_held
 from oed.controllers.links import Endpoint, open_link
 from oed.controllers.recording.log_file import check_log_path
 from oed.controllers.recording.recorder import Recorder
-from robots.common.errors import InputError, OedError
+from oed.controllers.recording.reported_joints import doubts_about_robot, require_no_further_joints
+from robots.common.errors import InputError, OedError, OtherRobotWarning
 from robots.common.progress import SILENT, Progress
 from robots.robot import Robot
 from robots.version import VERSION
@@ -80,8 +82,11 @@ def record(
         What was recorded; Ctrl-C is a usual end.
 
     Raises:
-        InputError: a log that cannot be written, or a duration that is not positive.
+        InputError: a log that cannot be written, a duration that is not positive, or a controller with more joints.
         LinkError: the controller cannot be reached, or falls silent; what was recorded stays.
+
+    Warns:
+        OtherRobotWarning: positions that this robot cannot have, or last joints that read zero all the time.
     """
     if duration is not None and not duration > 0:
         raise InputError(f"a duration of {duration} s", allowed="above 0")
@@ -90,7 +95,7 @@ def record(
     recorder = Recorder(open_link(endpoint, endpoint.state_port), robot, endpoint.form, patience, endpoint.connect_time)
     rows, note, begin, ended, interrupted = 0, "", time.monotonic(), "interrupted", False
     try:
-        recorder.wait_for_feedback()
+        require_no_further_joints(recorder.wait_for_feedback()[robot.n :], robot)
         recorder.begin(log, {"robot": robot.name, "source": f"feedback of {place}", "tool": VERSION}, force=force)
         begin = time.monotonic()
         progress.start("recording", duration)
@@ -116,6 +121,9 @@ def record(
                 rows = recorder.finish({"complete": ended in ("done", "interrupted"), "ended": ended})
             except OedError as error:
                 note = f"the log lacks the measured loss: {error}"
+    if recorder.lowest is not None and recorder.highest is not None:
+        for doubt in doubts_about_robot(robot, recorder.lowest, recorder.highest):
+            warnings.warn(OtherRobotWarning(doubt), stacklevel=2)
     return Recording(
         robot=robot.name,
         place=place,

@@ -47,11 +47,13 @@ class Form(ABC):
         name: as ``--to`` takes it.
         suffixes: of the file, the usual one first.
         period: sample period that the controller needs [s]; None for that of the trajectory.
+        has_samples: whether the file holds the trajectory, and not only limits of its robot.
     """
 
     name: ClassVar[str]
     suffixes: ClassVar[tuple[str, ...]]
     period: ClassVar[float | None] = None
+    has_samples: ClassVar[bool] = True
 
     @abstractmethod
     def write(self, motion: Motion, robot: Robot, options: ExportOptions, suffix: str) -> bytes:

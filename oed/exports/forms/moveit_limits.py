@@ -20,6 +20,7 @@ class MoveItLimits(Form):
 
     name: ClassVar[str] = "moveit-limits"
     suffixes: ClassVar[tuple[str, ...]] = (".yaml",)
+    has_samples: ClassVar[bool] = False
 
     def write(self, motion: Motion, robot: Robot, options: ExportOptions, suffix: str) -> bytes:
         """See `Form.write`."""

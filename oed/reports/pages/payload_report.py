@@ -52,7 +52,7 @@ def payload_page(payload: PayloadEstimate) -> Page:
                 paragraphs=(
                     "The intervals hold the truth with 95 %. They allow for correlated noise and for what is not known "
                     "of the arm. The values are those of a body that can exist. Moments of inertia that the log does "
-                    "not determine are those of a typical body of this mass.",
+                    "not determine are those of a typical body of this mass, and have no interval.",
                 ),
                 tables=(_table(payload),),
             ),
@@ -69,7 +69,7 @@ def _table(payload: PayloadEstimate) -> Table:
         (
             NAMES.get(item.name, f"{item.name} about the centre"),
             _value(item),
-            _interval(item),
+            _interval(item) if known else "–",
             item.unit,
             "yes" if known else "no",
         )

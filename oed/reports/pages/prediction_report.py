@@ -9,7 +9,7 @@ from estimation.predictions.prediction import Prediction
 from oed.reports.pictures.torque_pictures import torque_picture
 from oed.reports.rendering.page import Cell, Fact, Finding, Page, Section, Table, findings_of
 from oed.reports.rendering.provenance import Recording, footer
-from robots.common.plain import finite
+from robots.common.plain import finite, percent
 
 
 def prediction_page(
@@ -71,7 +71,7 @@ def prediction_page(
 def _findings(prediction: Prediction, share: NDArray[np.float64] | None) -> tuple[Finding, ...]:
     texts = []
     if share is not None and share.any():
-        texts = [f"{share.mean():.2g} % of the torques extrapolate: the fit has seen no such motion."]
+        texts = [f"{percent(share.mean() / 100)} of the torques extrapolate: the fit has seen no such motion."]
     gate = () if prediction.gate is None else prediction.gate.findings
     return (
         *findings_of("prediction.extrapolates", (*texts, *prediction.beyond)),

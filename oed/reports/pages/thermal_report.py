@@ -145,7 +145,8 @@ def _joints(estimate: CampaignEstimate) -> Table:
             else "not determined"
             for q in constants
         ]
-        ratio = next((q.value for q in fit.combinations if q.name.startswith("friction cold")), None)
+        cold = next((q for q in fit.combinations if q.name.startswith("friction cold")), None)
+        ratio = cold.value if cold is not None and cold.determined else None
         bounds = "; ".join(f"{name} above {value / 60:.3g} min" for name, value in fit.bounds.items())
         fast = texts[1] if len(texts) > 1 else None
         rows.append((*head, texts[0], fast, ratio, bounds or "–"))

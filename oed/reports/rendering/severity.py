@@ -72,6 +72,7 @@ LEVELS: dict[str, Level] = {
     "force.note": "note",
     "difference": "note",
     "difference.joint": "act",
+    "difference.payload": "note",
     "contact": "act",
     "loop.unfinished": "act",
     # Logs.

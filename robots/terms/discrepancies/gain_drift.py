@@ -7,6 +7,7 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
+from robots.common.plain import percent
 from robots.robot import Robot
 from robots.terms.effect_bases.capabilities import Persistence
 from robots.terms.effects import Coefficient, Effect, Situation
@@ -59,7 +60,7 @@ class GainDrift(OverTime):
         return (
             "The torque signals of all joints change slowly with time by the same factor; the total change over the "
             "logs is "
-            f"{100 * float(np.ptp(share)):.2g} %. Likely cause: the supply, or a common reference of the amplifiers."
+            f"{percent(float(np.ptp(share)))}. Likely cause: the supply, or a common reference of the amplifiers."
         )
 
 

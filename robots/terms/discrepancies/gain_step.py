@@ -7,6 +7,7 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
+from robots.common.plain import percent
 from robots.robot import Robot
 from robots.terms.effect_bases.sudden import Sudden
 from robots.terms.effects import Coefficient, JointEffect, Situation
@@ -44,7 +45,7 @@ class GainStep(Sudden, JointEffect):
         length: str = "rad",
     ) -> str:
         """Describes the finding in one sentence."""
-        change = f"{100 * abs(coefficients[0]):.2g} % {'more' if coefficients[0] > 0 else 'less'}"
+        change = f"{percent(abs(coefficients[0]))} {'more' if coefficients[0] > 0 else 'less'}"
         return (
             f"The residual torque of joint {joint} matches a torque signal logged {change} from t = {shape[0]:.2f} s "
             f"on than before. Likely cause: another amplifier, sensor or measuring range."

@@ -8,6 +8,7 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
+from robots.common.plain import percent
 from robots.robot import Robot
 from robots.signals import UNKNOWN_PAUSE
 from robots.terms.discrepancies.gain_drift import OverTime
@@ -68,7 +69,7 @@ class SessionFriction(OverTime):
         most, way = shares[k, j], "more" if shares[k, j] > 0 else "less"
         return (
             "The friction of the joints differs between the logs, most on joint "
-            f"{j + 1} with {100 * abs(most):.2g} % {way} than in the first log. Likely cause: another temperature, or "
+            f"{j + 1} with {percent(abs(most))} {way} than in the first log. Likely cause: another temperature, or "
             f"maintenance between the logs."
         )
 

@@ -238,3 +238,50 @@ def test_an_impossible_rate_is_refused(draw):
     """A false-alarm rate outside 0 to 0.5 is refused."""
     with pytest.raises(InputError, match="false-alarm rate 0"):
         compare([draw(1), draw(2)], alpha=0.0)
+
+
+def test_friction_has_one_statement(draw, base):
+    """A curve that differs where its mean does not is stated as that, in the verdict, the table and the sentence."""
+    one, two = draw(80), draw(80)
+    f1, f2 = (
+        next(i for i, c in enumerate(base.columns) if c.friction and c.symbol == s and c.joint == 2)
+        for s in ("f1", "f2")
+    )
+    values = two.values + 1e-6
+    change = 0.3 * values[f1]
+    values[f1] += change
+    # The mean over the speeds stays: the viscous part makes up for the other.
+    curve = compare([one, replace(two, values=two.values + 1e-6)]).curves[1]
+    values[f2] -= change * curve.mean_row[f1] / curve.mean_row[f2]
+    found = compare([one, replace(two, values=values)])
+    assert found.friction[1].kind == "unchanged"
+    assert found.parts(1) == ("friction curve of joint 2",)
+    assert "friction curve of joint 2" in found.verdict()
+    assert "friction of joint 2" not in found.summary()
+    assert "not significant in the mean; the curve differs, most at " in found.friction[1].sentence()
+    low, high = found.friction[1].curve.low, found.friction[1].curve.high
+    assert low < found.friction[1].curve.percent < high
+    assert low * high > 0
+    assert "f1_2" not in found.summary()
+
+
+def test_curves_of_another_sign_width_are_compared_by_their_mean(draw, base):
+    """Coefficients that make up for another width of the sign are no difference; the note names the joint."""
+    one, two = draw(81), draw(82)
+    terms = tuple(
+        replace(term, velocity_scale=(1e-3, 5e-3, 1e-3)) if hasattr(term, "velocity_scale") else term
+        for term in two.torque_model.terms
+    )
+    f1, f2 = (
+        next(i for i, c in enumerate(base.columns) if c.friction and c.symbol == s and c.joint == 2)
+        for s in ("f1", "f2")
+    )
+    values = two.values.copy()
+    rows = compare([one, two]).curves[1].mean_row
+    values[f1] *= 1.3
+    values[f2] -= 0.3 * two.values[f1] * rows[f1] / rows[f2]
+    other = replace(two, torque_model=replace(two.torque_model, terms=terms), values=values)
+    found = compare([one, other])
+    assert not found.significant
+    assert any("different widths in the models (joint 2)" in warning for warning in found.warnings)
+    assert compare([one, replace(two, values=values)]).significant

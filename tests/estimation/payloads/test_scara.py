@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import numpy as np
@@ -94,5 +95,9 @@ def test_mass_and_the_horizontal_centre_come_with_intervals(description: Path, s
         assert item.lower <= truth <= item.upper
     assert found.quantities[0].half_width < 0.1
     assert found.determined[:4] == (True, True, True, False)
-    assert "no motion of this robot shows it" in found.summary()
+    assert re.search(
+        r"centre of mass z +not determined; assumed \S+ m, no motion of this robot shows it", found.summary()
+    )
+    assert found.to_dict()["quantities"][3]["ci95"] == [None, None]
+    assert found.to_frame().loc["centre_z", ["lower", "upper"]].isna().all()
     assert "assumed, not determined by the logs: centre_z" in found.source

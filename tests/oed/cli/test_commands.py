@@ -136,10 +136,19 @@ def test_help(command: str, run) -> None:
 
 
 def test_notes_go_to_standard_error(run, arguments) -> None:
-    """Assumed values are noted once, on standard error, without a traceback."""
+    """Assumed values are noted once, on standard error, in short: the note says where they are listed."""
     done = run(*arguments("simulate"))
-    assert done.err.count("note: two: these values are assumptions") == 1
+    assert done.err.count("note: two: ") == 1
+    assert "note: two: its description has assumed values or other notes; oed robot show " in done.err
     assert "note:" not in done.out
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("command", ["design", "identify"])
+def test_work_on_a_robot_begins_with_all_notes(command: str, run, arguments) -> None:
+    """A design and an identification list the assumed values in full."""
+    done = run(*arguments(command))
+    assert done.err.count("note: two: these values are assumptions without a source: ") == 1
 
 
 def test_version(run) -> None:
@@ -202,3 +211,11 @@ def test_design_options_reach_the_design(run, robot: Path, tmp_path: Path) -> No
     }
     assert {key: settings[key] for key in expected} == expected
     assert done.data["criterion"] == "d"
+
+
+@pytest.mark.slow
+def test_an_export_of_limits_holds_no_samples(run, experiment: Path, tmp_path: Path) -> None:
+    """MoveIt's limits are limits: neither the line nor the JSON counts samples."""
+    words = ("export", experiment / "trajectory.csv", "--to", "moveit-limits", "--out", tmp_path / "limits.yaml")
+    assert "limits of velocity, acceleration and jerk of 2 joints written to" in run(*words).out
+    assert run(*words, "--force", "--json").data["samples"] is None

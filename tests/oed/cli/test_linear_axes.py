@@ -37,11 +37,11 @@ def scara(tmp_path):
 
 @pytest.fixture
 def trajectory(tmp_path):
-    """A bare trajectory, such as another program writes."""
+    """A bare trajectory, such as another program writes, at rest at both ends."""
     t = 0.004 * np.arange(1001)
-    phase = 2 * np.pi * np.outer(t, [0.5, 0.8, 0.7])
-    rate = 2 * np.pi * np.array([0.5, 0.8, 0.7])
-    motion = Motion(t, 0.1 * np.sin(phase), 0.1 * rate * np.cos(phase), -0.1 * rate**2 * np.sin(phase))
+    rate = 2 * np.pi * np.array([0.5, 1.0, 0.75])
+    phase = np.outer(t, rate)
+    motion = Motion(t, 0.05 * (1 - np.cos(phase)), 0.05 * rate * np.sin(phase), 0.05 * rate**2 * np.cos(phase))
     write_trajectory(tmp_path / "bare.csv", motion, bare=True)
     return tmp_path / "bare.csv", motion
 

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from oed.cli.options import robot_of_file
-from robots.common.errors import AssumedValueWarning, InputError, OtherRobotWarning
+from robots.common.errors import AssumedValueWarning, InputError
 
 FILE = Path("trajectory.csv")
 
@@ -22,16 +22,15 @@ def only_notes_on_robots():
 
 
 def test_the_file_names_its_robot():
-    """Without an option the file's robot counts; with the same name nothing is noted."""
+    """Without an option the file's robot counts."""
     assert robot_of_file(None, {"robot": "ur10"}, FILE).name == "ur10"
     assert robot_of_file("ur10", {"robot": "ur10"}, FILE).name == "ur10"
     assert robot_of_file("er3a", {}, FILE).name == "er3a"
 
 
-def test_another_robot_than_the_file_names_is_noted():
-    """The option wins, and a note says which robot the file was made for."""
-    with pytest.warns(OtherRobotWarning, match=r"trajectory\.csv was made for ur10; er3a is used"):
-        assert robot_of_file("er3a", {"robot": "ur10"}, FILE).name == "er3a"
+def test_the_option_wins():
+    """The option counts where the file names another robot; what that means is for each command to say."""
+    assert robot_of_file("er3a", {"robot": "ur10"}, FILE).name == "er3a"
 
 
 def test_a_file_without_a_robot_needs_the_option():

@@ -54,11 +54,11 @@ def controllers(robot: Robot) -> Iterator[Callable[..., tuple[VirtualController,
     """Start controllers; they end with the test."""
     started = []
 
-    def start(*, plant: Any = None, **settings: Any) -> tuple[VirtualController, Endpoint]:
+    def start(*, plant: Any = None, pose: Any = None, **settings: Any) -> tuple[VirtualController, Endpoint]:
         faults = Faults(**{name: settings.pop(name) for name in list(settings) if name in Faults.__dataclass_fields__})
         defaults: dict[str, Any] = {"speed": 5.0, "wait_for_points": True, "motion_port": 0, "state_port": 0}
         options = ControllerOptions(faults=faults, **(defaults | settings))
-        controller = VirtualController(robot, plant, options=options)
+        controller = VirtualController(robot, plant, options=options, pose=pose)
         controller.start()
         started.append(controller)
         endpoint = Endpoint(

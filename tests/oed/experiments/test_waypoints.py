@@ -35,6 +35,11 @@ def test_all_waypoints_are_passed_within_the_limits(method: str) -> None:
     assert result.retimed.duration_before == pytest.approx(stops.duration)
     assert motion.duration <= stops.duration + 1e-9
     assert (method == "ruckig") == (motion.duration == pytest.approx(stops.duration))
+    # Waypoints have no speed: nothing is said of a given timing.
+    moves = "straight moves that stop at each waypoint"
+    assert moves in result.summary()
+    assert ("as long as" in result.summary()) == (method == "ruckig")
+    assert "given" not in result.summary()
 
 
 def test_wrong_waypoints() -> None:

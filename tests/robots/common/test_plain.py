@@ -8,7 +8,7 @@ import math
 import numpy as np
 import pytest
 
-from robots.common.plain import all_finite, finite, number
+from robots.common.plain import all_finite, finite, number, percent, two_digits
 
 
 def test_what_json_has_no_number_for_is_null_and_comes_back() -> None:
@@ -19,3 +19,10 @@ def test_what_json_has_no_number_for_is_null_and_comes_back() -> None:
     assert [number(v, math.inf) for v in json.loads(text)] == [1.5, math.inf, math.inf, math.inf]
     assert math.isnan(number(finite(math.nan)))
     assert number(finite(2)) == pytest.approx(2.0)
+
+
+def test_two_digits_have_no_exponent() -> None:
+    """Sentences have 100 % and 1200, not 1e+02 % and 1.2e+03."""
+    shares = (1.0, 0.9996, 12.34, 0.0567, 0.00012)
+    assert [percent(share) for share in shares] == ["100 %", "100 %", "1200 %", "5.7 %", "0.012 %"]
+    assert two_digits(-0.4567) == "-0.46"

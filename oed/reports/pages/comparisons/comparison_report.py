@@ -43,7 +43,7 @@ def comparison_page(comparison: ModelComparison) -> Page:
         comparison: the comparison.
     """
     damaged, last = comparison.damaged, len(comparison.runs) - 1
-    parts = {item.name for item in comparison.significant if item.level == "part"}
+    parts = {name for run in comparison.compared for name in comparison.parts(run)}
     return Page(
         title="Comparison of models",
         robot=comparison.robot_name,
@@ -69,6 +69,7 @@ def comparison_page(comparison: ModelComparison) -> Page:
                     "families of tests (whole model, parts of joints, parameters) share the false-alarm rate. Within a "
                     "family, p-values are adjusted by Holm's method, which needs no independence of the tests. The "
                     "prior that the models share makes differences rather too small: tests are conservative.",
+                    *(["Payloads on the flange are taken off the parameters first."] if comparison.payloads else []),
                 ),
                 pictures=(parts_picture(comparison),),
                 tables=(whole_table(comparison),),
@@ -118,10 +119,16 @@ def _findings(comparison: ModelComparison) -> tuple[Finding, ...]:
         )
         for item in comparison.damaged
     ]
+    found += [
+        Finding(
+            code="difference.payload", subject=f"{comparison.labels[item.run]}:", text=item.sentence(comparison.labels)
+        )
+        for item in comparison.payloads
+    ]
     runs: dict[str, list[str]] = {}
-    for part in comparison.significant:
-        if part.level == "part" and part.run is not None:
-            runs.setdefault(part.name, []).append(comparison.labels[part.run])
+    for run in range(1, len(comparison.runs)):
+        for name in comparison.parts(run):
+            runs.setdefault(name, []).append(comparison.labels[run])
     found += [
         Finding(
             code="difference", subject=f"{name}:", text=f"differs from {comparison.labels[0]} in {', '.join(those)}."

@@ -59,12 +59,12 @@ def parameters_table(comparison: ModelComparison) -> Table:
     """Lists the parameters of the first and the last run, with their difference."""
     last = len(comparison.runs) - 1
     rows: list[tuple[Cell, ...]] = []
-    index = {column.name: i for i, column in enumerate(comparison.common.columns)}
+    compared = comparison.tested
+    index = {column.name: i for i, column in enumerate(compared.columns)}
     for item in comparison.of_run(last, "parameter"):
         i = index[item.name]
         values = [
-            significant(float(comparison.common.values[k, i]), float(np.sqrt(comparison.common.covariances[k, i, i])))
-            for k in (0, last)
+            significant(float(compared.values[k, i]), float(np.sqrt(compared.covariances[k, i, i]))) for k in (0, last)
         ]
         percent = "–" if not np.isfinite(item.percent) else f"{item.percent:+.2f}"
         verdict = "yes" if item.adjusted < comparison.alpha else "no"
@@ -94,7 +94,8 @@ def parameters_table(comparison: ModelComparison) -> Table:
             "significant",
         ),
         rows=tuple(rows),
-        caption="Parameters that all runs determine.",
+        caption="Parameters that all runs determine"
+        + (", without the payload of a run that carries one." if comparison.payloads else "."),
         align=("left", *["right"] * 5, "left", "right", "left"),
     )
 

@@ -52,6 +52,12 @@ def test_trajectory(run, tmp_path: Path, robot) -> None:
     assert done.code == 0, done.err
     assert "Action needed" in out.read_text()
     assert "exceeds" in out.read_text()
+    # An edited copy of the robot may be shown; a note says that the file names another.
+    copy = tmp_path / "copy.yaml"
+    copy.write_text(robot.read_text().replace("name: ", "name: copy_of_"))
+    noted = run("show", path, "--robot", copy, "--out", tmp_path / "copy.html")
+    assert (noted.code, "trajectory.csv was made for" in noted.err) == (0, True)
+    assert "was made for" not in run("show", path, "--robot", robot, "--out", tmp_path / "own.html").err
 
 
 def test_bad_input(run, robot, log, tmp_path: Path) -> None:

@@ -1,0 +1,63 @@
+"""Whether the joints that a controller reports are those of the robot."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from robots.common.errors import InputError
+from robots.robot import Robot
+
+Array = NDArray[np.float64]
+
+BEYOND = 0.02
+"""Distance from a limit of position from which it is no rounding or overshoot [rad or m]."""
+
+
+def require_no_further_joints(unused: Array, robot: Robot) -> None:
+    """Refuses a controller that reports more joints than the robot has.
+
+    Args:
+        unused: what it reports of further joints (m,); zero where there is none.
+        robot: the robot.
+
+    Raises:
+        InputError: naming the joint.
+    """
+    if np.abs(unused).max(initial=0.0) > 0:
+        joint = robot.n + int(np.abs(unused).argmax()) + 1
+        raise InputError(
+            f"the controller reports a joint {joint}, {robot.name} has {robot.n}",
+            joint=joint,
+            remedy="the controller is of another robot: correct --robot",
+        )
+
+
+def doubts_about_robot(robot: Robot, lowest: Array, highest: Array) -> list[str]:
+    """Names what speaks against a robot in the positions that its controller reports.
+
+    Feedback does not say how many joints there are: those that a controller lacks read zero.
+
+    Args:
+        robot: the robot.
+        lowest: smallest reported positions (10,) [rad or m].
+        highest: largest ones (10,).
+    """
+    found, n = [], robot.n
+    silent = (lowest[:n] == 0) & (highest[:n] == 0)
+    real = int(np.flatnonzero(~silent)[-1]) + 1 if (~silent).any() else n
+    if real < n:
+        joints = ", ".join(str(joint) for joint in range(real + 1, n + 1))
+        found.append(
+            f"joint {joints} of {robot.name} reads exactly 0 all the time: the controller may have {real} joints. "
+            "Check --robot"
+        )
+    for joint in range(n):
+        lower, upper = float(robot.limits.lower[joint]), float(robot.limits.upper[joint])
+        outside = lowest[joint] if lowest[joint] < lower - BEYOND else highest[joint]
+        if lowest[joint] < lower - BEYOND or highest[joint] > upper + BEYOND:
+            found.append(
+                f"joint {joint + 1} is reported at {outside:.3g} {robot.limits.unit(joint)}, outside the limits of "
+                f"{robot.name} ({lower:.3g} to {upper:.3g}): the controller may be of another robot. Check --robot"
+            )
+    return found
