@@ -25,6 +25,7 @@ from oed.reports.rendering.provenance import footer
 from oed.reports.rendering.saving import save_page
 from oed.reports.rendering.significant import NORMAL_95, significant
 from robots.common.files import ResultFolder
+from robots.common.plain import percent, two_digits
 from robots.signals import Log
 
 Array = NDArray[np.float64]
@@ -86,21 +87,19 @@ def _facts(view: DiagnosisView) -> tuple[Fact, ...]:
             # Only joints with a finding: on other joints the change comes from the base model.
             change[[j for j in range(len(change)) if j + 1 not in own]] = -np.inf
         worst = int(np.argmax(change))
-        facts.append(
+        facts += [
             Fact(
                 label=f"Error of joint {worst + 1}, held-out data",
-                value=f"{100 * view.nrmse_before[worst]:.2g} → {100 * view.nrmse_after[worst]:.2g} %",
+                value=f"{two_digits(100 * view.nrmse_before[worst])} → {percent(view.nrmse_after[worst])}",
                 note="of its torque RMS, base model → extended model",
                 status="good" if view.nrmse_after[worst] < view.nrmse_before[worst] else "neutral",
-            )
-        )
-        facts.append(
+            ),
             Fact(
                 label="Error of all joints, held-out data",
-                value=f"{100 * _pooled(view.nrmse_before):.2g} → {100 * _pooled(view.nrmse_after):.2g} %",
+                value=f"{two_digits(100 * _pooled(view.nrmse_before))} → {percent(_pooled(view.nrmse_after))}",
                 note="root mean square over joints",
-            )
-        )
+            ),
+        ]
     if view.findings:
         chance = max(finding.p_value for finding in view.findings)
         facts.append(

@@ -17,6 +17,7 @@ from oed.reports.rendering.picture import Panel, Picture, Series
 from oed.reports.rendering.provenance import Recording, footer
 from oed.reports.rendering.saving import save_page
 from robots.common.files import ResultFolder
+from robots.common.plain import two_digits
 from robots.terms.effects import EFFECTS
 
 CHANCE = 1e-3
@@ -47,7 +48,7 @@ def loop_page(result: LoopResult) -> Page:
             Fact(label="Effects found", value=len(last.findings), note=", ".join(last.causes)),
             Fact(
                 label="Error of all joints, held-out data",
-                value=f"{_pooled(last.before):.2g} → {_pooled(last.after):.2g} %",
+                value=f"{two_digits(_pooled(last.before))} → {two_digits(_pooled(last.after))} %",
                 note="of the torque RMS, base model → extended model",
             ),
         ),
