@@ -40,7 +40,8 @@ class FreeTorque:
             return white
         # In double precision: columns near to each other make much of rounding.
         values = cho_solve_banded((self.factor, True), self.columns.T @ white, check_finite=False)
-        return white - (self.columns @ values).astype(white.dtype, copy=False)
+        # Columns that are contiguous in memory stay so.
+        return np.subtract(white, (self.columns @ values).astype(white.dtype, copy=False), out=np.empty_like(white))
 
 
 def span_of(pieces: Sequence[Piece], rows: int) -> FreeTorque:

@@ -56,7 +56,7 @@ class Hypothesis:
             return (self.joint - 1,), (_finite(self.effect.local(situation, self.joint, shape)),)
         X = _finite(self.effect.columns(situation, self.joint, shape))
         joints = tuple(int(j) for j in np.flatnonzero(acting(X).any(axis=1))) or (0,)
-        return joints, tuple(np.ascontiguousarray(X[:, j]) for j in joints)
+        return joints, tuple(X[:, j] for j in joints)
 
     def coefficient_bounds(self, robot: Robot, shape: tuple[float, ...]) -> tuple[Array, Array]:
         """Returns the physical bounds of the coefficients, (k,) and (k,), at given shape values."""

@@ -297,4 +297,4 @@ class Problem:
 
 
 def _squares(columns: Array | Small) -> Array:
-    return np.asarray(np.einsum("ij,ij->j", columns, columns, dtype=float))
+    return np.asarray((columns.T[:, None] @ columns.T[:, :, None])[:, 0, 0], dtype=float)
