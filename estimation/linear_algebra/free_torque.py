@@ -36,7 +36,7 @@ class FreeTorque:
 
     def projected_out(self, white: NDArray[Real]) -> NDArray[Real]:
         """Leaves out of columns (N,) or (N, k) what lies in the span."""
-        if not self.columns.shape[1]:
+        if not self.columns.shape[1] or not white.size:
             return white
         # In double precision: columns near to each other make much of rounding.
         values = cho_solve_banded((self.factor, True), self.columns.T @ white, check_finite=False)
