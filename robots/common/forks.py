@@ -117,8 +117,11 @@ def _packed(results: list[Any]) -> _Parcel:
     sizes = tuple(array.nbytes for array in arrays)
     if sum(sizes) < SMALL:
         return pickle.dumps(results, protocol=5), (), ""
-    # It stays open until this process ends; the parent has mapped it by then.
-    descriptor = os.memfd_create("results")
+    try:
+        # It stays open until this process ends; the parent has mapped it by then.
+        descriptor = os.memfd_create("results")
+    except OSError:
+        return pickle.dumps(results, protocol=5), (), ""
     with open(descriptor, "wb", closefd=False) as file:
         for array in arrays:
             file.write(array)
@@ -127,10 +130,17 @@ def _packed(results: list[Any]) -> _Parcel:
 
 
 def _unpacked(head: bytes, sizes: tuple[int, ...], path: str) -> list[Any]:
-    """Takes results whose arrays stay where `_packed` put them."""
+    """Takes results whose arrays stay where `_packed` put them.
+
+    Raises:
+        BrokenProcessPool: too many files are open, or other processes are hidden.
+    """
     if not path:
         return list(pickle.loads(head))
-    with open(path, "r+b") as file:
-        memory = memoryview(mmap.mmap(file.fileno(), 0))
+    try:
+        with open(path, "r+b") as file:
+            memory = memoryview(mmap.mmap(file.fileno(), 0))
+    except OSError as error:
+        raise BrokenProcessPool("the results of a process cannot be mapped") from error
     starts = accumulate((size + -size % ALIGNED for size in sizes), initial=0)
     return list(pickle.loads(head, buffers=[memory[at : at + size] for at, size in zip(starts, sizes, strict=False)]))
