@@ -36,11 +36,12 @@ class FreeTorque:
 
     def projected_out(self, white: NDArray[Real]) -> NDArray[Real]:
         """Leaves out of columns (N,) or (N, k) what lies in the span."""
-        if not self.columns.shape[1]:
+        if not self.columns.shape[1] or not white.size:
             return white
         # In double precision: columns near to each other make much of rounding.
         values = cho_solve_banded((self.factor, True), self.columns.T @ white, check_finite=False)
-        return white - (self.columns @ values).astype(white.dtype, copy=False)
+        # Columns that are contiguous in memory stay so.
+        return np.subtract(white, (self.columns @ values).astype(white.dtype, copy=False), out=np.empty_like(white))
 
 
 def span_of(pieces: Sequence[Piece], rows: int) -> FreeTorque:

@@ -36,6 +36,7 @@ from estimation.diagnosis.experiment_plans.experiment_motions import (
 )
 from estimation.diagnosis.experiment_plans.rival_shapes import find_rival_shapes
 from estimation.diagnosis.hypothesis_tests.problem import Problem
+from robots.common.forks import forked
 from robots.robot import Robot
 from robots.signals import Motion
 from robots.terms.effects import EXPERIMENTS
@@ -129,7 +130,7 @@ def plan_next(problem: Problem, causes: Sequence[Cause]) -> NextExperiment | Non
     index = joint - 1 if joint is not None else int(np.argmax(np.ptp(problem.recording.q, axis=0)))
     room = motion_range(robot, problem.recording)
     grams = Grams(problem, possible, find_rival_shapes(problem, possible))
-    choices = [make_choice(grams, room, index, kind) for kind in MAKERS]
+    choices = forked(lambda kind: make_choice(grams, room, index, kind), MAKERS)
     if max(choice.chance for choice in choices) < ENOUGH:
         choices = [repeated(grams, choice) for choice in choices]
     ranking = sorted(choices, key=lambda choice: choice.rank)

@@ -8,13 +8,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from estimation.diagnosis.noise_models.whitening import acting
 from robots.robot import Robot
 from robots.terms.effects import Effect, JointEffect, Situation
 
 Array = NDArray[np.float64]
-
-# Approximate number of rows that are checked first for a column that is not zero.
-GLANCE = 64
 
 
 @dataclass(frozen=True)
@@ -56,7 +54,7 @@ class Hypothesis:
             return (self.joint - 1,), (_finite(self.effect.local(situation, self.joint, shape)),)
         X = _finite(self.effect.columns(situation, self.joint, shape))
         joints = tuple(int(j) for j in np.flatnonzero(acting(X).any(axis=1))) or (0,)
-        return joints, tuple(np.ascontiguousarray(X[:, j]) for j in joints)
+        return joints, tuple(X[:, j] for j in joints)
 
     def coefficient_bounds(self, robot: Robot, shape: tuple[float, ...]) -> tuple[Array, Array]:
         """Returns the physical bounds of the coefficients, (k,) and (k,), at given shape values."""
@@ -73,10 +71,3 @@ def _finite(X: Array) -> Array:
     with np.errstate(all="ignore"):
         finite = np.isfinite(X.sum())  # one pass in the usual case
     return X if finite else np.where(np.isfinite(X), X, 0.0)
-
-
-def acting(columns: Array) -> NDArray[np.bool_]:
-    """Marks columns (N, ...) that are not all zero; a few rows usually decide."""
-    nonzero = np.asarray(columns[:: len(columns) // GLANCE + 1].any(axis=0))
-    nonzero[~nonzero] = columns[:, ~nonzero].any(axis=0)
-    return nonzero

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from estimation.diagnosis.base_models.baseline import Baseline
 from estimation.diagnosis.calibration import MIN_COUNTED_ENERGY, MIN_DISTANT_ENERGY
 from estimation.diagnosis.hypothesis_tests.groups import Group
-from estimation.diagnosis.hypothesis_tests.hypotheses import Hypothesis, acting
+from estimation.diagnosis.hypothesis_tests.hypotheses import Hypothesis
 from estimation.diagnosis.noise_models.high_frequency_band import HighBand
 from estimation.diagnosis.noise_models.whitening import Whitening
 from estimation.diagnosis.recordings.recording import Recording
@@ -168,7 +168,9 @@ class Problem:
         Returns:
             One group per k columns.
         """
-        whole, white = zip(*(self._whitened(part, j) for j, part in zip(joints, columns, strict=True)), strict=True)
+        whole, white = zip(
+            *(self.whitening.both(part, j, single=True) for j, part in zip(joints, columns, strict=True)), strict=True
+        )
         total = white[0].shape[1]
         k = total // count
         P = self.whitening.precision
@@ -213,18 +215,6 @@ class Problem:
             )
             for i, own in enumerate(slice(i * k, (i + 1) * k) for i in range(count))
         ]
-
-    def _whitened(self, columns: Array, joint: int) -> tuple[Small, Small]:
-        """Whitens columns (N0, k) of a joint: with all rows, and with masked rows projected out."""
-        acts = acting(columns)
-        if acts.all():
-            whole = self.whitening.filtered(columns, joint, single=True)
-            return whole, self.whitening.counted(whole, joint)
-        # A contact has one column per joint, each zero on all other joints.
-        whole, white = (np.zeros((self.rows, len(acts)), np.float32, order="F") for _ in range(2))
-        if acts.any():
-            whole[:, acts], white[:, acts] = self._whitened(columns[:, acts], joint)
-        return whole, white
 
     @cached_property
     def _residual(self) -> Small:
@@ -297,4 +287,4 @@ class Problem:
 
 
 def _squares(columns: Array | Small) -> Array:
-    return np.asarray(np.einsum("ij,ij->j", columns, columns, dtype=float))
+    return np.asarray((columns.T[:, None] @ columns.T[:, :, None])[:, 0, 0], dtype=float)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
-from typing import Literal, overload
+from typing import Any, Literal, overload
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,6 +18,8 @@ from robots.common.stretches import spans
 Array = NDArray[np.float64]
 Small = NDArray[np.float32]
 
+# Approximate number of rows that are checked first for a column that is not zero.
+GLANCE = 64
 # Least gain of a whitening filter at zero frequency: a smaller estimate is chance.
 LEAST_AT_REST = 0.01
 
@@ -81,7 +83,23 @@ class Whitening:
 
     def apply(self, series: Array, joint: int) -> Array:
         """Whitens columns (N,) or (N, k) of one joint, counted from 0."""
-        return self.counted(self.filtered(series, joint), joint)
+        return self.both(series, joint)[1]
+
+    @overload
+    def both(self, series: Array, joint: int, *, single: Literal[False] = False) -> tuple[Array, Array]: ...
+    @overload
+    def both(self, series: Array, joint: int, *, single: Literal[True]) -> tuple[Small, Small]: ...
+    def both(self, series: Array, joint: int, *, single: bool = False) -> tuple[Array | Small, Array | Small]:
+        """Whitens columns of a joint with all rows, and as `apply` does. Columns that are zero cost nothing."""
+        if series.ndim == 1 or (acts := acting(series)).all():
+            whole: Any = self.filtered(series, joint, single=True) if single else self.filtered(series, joint)
+            return whole, self.counted(whole, joint)
+        some = self.both(series[:, acts], joint, single=True) if single else self.both(series[:, acts], joint)
+        result = []
+        for part in some:
+            result.append(np.zeros((len(part), len(acts)), part.dtype, order="F"))
+            result[-1][:, acts] = part
+        return result[0], result[1]
 
     @overload
     def filtered(self, series: Array, joint: int, *, single: Literal[False] = False) -> Array: ...
@@ -157,6 +175,13 @@ class Whitening:
         root = np.linalg.cholesky(self.precision)  # P = L L'
         mixed = np.einsum("jk,nj...->nk...", root, self.all(series), optimize=True)
         return np.asarray(mixed.reshape(-1, *series.shape[2:]))
+
+
+def acting(columns: Array) -> NDArray[np.bool_]:
+    """Marks columns (N, ...) that are not all zero; a few rows usually decide."""
+    nonzero = np.asarray(columns[:: len(columns) // GLANCE + 1].any(axis=0))
+    nonzero[~nonzero] = columns[:, ~nonzero].any(axis=0)
+    return nonzero
 
 
 def free_columns(

@@ -21,6 +21,7 @@ from estimation.diagnosis.recordings.thinning import decimate_recording, keep_cl
 from estimation.gate.measurements.resolution import lattice_step
 from estimation.regressions.preparation import Prepared, prepare, still_joints
 from robots.common.errors import InputError
+from robots.common.forks import forked
 from robots.robot import Robot
 from robots.signals import Log
 
@@ -93,7 +94,7 @@ def build_recording(
     found = [[of.of_positions(x) for x in log.positions.q.T] for of, log in zip(spectra, prepared, strict=True)]
     highest = np.max([[spectrum.cutoff() for spectrum in own] for own in found], axis=0)
     cap = select_position_cutoff(robot, prepared, highest)
-    parts = [_part(log, step, cap, of, own) for log, of, own in zip(prepared, spectra, found, strict=True)]
+    parts = forked(lambda each: _part(each[0], step, cap, *each[1:]), zip(prepared, spectra, found, strict=True))
     never = np.all([np.ptp(part[1], axis=0) == 0 for part in parts], axis=0)
     parts = _zero_resting_joints(parts, still_joints([part[1] for part in parts], travel) | never)
     lengths = [len(part[0]) for part in parts]

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
+
 import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import BSpline
-from scipy.linalg import solveh_banded
+from scipy.linalg import cho_solve_banded, cholesky_banded
 from scipy.signal import butter, sosfiltfilt
-from scipy.sparse import diags_array
+from scipy.sparse import csr_array, diags_array
 from scipy.special import binom
 
 Array = NDArray[np.float64]
@@ -36,7 +38,7 @@ def smooth_motion(x: Array, period: float, cutoffs: Array) -> tuple[Array, Array
     for j, cutoff in enumerate(cutoffs):
         if cutoff <= 0:
             continue
-        sections = butter(ORDER, min(cutoff * 2 * period, 0.99), output="sos")
+        sections = _sections(min(float(cutoff) * 2 * period, 0.99))
         padding = min(len(x) - 1, round(12 / (cutoff * period)))
         q[:, j] = sosfiltfilt(sections, x[:, j], padtype="odd", padlen=padding)
     states = (q, *differentiate(q, period))
@@ -45,9 +47,8 @@ def smooth_motion(x: Array, period: float, cutoffs: Array) -> tuple[Array, Array
             continue
         rows = min(len(x), int((FREE + BLENDED) / (cutoff * period)) + 1)
         weight = _step((np.arange(rows) * period * cutoff - FREE) / BLENDED)
-        begin = _free(x[:rows, j], period, cutoff)
-        end = _free(x[len(x) - rows :, j], period, cutoff)
-        for state, first, last in zip(states, begin, end, strict=True):
+        ends = _free(np.column_stack([x[:rows, j], x[len(x) - rows :, j]]), period, float(cutoff))
+        for state, (first, last) in zip(states, (both.T for both in ends), strict=True):
             column = state[:, j]
             column[:rows] = first + weight * (column[:rows] - first)
             column[len(x) - rows :] = last + weight[::-1] * (column[len(x) - rows :] - last)
@@ -79,18 +80,32 @@ def differentiate(x: Array, period: float) -> tuple[Array, Array]:
     return first, second
 
 
+@lru_cache(maxsize=64)
+def _sections(cutoff: float) -> Array:
+    return np.asarray(butter(ORDER, cutoff, output="sos"))
+
+
 def _free(x: Array, period: float, cutoff: float) -> tuple[Array, Array, Array]:
-    """Fits a smoothing spline to a position (N,) and evaluates it with two derivatives.
+    """Fits smoothing splines to positions (N, k) and evaluates them with two derivatives.
 
     The penalty acts on differences of the B-spline coefficients (Eilers and Marx 1996), of the same order as the
     filter. It is scaled to halve the signal at the cut-off. In the middle of a log the response equals that of the
     filter applied forward and backward, 1 / (1 + (f / fc)^16). Nothing is assumed beyond the ends.
     """
-    length = (len(x) - 1) * period
-    spans = int(np.clip(np.ceil(length * cutoff * KNOTS), ORDER + 1, max(len(x) - 1, ORDER + 1)))
-    width = length / spans
-    knots = np.arange(-DEGREE, spans + DEGREE + 1) * width
+    knots, design, factor = _spline(len(x), period, cutoff)
+    curve = BSpline(knots, cho_solve_banded((factor, False), np.asarray(design.T @ x)), DEGREE)
     t = np.arange(len(x)) * period
+    return curve(t), curve(t, 1), curve(t, 2)
+
+
+@lru_cache(maxsize=16)
+def _spline(rows: int, period: float, cutoff: float) -> tuple[Array, csr_array, Array]:
+    """Builds knots, design matrix, and the banded Cholesky factor of the normal equations."""
+    length = (rows - 1) * period
+    spans = int(np.clip(np.ceil(length * cutoff * KNOTS), ORDER + 1, max(rows - 1, ORDER + 1)))
+    width = length / spans
+    knots = np.asarray(width * np.arange(-DEGREE, spans + DEGREE + 1), dtype=np.float64)
+    t = np.arange(rows) * period
     design = BSpline.design_matrix(np.minimum(t, length * (1 - 1e-12)), knots, DEGREE)
     size = spans + DEGREE
     signs = [(-1.0) ** k * binom(ORDER, k) for k in range(ORDER + 1)]
@@ -102,8 +117,7 @@ def _free(x: Array, period: float, cutoff: float) -> tuple[Array, Array, Array]:
     bands = np.zeros((ORDER + 1, size))
     for k in range(ORDER + 1):
         bands[ORDER - k, k:] = normal.diagonal(k)
-    curve = BSpline(knots, solveh_banded(bands, np.asarray(design.T @ x)), DEGREE)
-    return curve(t), curve(t, 1), curve(t, 2)
+    return knots, design, cholesky_banded(bands)
 
 
 def _step(x: Array) -> Array:

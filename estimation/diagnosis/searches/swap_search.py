@@ -16,7 +16,7 @@ from estimation.diagnosis.hypothesis_tests.scoring import Accepted, score
 from estimation.diagnosis.joint_fits.total_torque import with_total_torque
 from estimation.diagnosis.searches.acceptance import is_certain
 from estimation.diagnosis.searches.candidate_screening import screen_candidates
-from robots.common.parallel import threaded
+from robots.common.forks import forked
 
 # Relative change of a member's gain up to which its last comparison with rivals remains valid.
 SAME = 0.02
@@ -144,7 +144,9 @@ def refine_candidates(
     """
     starts = [(o.hypothesis, o.shape) for o in outcomes]
     starts += [(o.hypothesis, known[o.hypothesis]) for o in outcomes if known and o.hypothesis in known]
-    refined = threaded(lambda start: refine(problem, start[0], start[1], accepted), starts)
+    fits = forked(lambda start: refine(problem, start[0], start[1], accepted), starts)
+    # Effects are compared by identity, and a forked process returns a copy.
+    refined = [replace(fit, hypothesis=own) for fit, (own, _) in zip(fits, starts, strict=True)]
     tops: dict[Hypothesis, FittedEffect] = {}
     for member in sorted(refined, key=lambda member: -member.bic_gain):
         tops.setdefault(member.hypothesis, member)

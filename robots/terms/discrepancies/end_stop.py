@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from robots.common.columns import side_by_side
 from robots.robot import Robot
 from robots.terms.base import force_unit, length_unit
 from robots.terms.discrepancies.local_fault import Placed
@@ -64,7 +65,7 @@ class EndStop(Placed):
     def local(self, situation: Situation, joint: int, shape: tuple[float, ...] = ()) -> Array:
         """Evaluates the torque per unit of the coefficients (N, 2)."""
         deep = np.maximum((situation.q[:, joint - 1] - shape[0]) * (-1.0 if self.below else 1.0), 0.0)
-        return np.column_stack([-deep if self.below else deep, deep * situation.dq[:, joint - 1]])
+        return side_by_side([-deep if self.below else deep, deep * situation.dq[:, joint - 1]])
 
     def describe(
         self,

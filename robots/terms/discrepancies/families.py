@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.signal import lfilter
 
+from robots.common.columns import side_by_side
 from robots.common.stretches import spans
 from robots.terms.discrepancies.gain_drift import half_waves, log_time
 from robots.terms.discrepancies.resonance import resonance
@@ -55,7 +56,7 @@ class Family:
 
 def _angle(s: Situation, joint: int, other: int, shape: tuple[float, ...]) -> Array:
     q = s.q[:, other - 1]
-    return np.column_stack([f(h * q) for h in HARMONICS for f in (np.cos, np.sin)])
+    return side_by_side([f(h * q) for h in HARMONICS for f in (np.cos, np.sin)])
 
 
 def _angles(s: Situation, joint: int, other: int, shape: tuple[float, ...]) -> Array:
@@ -64,7 +65,7 @@ def _angles(s: Situation, joint: int, other: int, shape: tuple[float, ...]) -> A
     a, b = s.q[:, joint - 1], s.q[:, other - 1]
     first = [f(h * a) for h in (1, 2) for f in (np.cos, np.sin)]
     second = [f(h * b) for h in (1, 2) for f in (np.cos, np.sin)]
-    return np.column_stack([x * y for x in first for y in second])
+    return side_by_side([x * y for x in first for y in second])
 
 
 def _motion(s: Situation, joint: int, other: int, shape: tuple[float, ...]) -> Array:
@@ -72,14 +73,14 @@ def _motion(s: Situation, joint: int, other: int, shape: tuple[float, ...]) -> A
         return np.zeros((len(s), 5))
     v = s.dq[:, other - 1]
     own = s.dq[:, joint - 1]
-    return np.column_stack([v, np.abs(v), v * np.abs(v), s.sign[:, other - 1], v * own])
+    return side_by_side([v, np.abs(v), v * np.abs(v), s.sign[:, other - 1], v * own])
 
 
 def _push(s: Situation, joint: int, other: int, shape: tuple[float, ...]) -> Array:
     if other == joint:
         return np.zeros((len(s), 3))
     q, a = s.q[:, joint - 1], s.ddq[:, other - 1]
-    return np.column_stack([a, a * np.cos(q), a * np.sin(q)])
+    return side_by_side([a, a * np.cos(q), a * np.sin(q)])
 
 
 def _whirl(s: Situation, joint: int, other: int, shape: tuple[float, ...]) -> Array:
@@ -101,7 +102,7 @@ def _posture(s: Situation, joint: int, other: int, shape: tuple[float, ...]) -> 
 
 def _products(q: Array, v: Array) -> Array:
     waves = [f(h * q) for h in (1, 2) for f in (np.cos, np.sin)]
-    return np.column_stack([wave * speed for wave in waves for speed in (v, v * v)])
+    return side_by_side([wave * speed for wave in waves for speed in (v, v * v)])
 
 
 def _speed_of(s: Situation, joint: int) -> Array:
@@ -124,22 +125,22 @@ def _speed(s: Situation, joint: int, other: int, shape: tuple[float, ...]) -> Ar
     x = _speed_of(s, joint) / shape[0]
     centres = (0.0, 0.05, 0.15, 0.35, 0.65, 1.0)
     widths = (0.03, 0.06, 0.1, 0.2, 0.25, 0.3)
-    return np.column_stack([np.exp(-0.5 * ((x - c) / w) ** 2) for c, w in zip(centres, widths, strict=True)])
+    return side_by_side([np.exp(-0.5 * ((x - c) / w) ** 2) for c, w in zip(centres, widths, strict=True)])
 
 
 def _load(s: Situation, joint: int, other: int, shape: tuple[float, ...]) -> Array:
     x = _load_of(s, joint) / shape[0]
-    return np.column_stack([x, np.abs(x), x * np.abs(x), x**2, np.abs(x) ** 3])
+    return side_by_side([x, np.abs(x), x * np.abs(x), x**2, np.abs(x) ** 3])
 
 
 def _torque(s: Situation, joint: int, other: int, shape: tuple[float, ...]) -> Array:
     x = _torque_of(s, joint) / shape[0]
-    return np.column_stack([np.tanh(x / 0.05), np.tanh(x / 0.2), x * np.abs(x), x**3, np.abs(x), x**2])
+    return side_by_side([np.tanh(x / 0.05), np.tanh(x / 0.2), x * np.abs(x), x**3, np.abs(x), x**2])
 
 
 def _acceleration(s: Situation, joint: int, other: int, shape: tuple[float, ...]) -> Array:
     x = _acceleration_of(s, joint) / shape[0]
-    return np.column_stack([np.abs(x), x * np.abs(x), x**3])
+    return side_by_side([np.abs(x), x * np.abs(x), x**3])
 
 
 def _memory(s: Situation, joint: int, other: int, shape: tuple[float, ...]) -> Array:
@@ -159,7 +160,7 @@ def _creep(s: Situation, joint: int, other: int, shape: tuple[float, ...]) -> Ar
 def _hysteresis(s: Situation, joint: int, other: int, shape: tuple[float, ...]) -> Array:
     torque = _torque_of(s, joint) / shape[0]
     rate = np.concatenate([np.gradient(torque[run], s.period) if run.stop - run.start > 1 else [0.0] for run in s.runs])
-    return np.column_stack([bristle(s.t, torque, rate, s.runs, length) for length in STRAINS])
+    return side_by_side([bristle(s.t, torque, rate, s.runs, length) for length in STRAINS])
 
 
 def _supply(s: Situation, joint: int, other: int, shape: tuple[float, ...]) -> Array:
@@ -205,11 +206,11 @@ def _start(s: Situation, joint: int, other: int, shape: tuple[float, ...]) -> Ar
 
 
 def _ringing(s: Situation, joint: int, other: int, shape: tuple[float, ...]) -> Array:
-    sources = np.column_stack([s.rigid[:, joint - 1], s.ddq[:, joint - 1]])
+    sources = side_by_side([s.rigid[:, joint - 1], s.ddq[:, joint - 1]])
     for run in s.runs:
         sources[run] -= sources[run].mean(axis=0)
     place, rate = resonance(s, sources, shape[0])
-    return np.column_stack([place[:, 0], rate[:, 0], place[:, 1], rate[:, 1]])
+    return side_by_side([place[:, 0], rate[:, 0], place[:, 1], rate[:, 1]])
 
 
 def _vibration(s: Situation, joint: int, other: int, shape: tuple[float, ...]) -> Array:
@@ -222,19 +223,19 @@ def _vibration(s: Situation, joint: int, other: int, shape: tuple[float, ...]) -
         pull = np.ones((len(s), 1)) * [1.0, 0.0, 0.0]
     waves = (np.cos(phase), np.sin(phase))
     columns = [wave * pull[:, i % pull.shape[1]] for i in range(3) for wave in waves]
-    return np.column_stack([*columns, *waves])
+    return side_by_side([*columns, *waves])
 
 
 def _sway(s: Situation, joint: int, other: int, shape: tuple[float, ...]) -> Array:
     phase = 2 * np.pi * shape[0] * (s.t - s.origin)
-    return np.column_stack([np.cos(phase), np.sin(phase)])
+    return side_by_side([np.cos(phase), np.sin(phase)])
 
 
 def _turns(s: Situation, joint: int, other: int, shape: tuple[float, ...]) -> Array:
     q, v, a = (x[:, joint - 1] for x in (s.q, s.dq, s.ddq))
     waves = (np.cos(shape[0] * q), np.sin(shape[0] * q))
     # Effect of a periodic position error through stiffness, friction and inertia.
-    return np.column_stack([wave * factor for factor in (np.ones(len(s)), v, v**2, a) for wave in waves])
+    return side_by_side([wave * factor for factor in (np.ones(len(s)), v, v**2, a) for wave in waves])
 
 
 FAMILIES: dict[str, Family] = {

@@ -7,6 +7,7 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
+from robots.common.columns import side_by_side
 from robots.common.plain import percent
 from robots.robot import Robot
 from robots.terms.effect_bases.capabilities import Persistence
@@ -66,7 +67,7 @@ class GainDrift(OverTime):
 
 def half_waves(x: Array, count: int = KNOTS) -> Array:
     """Evaluates the half cosine waves cos(pi k x), k = 1 ... count (N, count), of relative time x (N,) from 0 to 1."""
-    return np.column_stack([np.cos(np.pi * k * x) for k in range(1, count + 1)])
+    return side_by_side([np.cos(np.pi * k * x) for k in range(1, count + 1)])
 
 
 def log_time(situation: Situation) -> Array:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from abc import abstractmethod
+from collections.abc import Sequence
 from dataclasses import replace
 from functools import lru_cache
 from typing import TYPE_CHECKING, NamedTuple
@@ -105,17 +106,11 @@ class StaticJointEffect(StaticEffect, JointEffect):
 
     def local(self, situation: Situation, joint: int, shape: tuple[float, ...] = ()) -> Array:
         """Evaluates `row` on all samples (N, k)."""
-        s, j = situation, joint - 1
-        shapes = np.broadcast_to(np.asarray(shape, dtype=float), (len(s), len(self.shapes)))
-        signals = (np.ascontiguousarray(a[:, j]) for a in (s.q, s.dq, s.ddq, s.rigid, s.load, s.torque, s.sign))
-        return _row_evaluator(self, s.robot, joint)(*signals, shapes)[0][:, 0]
+        return _row_evaluator(self, situation.robot, joint)(situation, joint, shape)[:, 0]
 
     def slopes(self, situation: Situation, joint: int, coefficients: Array, shape: tuple[float, ...]) -> Array:
         """Evaluates the derivatives of the torque (N, 1 + s) by the base model's torque and by each shape value."""
-        s, j = situation, joint - 1
-        shapes, weights = (np.broadcast_to(np.asarray(x, dtype=float), (len(s), len(x))) for x in (shape, coefficients))
-        signals = (np.ascontiguousarray(a[:, j]) for a in (s.q, s.dq, s.ddq, s.rigid, s.load, s.torque, s.sign))
-        return _slope_evaluator(self, s.robot, joint)(*signals, shapes, weights)[0][:, 0]
+        return _slope_evaluator(self, situation.robot, joint)(situation, joint, shape, coefficients)[:, 0]
 
     def undone(
         self, situation: Situation, joint: int, coefficients: Array, shape: tuple[float, ...], reading: Array
@@ -151,19 +146,34 @@ def _evaluator(effect: StaticEffect, robot: Robot, joint: Place) -> BatchFunctio
     return batch_function(effect.function(robot, joint), "vectorised")
 
 
+class _JointFunction:
+    """A function of one joint's signals, of which only those that it needs are read, and of constants."""
+
+    def __init__(self, name: str, at: Instant, result: casadi.SX, *constants: casadi.SX) -> None:
+        self.needed = [k for k in Instant._fields[:-1] if casadi.depends_on(result, getattr(at, k))]
+        signals = [getattr(at, k) for k in self.needed]
+        function = casadi.Function(name, [*signals, at.shape, *constants], [casadi.densify(result)])
+        self.function = batch_function(function, "vectorised")
+
+    def __call__(self, situation: Situation, joint: int, *constants: Sequence[float] | Array) -> Array:
+        """Evaluates all samples (N, r, c)."""
+        signals = (np.ascontiguousarray(getattr(situation, name)[:, joint - 1]) for name in self.needed)
+        spread = (np.broadcast_to(np.asarray(x, dtype=float), (len(situation), len(x))) for x in constants)
+        return self.function(*signals, *spread)[0]
+
+
 @lru_cache(maxsize=512)
 @builds_expressions
-def _row_evaluator(effect: StaticJointEffect, robot: Robot, joint: int) -> BatchFunction:
+def _row_evaluator(effect: StaticJointEffect, robot: Robot, joint: int) -> _JointFunction:
     at = Instant.symbols(1, len(effect.shapes))
-    row = effect.row(robot, joint, at)
-    return batch_function(casadi.Function(effect.name, list(at), [casadi.densify(row)]), "vectorised")
+    return _JointFunction(effect.name, at, effect.row(robot, joint, at))
 
 
 @lru_cache(maxsize=512)
 @builds_expressions
-def _slope_evaluator(effect: StaticJointEffect, robot: Robot, joint: int) -> BatchFunction:
+def _slope_evaluator(effect: StaticJointEffect, robot: Robot, joint: int) -> _JointFunction:
     at = Instant.symbols(1, len(effect.shapes))
     row = effect.row(robot, joint, at)
     weights = casadi.SX.sym("coefficients", row.shape[1])
     slopes = casadi.jacobian(row @ weights, casadi.vertcat(at.torque, at.shape))
-    return batch_function(casadi.Function(effect.name, [*at, weights], [casadi.densify(slopes)]), "vectorised")
+    return _JointFunction(effect.name, at, slopes, weights)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+from bisect import bisect_left
 from itertools import product
 from typing import TYPE_CHECKING, ClassVar
 
@@ -199,6 +201,9 @@ def _lag(t: Array, pushed: Array) -> Array:
     speed = cumulative_trapezoid(pushed, t, initial=0)
     way = cumulative_trapezoid(speed, t, initial=0)
     changes = np.flatnonzero(pushed[:-1] * pushed[1:] < 0) + 1
+    rises = pushed[changes] > 0
+    # Rows from which the load pushes the link off a flank, with a last one that is not there.
+    leaving = {side: [*changes[rises == (side < 0)].tolist(), len(t)] for side in (1.0, -1.0)}
     lag = np.empty(len(t))
     side = 1.0 if np.sum(pushed[: max(len(t) // 100, 1)]) >= 0 else -1.0
     row = settled = 0
@@ -206,24 +211,26 @@ def _lag(t: Array, pushed: Array) -> Array:
         # The link stays until the load pushes it off its flank.
         leaves = row
         if side * pushed[row] >= 0:
-            leaves = next((int(c) for c in changes[np.searchsorted(changes, row) :] if side * pushed[c] < 0), len(t))
+            leaves = leaving[side][bisect_left(leaving[side], row)]
         lag[row:leaves] = side
         if leaves == len(t):
             break
-        begins = t[leaves]
+        begins, v0, x0 = t[leaves], speed[leaves], way[leaves]
         if leaves > settled:
             before, after = pushed[leaves - 1], pushed[leaves]
-            begins = t[leaves - 1] + (t[leaves] - t[leaves - 1]) * before / (before - after)
-        v0, x0 = (float(np.interp(begins, t, values)) for values in (speed, way))
-        last = min(int(np.searchsorted(t, t[leaves] + SLOWEST)), len(t))
+            share = after / (after - before)
+            begins, v0, x0 = (x[leaves] - share * (x[leaves] - x[leaves - 1]) for x in (t, speed, way))
+        last = t.searchsorted(t[leaves] + SLOWEST)
         free = side + way[leaves:last] - x0 - v0 * (t[leaves:last] - begins)
-        outside = np.flatnonzero(np.abs(free) > 1.0)
-        lands = leaves + int(outside[0]) if len(outside) else last
+        outside = np.abs(free) > 1.0
+        first = int(outside.argmax())
+        landed = bool(outside[first])
+        lands = leaves + (first if landed else len(free))
         lag[leaves:lands] = free[: lands - leaves]
         if lands == len(t):
             break
-        side = float(np.sign(free[outside[0]])) if len(outside) else -side
-        row = settled = max(int(np.searchsorted(t, t[lands] + SETTLES)), lands + 1)
+        side = math.copysign(1.0, free[first]) if landed else -side
+        row = settled = max(int(t.searchsorted(t[lands] + SETTLES)), lands + 1)
         lag[lands:row] = side
     return lag
 

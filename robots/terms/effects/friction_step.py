@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
+from robots.common.columns import side_by_side
 from robots.terms.base import force_unit, length_unit
 from robots.terms.effect_bases.base import Coefficient, JointEffect, Place, Situation
 from robots.terms.effect_bases.sudden import Sudden
@@ -34,7 +35,7 @@ class FrictionStep(Sudden, JointEffect):
     def local(self, situation: Situation, joint: int, shape: tuple[float, ...] = ()) -> Array:
         """Evaluates sign(dq) and dq after the change, zero before (N, 2)."""
         after = (situation.t >= shape[0]).astype(float)
-        return np.column_stack([after * situation.sign[:, joint - 1], after * situation.dq[:, joint - 1]])
+        return side_by_side([after * situation.sign[:, joint - 1], after * situation.dq[:, joint - 1]])
 
     def describe(
         self,

@@ -177,9 +177,14 @@ def _stiffness(situation: Situation, joint: int, resonance: float, rotor: float 
 
 def link_inertia(situation: Situation, joint: int, rotor: float = KNOWN) -> Array:
     """Returns a joint's column of the links' inertia matrix (N, n), without described and additional rotor inertia."""
-    column = situation.sensitivity("inertia")[:, :, joint - 1].copy()
+    column = _column(situation, "inertia", joint).copy(order="K")
     column[:, joint - 1] -= situation.rotors[1, joint - 1] + rotor
     return column
+
+
+def _column(situation: Situation, kind: str, joint: int) -> Array:
+    """Returns a joint's column of a sensitivity (N, n), contiguous by joints: many shapes of an effect multiply it."""
+    return situation.cached((kind, joint), lambda: np.asfortranarray(situation.sensitivity(kind)[:, :, joint - 1]))
 
 
 def windup(situation: Situation, joint: int, lag: Array, rate: Array, curve: Array, rotor: float = KNOWN) -> Array:
@@ -196,9 +201,7 @@ def windup(situation: Situation, joint: int, lag: Array, rate: Array, curve: Arr
     Returns:
         Torque change (N, n) [N m or N].
     """
-    j = joint - 1
-    return np.asarray(
-        -situation.sensitivity("position")[:, :, j] * lag[:, None]
-        - situation.sensitivity("velocity")[:, :, j] * rate[:, None]
-        - link_inertia(situation, joint, rotor) * curve[:, None]
-    )
+    total = _column(situation, "position", joint) * lag[:, None]
+    total += _column(situation, "velocity", joint) * rate[:, None]
+    total += link_inertia(situation, joint, rotor) * curve[:, None]
+    return np.negative(total, out=total)

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
+from robots.common.columns import side_by_side
 from robots.terms.base import force_unit, length_unit
 from robots.terms.effect_bases.base import Coefficient, Place, Shape, Situation
 from robots.terms.effect_bases.heat import HeatEffect
@@ -39,7 +40,7 @@ class LoadHeat(HeatEffect):
     def local(self, situation: Situation, joint: int, shape: tuple[float, ...] = ()) -> Array:
         """Evaluates -x sign(dq) and -x dq (N, 2)."""
         x = copper_heat(situation, joint, shape[0])
-        return np.column_stack([-x * situation.sign[:, joint - 1], -x * situation.dq[:, joint - 1]])
+        return side_by_side([-x * situation.sign[:, joint - 1], -x * situation.dq[:, joint - 1]])
 
     def describe(
         self,

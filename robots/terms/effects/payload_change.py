@@ -63,7 +63,9 @@ class PayloadChange(Effect):
 
     def columns(self, situation: Situation, joint: Place, shape: tuple[float, ...] = ()) -> Array:
         """Evaluates the torque of all joints per kg, kg m and kg m2 (N, n, 10)."""
-        return situation.sensitivity("tool") * (situation.t >= shape[0]).astype(float)[:, None, None]
+        # Each column is contiguous in memory: filters read one column at a time.
+        tool = situation.cached("columns of the tool", lambda: np.asfortranarray(situation.sensitivity("tool")))
+        return tool * (situation.t >= shape[0]).astype(float)[:, None, None]
 
     def nearest(self, matrix: Array, target: Array, shape: tuple[float, ...]) -> Array:
         """Finds the best body, or point mass, that was picked up or put down."""

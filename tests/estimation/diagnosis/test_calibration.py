@@ -14,7 +14,6 @@ PACKAGE = Path(estimation.diagnosis.__file__).parent
 # What decides is in these folders. Constants of numerics may stay there: tolerances, sizes of grids, rounds, effort.
 FOLDERS = ("hypothesis_tests", "searches", "validations", "simulations", "results")
 NUMERICS = {
-    "hypotheses.py": {"GLANCE"},
     "joint_shape_refinement.py": {"ROUNDS", "LEAST_GAIN", "FACTORS"},
     "log_noise_levels.py": {"PASSED"},
     "fitted_effects.py": {"ACTS"},

@@ -45,6 +45,37 @@ def test_no_items_give_no_results() -> None:
 
 
 @linux
+def test_large_arrays_come_back_as_they_were() -> None:
+    """Their values, order in memory and type are kept, they can be written to, and empty ones come back too."""
+
+    def arrays(k: int) -> list[np.ndarray]:
+        whole = np.arange(60_000.0).reshape(300, 200) + k
+        return [whole, np.asfortranarray(whole), whole[::2, 3:9], whole.astype(np.float32)[:, :1], whole[:0]]
+
+    for k, found in enumerate(forked(arrays, range(5), chunk=2)):
+        for array, expected in zip(found, arrays(k), strict=True):
+            np.testing.assert_array_equal(array, expected)
+            assert array.dtype == expected.dtype
+            array += 1.0
+        assert found[1].flags.f_contiguous
+
+
+@linux
+@pytest.mark.parametrize(("place", "name"), [(forks.os, "memfd_create"), (forks.mmap, "mmap")])
+def test_large_arrays_come_back_without_shared_memory(
+    place: object, name: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Where the system refuses shared memory, arrays are sent, or threads do the work."""
+
+    def refuse(*_: object, **__: object) -> int:
+        raise OSError("too many open files")
+
+    monkeypatch.setattr(place, name, refuse)
+    results = forked(lambda k: np.full(50_000, float(k)), range(4))
+    assert [float(result[-1]) for result in results] == [0.0, 1.0, 2.0, 3.0]
+
+
+@linux
 def test_an_error_comes_back_as_it_was() -> None:
     def refuse(k: int) -> int:
         if k == 3:

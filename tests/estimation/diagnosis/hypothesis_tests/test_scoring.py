@@ -7,8 +7,8 @@ import pytest
 from scipy.optimize import lsq_linear
 
 from estimation.diagnosis.calibration import MIN_VISIBLE_ENERGY
-from estimation.diagnosis.hypothesis_tests.hypotheses import GLANCE, acting
 from estimation.diagnosis.hypothesis_tests.scoring import Score, visible_root
+from estimation.diagnosis.noise_models.whitening import GLANCE, acting
 
 
 @pytest.mark.parametrize("share", [0.9, 1.01 * MIN_VISIBLE_ENERGY, 0.99 * MIN_VISIBLE_ENERGY, 0.0])
