@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -16,13 +17,14 @@ from estimation.thermal.band import error_band
 from estimation.thermal.expected_rounds import expected_rounds
 from estimation.thermal.information import inverse_of, solve_normal
 from estimation.thermal.results.campaign_estimate import CampaignEstimate
-from estimation.thermal.results.estimate import ThermalEstimate
+from estimation.thermal.results.estimate import ThermalEstimate, searched_parameters, with_errors
 from estimation.thermal.runs.condensed import Condensed, JointSums, condense
 from estimation.thermal.runs.extraction import join_pieces, piece_on_bins, ratio_of
 from estimation.thermal.runs.thermal_run import ThermalRun
 from estimation.thermal.thermal_fit import fit_thermal
 from estimation.thermal.torque import ThermalTorqueModel
 from robots.common.errors import InputError, NotIdentifiableError
+from robots.common.forks import forked
 from robots.common.parallel import one_blas_thread
 from robots.common.progress import SILENT, Progress
 from robots.robot import Robot
@@ -113,17 +115,13 @@ class _AlternatingFit:
         fits: list[ThermalEstimate | None] = [None] * len(self.moves)
         rounds, whole, changes = 0, float(MOST_ROUNDS), list[float]()
         for rounds in range(1, MOST_ROUNDS + 1):
+            starts = 3 if rounds == 1 else 1
+            advance = partial(_advance, bar, rounds, max(whole, rounds))
+            found = self._fit_all({**options, "starts": starts, "bounds": False}, advance)
             change = 0.0
-            for j, sums in enumerate(self.condensed.joints):
-                if not self.moves[j]:
-                    continue
-                runs = self._runs(j, sums)
-                fit = fit_thermal(runs, starts=3 if rounds == 1 else 1, bounds=False, **options)
-                factor = self._factor(fit, runs) / fit.model.beta
+            for j, (fit, factor) in found.items():
                 change = max(change, float(np.abs(factor / self.factors[j] - 1.0).max()))
                 fits[j], self.factors[j] = fit, factor
-                share = (rounds - 1 + (j + 1) / len(self.moves)) / max(whole, rounds)
-                bar.update(2.0 + MOST_ROUNDS * share, f"round {rounds}, joint {j + 1}")
             self._solve_linear()
             changes.append(change)
             whole = expected_rounds(changes, SETTLED, MOST_ROUNDS)
@@ -134,15 +132,13 @@ class _AlternatingFit:
             if change < SETTLED
             else [f"The alternating fit stopped before it converged (last relative change {change:.1e})."]
         )
-        fits = [
-            None if fit is None else fit_thermal(self._runs(j, sums), starts=1, **options)
-            for j, (fit, sums) in enumerate(zip(fits, self.condensed.joints, strict=True))
-        ]
+        for j, (fit, _) in self._fit_all({**options, "starts": 1}).items():
+            fits[j] = fit
         notes += sorted({note for fit in fits if fit is not None for note in fit.notes})
-        notes += self._warm(fits, options)
+        notes += self._warm(options)
         final = [None if fit is None else self._unit(fit) for fit in fits]
         covariance, errors = self._joint_covariance(final)
-        finished = [None if fit is None else _with_errors(fit, errors[j]) for j, fit in enumerate(final)]
+        finished = [None if fit is None else with_errors(fit, errors[j]) for j, fit in enumerate(final)]
         model = replace(self.model, values=self.values, covariance=covariance)
         thermal = tuple(None if fit is None else fit.model for fit in finished)
         residuals = self._residuals()
@@ -161,16 +157,26 @@ class _AlternatingFit:
             notes=tuple(notes),
         )
 
-    def _warm(self, fits: Sequence[ThermalEstimate | None], options: dict[str, Any]) -> list[str]:
+    def _warm(self, options: dict[str, Any]) -> list[str]:
         """Says which joints do not start at ambient temperature although they were taken to."""
         if options["start"] != "ambient":
             return []
-        found = []
-        for j, (sums, fit) in enumerate(zip(self.condensed.joints, fits, strict=True)):
-            if fit is not None:
-                tried = fit_thermal(self._runs(j, sums), starts=1, bounds=False, **{**options, "start": "auto"})
-                found += [note for note in tried.notes if "does not start at ambient temperature" in note]
-        return found
+        tried = self._fit_all({**options, "start": "auto", "starts": 1, "bounds": False})
+        notes = [note for fit, _ in tried.values() for note in fit.notes]
+        return [note for note in notes if "does not start at ambient temperature" in note]
+
+    def _fit_all(
+        self, options: dict[str, Any], advance: Callable[[float], None] = lambda share: None
+    ) -> dict[int, tuple[ThermalEstimate, Array]]:
+        """Fits the heat of each joint that moves, several joints at once: estimates and friction factors (B,)."""
+        joints = [j for j, moves in enumerate(self.moves) if moves]
+
+        def fitted(j: int) -> tuple[ThermalEstimate, Array]:
+            runs = self._runs(j, self.condensed.joints[j])
+            fit = fit_thermal(runs, **options)
+            return fit, self._factor(fit, runs) / fit.model.beta
+
+        return dict(zip(joints, forked(fitted, joints, advance, threads=False), strict=True))
 
     def _solve_linear(self) -> None:
         for _ in range(2):
@@ -241,7 +247,7 @@ class _AlternatingFit:
     def _joint_covariance(self, fits: Sequence[ThermalEstimate | None]) -> tuple[Array, list[dict[str, float]]]:
         """Covariance of the linear parameters, and standard errors of the thermal ones, none held fixed."""
         size = len(self.values)
-        names = [[] if fit is None else _searched(fit) for fit in fits]
+        names = [[] if fit is None else searched_parameters(fit) for fit in fits]
         offsets = size + np.concatenate([[0], np.cumsum([len(own) for own in names])]).astype(int)
         information = np.zeros((int(offsets[-1]),) * 2)
         for j, (sums, factor, fit) in enumerate(zip(self.condensed.joints, self.factors, fits, strict=True)):
@@ -287,14 +293,5 @@ class _AlternatingFit:
         return np.stack(columns, axis=1) if columns else np.zeros((len(self.factors[j]), 0))
 
 
-def _searched(fit: ThermalEstimate) -> list[str]:
-    """Parameters that were searched and have both sides to move to; beta is the scale of the friction itself."""
-    return [q.name for q in fit.parameters if np.isfinite(q.standard_error) and q.value != 0.0 and q.name != "beta"]
-
-
-def _with_errors(fit: ThermalEstimate, errors: Mapping[str, float]) -> ThermalEstimate:
-    parameters = tuple(
-        replace(q, standard_error=max(q.standard_error, errors[q.name])) if q.name in errors else q
-        for q in fit.parameters
-    )
-    return replace(fit, parameters=parameters)
+def _advance(bar: Progress, rounds: int, whole: float, share: float) -> None:
+    bar.update(2.0 + MOST_ROUNDS * (rounds - 1 + share) / whole, f"round {rounds}")

@@ -40,6 +40,7 @@ def forked(
     advance: Callable[[float], None] = lambda share: None,
     *,
     chunk: int = 1,
+    threads: bool = True,
 ) -> list[Result]:
     """Applies a function to every item in forked processes, one per core, and returns the results in order.
 
@@ -52,6 +53,7 @@ def forked(
         items: the items.
         advance: is called with the share of the items that are done.
         chunk: number of items that a process takes at once: more for items that are done in milliseconds.
+        threads: whether the function may run in several threads; IPOPT may not.
 
     Returns:
         One result per item, in order.
@@ -65,7 +67,7 @@ def forked(
         except BrokenProcessPool:
             pass
     results = []
-    for result in threaded(function, work):
+    for result in threaded(function, work) if threads else map(function, work):
         results.append(result)
         if len(results) % OFTEN == 0:
             give_back()

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass, field, replace
 from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -224,6 +224,20 @@ class ThermalEstimate:
         """
         text = json.dumps(self.to_dict(), indent=2, allow_nan=False) + "\n"
         write_atomic(Path(folder) / THERMAL, text, force=force)
+
+
+def searched_parameters(fit: ThermalEstimate) -> list[str]:
+    """Parameters that were searched and have both sides to move to; beta is the scale of the friction itself."""
+    return [q.name for q in fit.parameters if np.isfinite(q.standard_error) and q.value != 0.0 and q.name != "beta"]
+
+
+def with_errors(fit: ThermalEstimate, errors: Mapping[str, float]) -> ThermalEstimate:
+    """Raises standard errors to at least those of a joint fit, by name."""
+    parameters = tuple(
+        replace(q, standard_error=max(q.standard_error, errors[q.name])) if q.name in errors else q
+        for q in fit.parameters
+    )
+    return replace(fit, parameters=parameters)
 
 
 def load_thermal_model(path: str | PathLike[str]) -> ThermalModel:
