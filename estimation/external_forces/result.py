@@ -98,7 +98,7 @@ class ForceEstimate:
             parts = ", ".join(f"{value:.3g}" for value in contact.force)
             where = contact.place.text(self.joint_names)
             lines.append(
-                f"  {contact.start:9.4g}  {contact.end - contact.start:12.3g}  {size:>26}  {parts:22}  {where}"
+                f"  {contact.start:9.2f}  {contact.end - contact.start:12.3g}  {size:>26}  {parts:22}  {where}"
             )
         if count:
             lines.append("  in parentheses: 95 % interval, by noise and the model's error")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -221,6 +222,10 @@ class Evaluation:
                 else:
                     kept.append(force)
             self.forces = kept
+
+    def unsettled(self, logs: Sequence[str]) -> tuple[Finding, ...]:
+        """Short forces in the newest windows: later ones show whether a lasting change began with them."""
+        return tuple(replace(contact_finding(force, logs), settled=False) for force in self.forces)
 
     def conclude(self, logs: Sequence[str]) -> None:
         """Ends the confirmation of an alarm: names what changed, takes it as the new level, and goes on."""

@@ -46,5 +46,5 @@ def contact_finding(force: tuple[float, float, int, int, float], logs: Sequence[
         detected=at,
         sigmas=0.0,
         log=logs[log],
-        text=f", felt by the joints up to {link}" if link else "",
+        text=f" (felt in the torque of joint {link} and below)" if link else "",
     )

@@ -110,7 +110,9 @@ class Finding:
         text = where + (what if where else what[0].upper() + what[1:])
         if self.from_start:
             return f"{text}. The first log already differs from the model."
-        return f"{text}. Since {self.date(origin)}."
+        since = "At" if self.kind == "contact" else "Since"
+        log = f", found in {self.log}" if self.log else ""
+        return f"{text}. {since} {self.date(origin)}{log}."
 
     def date(self, origin: float) -> str:
         """The interval of the date in words."""

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from scipy.stats import chi2
 
 from estimation.monitoring.control_charts.change_fit import StepFit
-from estimation.monitoring.control_charts.quantities import Quantity, start_limit
+from estimation.monitoring.control_charts.quantities import PAUSE, Quantity, start_limit
 from estimation.monitoring.findings import NORMAL_95, Finding, Kind, relative
 from estimation.monitoring.windows.baseline import PAYLOAD
 
@@ -35,6 +35,7 @@ class Change:
         latest: of the date [s].
         first: whether the step begins with the first of all windows.
         window: index of the first changed window among the quantity's samples.
+        begins: whether a recording begins with this window.
     """
 
     quantity: Quantity
@@ -45,6 +46,7 @@ class Change:
     latest: float
     first: bool
     window: int
+    begins: bool
 
     @property
     def sigmas(self) -> float:
@@ -112,6 +114,7 @@ def _change(q: Quantity, fit: StepFit, k: int, begin: float) -> Change:
         latest=q.samples[last].end,
         first=k == 0 and q.is_whole(begin),
         window=k,
+        begins=k == 0 or q.samples[k].start - q.samples[k - 1].end > PAUSE,
     )
 
 
@@ -136,7 +139,8 @@ def name_changes(
         for group in ("friction", "offset", "payload", "common", "residual")
     }
     # One cause damages one joint or two; what all joints share is taken out before.
-    grown = [c for c in by_group["residual"] if c.size > 0]
+    # A log of another robot differs from its first window on, a push does not.
+    grown = [c for c in by_group["residual"] if c.size > 0 and c.begins]
     if max(len(by_group["friction"]), len(grown)) >= max(3, joints / 2):
         worst = max(changes, key=lambda c: c.gain)
         text = f": {len(changes)} quantities differ from the model at once"
@@ -156,7 +160,8 @@ def name_changes(
         values = relative(c.size, c.error) if common_unit == "%" else _interval(c)
         found.append(_finding(c, "heat", None, values, common_unit, detected, log))
     if not found:
-        for c in by_group["residual"]:
+        # A residual that falls needs no attention.
+        for c in (c for c in by_group["residual"] if c.size > 0):
             share = relative(c.size, c.error)[0]
             text = f" (RMS {share:+.0f} %)"
             found.append(

@@ -76,7 +76,7 @@ class MonitorResult:
             joint_names=robot.joint_names,
             heat=evaluation.heat.kind,
             false_alarm_hours=monitor.settings.false_alarm_hours,
-            findings=monitor.findings,
+            findings=(*monitor.findings, *evaluation.unsettled(monitor.logs)),
             logs=tuple(monitor.rows),
             notes=tuple(notes),
             history=history,

@@ -35,6 +35,10 @@ SHOWABLE = ("mass", *(f"centre_{axis}" for axis in AXES))
 # A parameter is in the torques of a robot if its unit vector lies in the space of those that are, but for this part.
 SHOWN = 1e-6
 
+LONGER = (
+    "record a longer log, or a heavier payload; if the arm warmed up between both logs, give --model, not --without"
+)
+
 
 def determined(found: Sequence[Quantity]) -> tuple[bool, ...]:
     """Finds which quantities of a payload a log determines by itself."""
@@ -76,14 +80,14 @@ def require_determined(found: Sequence[Quantity], robot: Robot, q: ArrayLike, gr
             missing = f"no motion of {robot.name} shows the mass of a payload"
         raise NotIdentifiableError(
             f"the log does not determine the payload's mass: {shown}",
-            remedy=missing or "check that the payload was on the flange; record a longer log, or a heavier payload",
+            remedy=missing or f"check that the payload was on the flange; {LONGER}",
         )
     axes = [name[-1] for name in open_ if name not in never]
     if axes:
         raise NotIdentifiableError(
             f"the log does not determine the payload's centre of mass along {', '.join(axes)} of the flange (the mass "
             f"is {shown})",
-            remedy=missing or "record a longer log, or a heavier payload",
+            remedy=missing or LONGER,
         )
 
 

@@ -55,7 +55,7 @@ def fleet(
     """Monitors many robots of one type, and lists them, worst first.
 
     Writes fleet.json, fleet.csv and report.html. Finished robots are kept in the folder robots: a run that was stopped
-    goes on from there, and a later run takes in new logs only.
+    goes on from there, and a later run, with --force, takes in new logs only.
     """
     console = Console(json=json, quiet=quiet)
     with console.working(f"finished robots are kept in {out / 'robots'}, and the same command goes on") as progress:

@@ -145,3 +145,34 @@ def test_result_is_saved_whole(arm, monitor, tmp_path):
     assert len(lines) == 1 + 3 * 6
     with pytest.raises(InputError, match=r"exists|already"):
         result.save(tmp_path)
+
+
+@pytest.mark.slow
+def test_a_contact_in_the_newest_log_is_watched_at_once(arm, monitor):
+    """A push near the end of the last log makes the light amber, before later windows can confirm it."""
+
+    def push(t, index):
+        s = np.clip((t - 350.2) / 0.5, 0.0, 1.0)
+        return np.sin(np.pi * s)[:, None] * np.array([0, 15.0, 10.0, 0, 3.0, 0])
+
+    logs = [arm.log(300.0 * k, 60.0, extra=push, name=f"log {k}") for k in range(3)]
+    first = monitor_logs(monitor, logs[:2])
+    assert [(f.kind, f.settled) for f in first.findings] == [("contact", False)]
+    assert first.light == "amber"
+    assert "found in log 1" in first.verdict()
+    later = monitor_logs(monitor, logs)
+    assert [(f.kind, f.settled) for f in later.findings] == [("contact", True)]
+
+
+@pytest.mark.slow
+def test_pushes_do_not_make_a_log_foreign(arm, monitor):
+    """Two strong pushes 15 s apart are no other robot: the log is used, and a contact is named."""
+
+    def push(t, index):
+        pulses = [np.sin(np.pi * np.clip((t - at) / 0.5, 0.0, 1.0)) for at in (325.2, 340.2)]
+        return sum(pulses)[:, None] * np.array([4.0, 40.0, 25.0, 3.0, 6.0, 1.0])
+
+    logs = [arm.log(300.0 * k, 60.0, extra=push, name=f"log {k}") for k in range(3)]
+    result = monitor_logs(monitor, logs)
+    assert all(row.used for row in result.logs)
+    assert "contact" in {f.kind for f in result.findings}
