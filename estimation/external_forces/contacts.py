@@ -13,6 +13,7 @@ from estimation.external_forces.residuals.signals import Signals
 from estimation.external_forces.thresholds.calibrations import Calibration
 from estimation.external_forces.thresholds.observations import Observed
 from estimation.external_forces.wrenches import tool_load
+from estimation.identifications.transfer import NORMAL_95
 from robots.common.plain import all_finite, finite
 from robots.common.stretches import joined_spans
 from robots.geometry.chain import Chain
@@ -21,8 +22,6 @@ Array = NDArray[np.float64]
 
 # Samples that stand for a longer contact where its first and last moment are sought.
 MOST_ROWS = 400
-# Half-width of a normal distribution's 95 % interval.
-NORMAL_95 = 1.96
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from scipy.stats import chi2
 
 from estimation.monitoring.control_charts.change_fit import StepFit
-from estimation.monitoring.control_charts.quantities import PAUSE, Quantity, start_limit
+from estimation.monitoring.control_charts.quantities import Quantity, start_limit
 from estimation.monitoring.findings import NORMAL_95, Finding, Kind, relative
 from estimation.monitoring.windows.baseline import PAYLOAD
 
@@ -114,7 +114,7 @@ def _change(q: Quantity, fit: StepFit, k: int, begin: float) -> Change:
         latest=q.samples[last].end,
         first=k == 0 and q.is_whole(begin),
         window=k,
-        begins=k == 0 or q.samples[k].start - q.samples[k - 1].end > PAUSE,
+        begins=k == 0 or k in q.after_pauses(),
     )
 
 

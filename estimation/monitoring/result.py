@@ -87,8 +87,13 @@ class MonitorResult:
     @property
     def severity(self) -> Severity:
         """The most urgent finding's; a last log that does not fit is to be watched."""
-        undecided: list[Severity] = ["watch"] if any(row.undecided for row in self.logs) else []
+        undecided: list[Severity] = ["watch"] if self.undecided else []
         return worst([*(f.severity for f in self.findings), *undecided])
+
+    @property
+    def undecided(self) -> str:
+        """Name of a last log that does not fit the model; empty without one."""
+        return next((row.name for row in self.logs if row.undecided), "")
 
     @property
     def light(self) -> str:
@@ -116,12 +121,17 @@ class MonitorResult:
 
     def sentence(self) -> str:
         """Says what the headline is."""
-        undecided = next((row.name for row in self.logs if row.undecided), None)
         if self.headline is not None:
             return self.headline.sentence(self.origin)
-        if undecided is not None:
-            return f"Log {undecided} {UNFIT}. The next log shows which."
+        if self.undecided:
+            return f"Log {self.undecided} {UNFIT}. The next log shows which."
         return "No change beyond what temperature explains."
+
+    def advice(self) -> str:
+        """Says what to do next; empty where nothing is to be done."""
+        if self.headline is not None:
+            return self.headline.advice()
+        return "Check which robot this log belongs to." if self.undecided else ""
 
     def verdict(self) -> str:
         """Says in some sentences what was found, and how much temperature explains."""

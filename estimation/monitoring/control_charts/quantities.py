@@ -97,12 +97,16 @@ class Quantity:
         It finds what charts of single windows absorb: a change in a long pause, before which nothing is remembered but
         the level. Tests at one window after another are correlated, so alarms are rarer than stated.
         """
-        starts = np.array([s.start for s in self.samples])
-        ends = np.array([s.end for s in self.samples])
-        begins = 1 + np.flatnonzero(starts[1:] - ends[:-1] > PAUSE)
+        begins = self.after_pauses()
         if not len(begins):
             return False
         return bool(self.steps(begins).exceeding(self.margin).max() > chi2.isf(1.0 / self.chart.run_length, 1))
+
+    def after_pauses(self) -> NDArray[np.intp]:
+        """Indices of the samples that follow a pause."""
+        starts = np.array([s.start for s in self.samples])
+        ends = np.array([s.end for s in self.samples])
+        return 1 + np.flatnonzero(starts[1:] - ends[:-1] > PAUSE)
 
     def differs_from_start(self, first: float, limit: float) -> bool:
         """Tests whether all windows so far differ from the prior level, which is that of the model.

@@ -74,7 +74,7 @@ class RobotRow:
             name=name,
             light=result.light,
             text=result.sentence(),
-            advice=worst.advice() if worst else "" if result.light == "green" else "Check of which robot this log is.",
+            advice=result.advice(),
             since=when(worst.earliest, result.origin) if worst else "",
             logs=result.logs,
             findings=result.findings,

@@ -147,7 +147,7 @@ def _evaluator(effect: StaticEffect, robot: Robot, joint: Place) -> BatchFunctio
 
 
 class _JointFunction:
-    """A function of one joint's signals, of which only those that it needs are read, and of constants."""
+    """A function of one joint's signals and of constants. Only the signals that it needs are read."""
 
     def __init__(self, name: str, at: Instant, result: casadi.SX, *constants: casadi.SX) -> None:
         self.needed = [k for k in Instant._fields[:-1] if casadi.depends_on(result, getattr(at, k))]

@@ -57,8 +57,8 @@ def test_variances_and_correlation_are_recovered(exact):
 def test_what_healthy_logs_show_of_the_parameters_errors_is_recovered(exact):
     """Where the residual grows with the parameters' variance, leverage is by how much, and the level stays as it is.
 
-    A tenth of 20,000 rows has the larger variance: the mean of 2000 squares scatters by 3 %, of which the level takes
-    a part.
+    A tenth of 20,000 rows has the larger variance: the mean of 2000 squares scatters by 3 %. The level
+    takes a part of it.
     """
     model, truth, residual, dq, friction, variance = samples(exact, beyond=0.25)
     counts = np.ones(len(dq), dtype=bool)
