@@ -29,8 +29,8 @@ os.environ.setdefault("OMP_NUM_THREADS", "1")
 sys.path.insert(0, str(Path(__file__).parents[1]))
 
 import numpy as np
-from scipy.stats import beta
 
+from benchmarks.monitoring_parts.tables import print_table
 from benchmarks.monitoring_parts.virtual_robot import DAY, Cause, VirtualRobot
 from estimation import fit_campaign, identify
 from estimation.models.model import model_from_dict
@@ -316,70 +316,6 @@ def run(folder: Path, study: str, count: int) -> None:
         print(f"{study} {number}: {row['seconds']:.0f} s", flush=True)
 
 
-def table(folder: Path) -> None:
-    """Prints the figures of all rows."""
-    for study in ("thesis", "night", "start", "healthy", "weeks", "speed"):
-        file = folder / f"{study}.jsonl"
-        rows = [json.loads(line) for line in file.read_text().splitlines()] if file.exists() else []
-        if not rows:
-            continue
-        print(f"{study}: {len(rows)} rows")
-        for name in VARIANTS:
-            found = [row[name] for row in rows if name in row]
-            if not found:
-                continue
-            if study in ("thesis", "night"):
-                seen = [f for f in found if f["delay"] is not None]
-                good = [
-                    f
-                    for f in seen
-                    if f["delay"] <= CYCLE
-                    and f["dated"]
-                    and (f["width"] <= CYCLE or study == "night")
-                    and abs(f["size"] - 100 * DAMAGE) <= 5
-                ]
-                clean = sum(not f["false"] for f in found)
-                print(
-                    f"  {name:14} named in {len(seen)} of {len(found)}; within 5 min, dated within it, size within 5 "
-                    f"points: {len(good)}; without any other finding: {clean}; sizes "
-                    f"{_range([f['size'] for f in seen])} %; delays {_range([f['delay'] for f in seen])} s; intervals "
-                    f"hold 32 %: {sum(bool(f['covered']) for f in seen)}; heat {_range([f['heat'] for f in found])} %"
-                )
-            elif study == "start":
-                ill = [row[name] for row in rows if row["damaged"]]
-                well = [row[name] for row in rows if not row["damaged"]]
-                held = [held for f in ill for held in f["covered"]]
-                print(
-                    f"  {name:14} damaged: found in {sum(f['found'] for f in ill)} of {len(ill)}, intervals hold "
-                    f"30 % in {sum(held)} of {len(held)}; healthy: red {sum(f['act'] > 0 for f in well)}, amber "
-                    f"{sum(bool(f['false']) and not f['act'] for f in well)} of {len(well)}; beside a damage: "
-                    f"{sum(len(f['false']) for f in ill)} other findings"
-                )
-            elif study == "healthy":
-                hours, motion = sum(row["hours"] for row in rows), sum(row["motion"] for row in rows)
-                print(f"  {name:14} {sum(map(len, found))} false alarms in {hours:.0f} h, {motion:.1f} h of it logged")
-            elif study == "weeks":
-                right = sum(f["right"] for f in found)
-                low, high = beta.ppf([0.025, 0.975], [right, right + 1], [len(found) - right + 1, len(found) - right])
-                by = {row["kind"]: [0, 0] for row in rows}
-                for row in rows:
-                    by[row["kind"]][0] += row[name]["right"]
-                    by[row["kind"]][1] += 1
-                sizes = np.array([s for f in found for s in f["sizes"]])
-                held = np.mean((sizes[:, 2] <= sizes[:, 1]) & (sizes[:, 1] <= sizes[:, 3])) if len(sizes) else np.nan
-                print(
-                    f"  {name:14} kind and joint right in {right} of {len(found)} ({100 * low:.0f} to {100 * high:.0f} "
-                    f"%); intervals of sizes hold the truth in {100 * held:.0f} % of {len(sizes)}; "
-                    + ", ".join(f"{kind} {a}/{b}" for kind, (a, b) in sorted(by.items()))
-                )
-            else:
-                print(f"  {name:14} {np.median(found):.0f} times real time")
-
-
-def _range(values: Sequence[float]) -> str:
-    return f"{min(values):.3g} to {max(values):.3g}" if values else "none"
-
-
 def main() -> int:
     warnings.simplefilter("ignore")
     if len(sys.argv) < 2:
@@ -389,7 +325,7 @@ def main() -> int:
     folder.mkdir(parents=True, exist_ok=True)
     counts = {"thesis": 6, "night": 6, "start": 100, "healthy": 1, "weeks": 200, "speed": 1}
     if study == "table":
-        table(folder)
+        print_table(folder, list(VARIANTS), cycle=CYCLE, damage=DAMAGE)
         return 0
     if study not in counts:
         print(f"unknown study {study}; one of {', '.join(counts)}, table")
