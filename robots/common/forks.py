@@ -3,15 +3,12 @@
 from __future__ import annotations
 
 import gc
-import mmap
 import multiprocessing
-import os
-import pickle
 import sys
 from collections.abc import Callable, Iterable, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
-from itertools import accumulate, count, repeat
+from itertools import count, repeat
 from typing import Any, TypeVar
 
 from robots.common.memory import give_back
@@ -23,13 +20,6 @@ Result = TypeVar("Result")
 OFTEN = 20
 """Items after which a process returns freed memory to the system."""
 
-SMALL = 1 << 16
-"""Size of arrays [bytes] below which results are sent as they are, not in shared memory."""
-
-ALIGNED = 64
-"""Arrays begin at multiples of this many bytes."""
-
-_Parcel = tuple[bytes, tuple[int, ...], str]
 _work: dict[int, tuple[Callable[[Any], Any], Sequence[Any]]] = {}
 _numbers = count()
 
@@ -89,8 +79,8 @@ def _in_forks(
     pool = ProcessPoolExecutor(cores, mp_context=multiprocessing.get_context("fork"), initializer=start_worker)
     try:
         results: list[Result] = []
-        for parcel in pool.map(_apply, repeat(number), range(0, len(work), chunk), repeat(chunk)):
-            results += _unpacked(*parcel)
+        for some in pool.map(_apply, repeat(number), range(0, len(work), chunk), repeat(chunk)):
+            results += some
             advance(len(results) / len(work))
         return results
     finally:
@@ -99,50 +89,9 @@ def _in_forks(
         del _work[number]
 
 
-def _apply(number: int, start: int, chunk: int) -> _Parcel:
+def _apply(number: int, start: int, chunk: int) -> list[Any]:
     function, work = _work[number]
     results = [function(item) for item in work[start : start + chunk]]
     if start % OFTEN < chunk:
         give_back()
-    return _packed(results)
-
-
-def _packed(results: list[Any]) -> _Parcel:
-    """Pickles results and puts their arrays into memory that the parent maps: a pipe would copy them five times.
-
-    Returns:
-        The pickle, the sizes of the arrays [bytes], and the path of the memory; empty if it is sent with the pickle.
-    """
-    buffers: list[pickle.PickleBuffer] = []
-    head = pickle.dumps(results, protocol=5, buffer_callback=buffers.append)
-    arrays = [buffer.raw() for buffer in buffers]
-    sizes = tuple(array.nbytes for array in arrays)
-    if sum(sizes) < SMALL:
-        return pickle.dumps(results, protocol=5), (), ""
-    try:
-        # It stays open until this process ends; the parent has mapped it by then.
-        descriptor = os.memfd_create("results")
-    except OSError:
-        return pickle.dumps(results, protocol=5), (), ""
-    with open(descriptor, "wb", closefd=False) as file:
-        for array in arrays:
-            file.write(array)
-            file.write(bytes(-array.nbytes % ALIGNED))
-    return head, sizes, f"/proc/{os.getpid()}/fd/{descriptor}"
-
-
-def _unpacked(head: bytes, sizes: tuple[int, ...], path: str) -> list[Any]:
-    """Takes results whose arrays stay where `_packed` put them.
-
-    Raises:
-        BrokenProcessPool: too many files are open, or other processes are hidden.
-    """
-    if not path:
-        return list(pickle.loads(head))
-    try:
-        with open(path, "r+b") as file:
-            memory = memoryview(mmap.mmap(file.fileno(), 0))
-    except OSError as error:
-        raise BrokenProcessPool("the results of a process cannot be mapped") from error
-    starts = accumulate((size + -size % ALIGNED for size in sizes), initial=0)
-    return list(pickle.loads(head, buffers=[memory[at : at + size] for at, size in zip(starts, sizes, strict=False)]))
+    return results

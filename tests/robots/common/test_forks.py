@@ -61,21 +61,6 @@ def test_large_arrays_come_back_as_they_were() -> None:
 
 
 @linux
-@pytest.mark.parametrize(("place", "name"), [(forks.os, "memfd_create"), (forks.mmap, "mmap")])
-def test_large_arrays_come_back_without_shared_memory(
-    place: object, name: str, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """Where the system refuses shared memory, arrays are sent, or threads do the work."""
-
-    def refuse(*_: object, **__: object) -> int:
-        raise OSError("too many open files")
-
-    monkeypatch.setattr(place, name, refuse)
-    results = forked(lambda k: np.full(50_000, float(k)), range(4))
-    assert [float(result[-1]) for result in results] == [0.0, 1.0, 2.0, 3.0]
-
-
-@linux
 def test_an_error_comes_back_as_it_was() -> None:
     def refuse(k: int) -> int:
         if k == 3:
