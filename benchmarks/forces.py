@@ -132,12 +132,12 @@ def thermal_of(model: Model, plant: Plant, log: Log, rng: np.random.Generator) -
     return replace(cold, thermal=tuple(replace(m, reference=float(T)) for m, T in zip(models, warm, strict=True) if m))
 
 
-def predictor_of(model: Model, thermal: ThermalTorqueModel | None, before: list[Log]) -> Predictor:
+def predictor_of(thermal: ThermalTorqueModel | None, before: list[Log]) -> Predictor:
     """Predicts with heat, from what the robot did before a log."""
     if thermal is None:
-        return lambda log: predict(model, log)
+        return predict
 
-    def run(log: Log) -> Any:
+    def run(model: Model, log: Log) -> Any:
         earlier = [own for own in before if own.t[-1] < log.t[0]]
         return predict(model, log, thermal=thermal, start=start_temperatures(thermal, earlier, float(log.t[0])))
 
@@ -164,7 +164,7 @@ def run_seed(seed: int) -> dict[str, Any]:
     model = identify(robot, first).model
     row: dict[str, Any] = {"seed": seed, "friction_left": float(np.mean(factor[1] / factor[0]))}
     for name, thermal in (("heat", thermal_of(model, plant, first, rng)), ("none", None)):
-        predictor = predictor_of(model, thermal, [first, healthy, test])
+        predictor = predictor_of(thermal, [first, healthy, test])
         try:
             found = estimate_forces(model, touched, healthy=[healthy], predictor=predictor)
             alone = estimate_forces(model, free, calibration=found.calibration, predictor=predictor)

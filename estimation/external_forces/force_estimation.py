@@ -19,6 +19,7 @@ from estimation.external_forces.thresholds.observations import Observed, observe
 from estimation.external_forces.wrenches import tool_load
 from estimation.logs.provenance import are_same_log, describe_logs
 from estimation.models.model import Model
+from estimation.predictions.checked_motions import smoothed_at_least
 from estimation.predictions.prediction import Prediction, predict
 from robots.common.errors import InputError
 from robots.common.progress import SILENT, Progress
@@ -28,7 +29,13 @@ from robots.terms.situations.flange_body import require_flange
 BANDWIDTH = 4.0
 """Default bandwidth of the observer [Hz]: a push of 0.2 s is five of its time constants."""
 
-Predictor = Callable[[Log], Prediction]
+SHARPNESS = 5.0
+"""Least cut-off of the positions' smoothing over the observer's bandwidth: what it smears must be short for the observer.
+
+Noise of the positions above the bandwidth does not pass the observer, so that a higher cut-off costs nothing.
+"""
+
+Predictor = Callable[[Model, Log], Prediction]
 
 
 def estimate_forces(
@@ -56,8 +63,8 @@ def estimate_forces(
         bandwidth: of the observer [Hz].
         tool: position (3,) of the tool point in the flange's frame [m]; the flange by default.
         velocity: ``smoothed``, from smoothed positions, or ``logged``, the log's columns dq1..
-        predictor: predicts the torques of a log; `predict` with this model by default. One with heat is
-            ``lambda log: predict(model, log, thermal=...)``.
+        predictor: predicts the torques of a log by the model that it is given, whose smoothing suits the observer;
+            `predict` by default. One with heat is ``lambda model, log: predict(model, log, thermal=...)``.
         progress: receives the progress.
 
     Returns:
@@ -76,13 +83,14 @@ def estimate_forces(
         raise InputError(f"a bandwidth of {bandwidth} Hz", allowed="a positive number")
     if calibration is not None:
         bandwidth, velocity = calibration.bandwidth, calibration.velocity
-    run, bar = predictor or (lambda own: predict(model, own)), progress or SILENT
+    model = smoothed_at_least(model, SHARPNESS * bandwidth)
+    run, bar = predictor or predict, progress or SILENT
     bar.start("external forces", float(len(healthy) + 1))
     warnings: list[str] = []
 
     def prepared(own: Log, done: int) -> tuple[Signals, Callable[[Signals], str | None]]:
         bar.update(float(done), own.name)
-        prediction = run(own)
+        prediction = run(model, own)
         if prediction.measured is None:
             raise InputError("the log has no torque", file=own.metadata.get("file"), remedy="record tau1.. or i1..")
         dynamics = dynamics_of(model, gravity=own.gravity, payload=own.payload, tool=tool)

@@ -19,6 +19,8 @@ from robots.common.errors import AssumedValueWarning
 from robots.robot import Robot
 from robots.signals import Log
 
+# Cut-off [Hz] of a model that states none.
+CUTOFF = 10.0
 JOINED = ("t", "q", "tau", "current", "ambient", "temperature")
 
 
@@ -76,6 +78,17 @@ def smoother_of(model: Model, cutoff: float) -> Smoother:
     smoothing = model.provenance.get("smoothing")
     kind = smoothing.get("kind") if isinstance(smoothing, Mapping) else None
     return SmoothingSpline(cutoff) if kind == SmoothingSpline.name else LowPass(cutoff)
+
+
+def smoothed_at_least(model: Model, cutoff: float) -> Model:
+    """Gives the model with its cut-off for other motions raised to one [Hz], if it is lower.
+
+    The fit takes the lowest cut-off that its motions allow. Motions with stops need a higher one: a low-pass rings at a
+    stop, and the sign of the friction follows the ringing.
+    """
+    if float(model.provenance.get("cutoff_hz", CUTOFF)) >= cutoff:
+        return model
+    return replace(model, provenance={**model.provenance, "cutoff_hz": cutoff})
 
 
 def note_meaning(model: Model, log: Log) -> None:

@@ -81,6 +81,7 @@ def force(
         from estimation import load_model, predict, read_logs
         from estimation.external_forces import estimate_forces
         from estimation.external_forces.online.c_export import observer_code
+        from estimation.models.model import Model
         from estimation.predictions.prediction import Prediction, clock_shift
         from oed.reports import save_force_report
         from oed.reports.rendering.provenance import recordings_from
@@ -103,13 +104,13 @@ def force(
         _, (recorded, *normal) = with_torque_meaning(robot, with_known_setup(read, payload, gravity), torque_is)
         assumed = ""
 
-        def predicted(own: Log) -> Prediction:
+        def predicted(sharp: Model, own: Log) -> Prediction:
             nonlocal assumed
             later, clock = clock_shift(identified, own)
             heat = heat_of(model, identified, own, before or [], ambient, mapping, later)
             if own is recorded:
                 assumed = "\n".join(words for words in (heat.assumed, clock) if words)
-            return predict(identified, own, later=later, **heat.options)
+            return predict(sharp, own, later=later, **heat.options)
 
         result = estimate_forces(
             identified,
