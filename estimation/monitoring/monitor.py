@@ -18,6 +18,7 @@ from estimation.monitoring.findings import Finding
 from estimation.monitoring.log_row import LogRow
 from estimation.monitoring.settings import MonitorSettings
 from estimation.monitoring.windows.baseline import Baseline, baseline_of
+from estimation.monitoring.windows.projection import SLOWEST
 from estimation.monitoring.windows.stream_windows import StreamWindows
 from estimation.monitoring.windows.window_rows import settling
 from robots.common.errors import InputError
@@ -49,7 +50,8 @@ class Monitor:
         self.baseline = baseline
         self.settings = settings or MonitorSettings()
         n = baseline.robot.n
-        self._windows = StreamWindows(self.settings.window, settling(baseline.cutoff), 2 + 3 * n)
+        slowest = SLOWEST * np.where(np.isfinite(baseline.speeds), baseline.speeds, 0.0)
+        self._windows = StreamWindows(self.settings.window, settling(baseline.cutoff), 2 + 3 * n, slowest)
         self._evaluation: Evaluation | None = None
         self.logs: list[str] = []
         # Stored logs that it has decided on; those that were used in the order of `logs`.

@@ -16,19 +16,26 @@ Array = NDArray[np.float64]
 PAUSE_STEPS, PAUSE_SECONDS = 20.0, 0.5
 # The last part of a recording counts from this share of a window on, and with so many rows.
 SHORTEST, FEWEST = 0.3, 50
+# A window with rests ends after so many times its length of motion at the latest.
+LONGEST = 6.0
+# Motion is the change of the positions over this time [s].
+LOOK_BACK = 0.2
 
 
 class StreamWindows:
-    """Cuts rows into windows on a grid from the start of each recording; the cuts do not depend on the chunks.
+    """Cuts rows into windows from the start of each recording on; the cuts do not depend on the chunks.
+
+    A window holds a stated time of motion. Rests make it longer: a robot at rest shows nothing of its friction.
 
     Args:
-        window: length [s].
+        window: length [s] of the motion.
         margin: rows before and after a window that its smoothing needs [s].
         width: number of columns of a row, the time included.
+        slowest: speeds (n,) below which the joints rest [rad/s or m/s]; positions are the columns after the time.
     """
 
-    def __init__(self, window: float, margin: float, width: int) -> None:
-        self.window, self.margin = window, margin
+    def __init__(self, window: float, margin: float, width: int, slowest: Array) -> None:
+        self.window, self.margin, self.slowest = window, margin, slowest
         self.rows = np.zeros((0, width))
         self.start: float | None = None
         self.period: float | None = None
@@ -77,7 +84,8 @@ class StreamWindows:
         if start is None or last is None:
             return
         inside = int((rows[:, 0] >= start).sum())
-        if last - start >= SHORTEST * self.window and inside >= FEWEST:
+        moved = self._motion(rows, start)
+        if len(moved) and moved[-1] >= SHORTEST * self.window and inside >= FEWEST:
             yield rows, start, last, True
 
     def _grow(self, rows: Array) -> Iterator[tuple[Array, float, float, bool]]:
@@ -86,13 +94,39 @@ class StreamWindows:
         self.rows = np.concatenate([self.rows, rows])
         if self.start is None:
             self.start = float(self.rows[0, 0])
-        while self.rows[-1, 0] >= self.start + self.window + self.margin:
-            end = self.start + self.window
+        while (end := self._end(self.start)) is not None and self.rows[-1, 0] >= end + self.margin:
             t = self.rows[:, 0]
             stop = int(np.searchsorted(t, end + self.margin, side="right"))
             yield self.rows[:stop], self.start, end, False
             self.start = end
             self.rows = self.rows[int(np.searchsorted(t, end - self.margin)) :]
+
+    def _end(self, start: float) -> float | None:
+        """The time at which the window that starts at a time is complete [s]; None where it is not yet."""
+        t = self.rows[:, 0]
+        if t[-1] < start + self.window:
+            return None
+        moved = self._motion(self.rows, start)
+        inside = t[t >= start]
+        rested = inside - start - moved
+        done = np.flatnonzero((moved >= self.window) | (inside >= start + LONGEST * self.window))
+        if not len(done):
+            return None
+        return float(min(start + self.window + rested[done[0]], start + LONGEST * self.window))
+
+    def _motion(self, rows: Array, start: float) -> Array:
+        """Time [s] in which any joint has moved since the start, at each row from it on."""
+        t, q = rows[:, 0], rows[:, 1 : 1 + len(self.slowest)]
+        back = max(1, round(LOOK_BACK / self.period)) if self.period else 1
+        if len(t) <= back:
+            return t[t >= start] - start
+        speed = np.abs(q[back:] - q[:-back]) / (t[back:] - t[:-back])[:, None]
+        moves = (speed >= self.slowest).any(axis=1)
+        # The first rows have none before them.
+        moves = np.concatenate([np.full(back, moves[0]), moves])[t >= start]
+        inside = t[t >= start]
+        rest = np.where(moves[1:], 0.0, np.diff(inside))
+        return np.asarray(inside - start - np.concatenate([[0.0], np.cumsum(rest)]))
 
     def to_dict(self) -> dict[str, Any]:
         """Gives the state as plain data."""
