@@ -64,7 +64,7 @@ class Evaluation:
         self.forces: list[tuple[float, float, int, int, float]] = []
         self.colour_sum = np.zeros((self.n, HIGHEST_ORDER + 1))
         self.colour_rows = np.zeros(self.n)
-        self.colour_count = 0
+        self.colour_count = np.zeros(self.n)
         self.bursts_in_row = 0
         self.bursts = BurstChart(self._run_length(1))
         self.noise_threshold = self.bursts.threshold
@@ -148,7 +148,8 @@ class Evaluation:
         return found
 
     def _project(self, found: WindowRows, start: float, end: float) -> Window:
-        colour = Colour.fit(self.colour_sum / self.colour_count, self.colour_rows) if self.colour_count else None
+        seen = np.maximum(self.colour_count, 1.0)[:, None]
+        colour = Colour.fit(self.colour_sum / seen, self.colour_rows).of(self.colour_count > 0)
         speeds = self.baseline.speeds
         usual = np.where(np.isfinite(speeds), speeds, np.abs(found.dq).max(axis=0))
         window = project(
@@ -161,10 +162,10 @@ class Evaluation:
             usual_speed=usual,
             edges=(start, end),
         )
-        if self.colour_count < COLOUR_WINDOWS:
-            self.colour_sum += window.colour
-            self.colour_rows += window.rows
-            self.colour_count += 1
+        new = window.moves & (self.colour_count < COLOUR_WINDOWS)
+        self.colour_sum += np.where(new[:, None], window.colour, 0.0)
+        self.colour_rows += np.where(new, window.rows, 0.0)
+        self.colour_count += new
         return window
 
     def _known(self, window: Window) -> NDArray[np.bool_]:
@@ -271,7 +272,7 @@ class Evaluation:
             "findings": [f.to_state() for f in self.findings],
             "event": None if event is None else [event.time, event.log, event.sources, event.windows],
             "forces": [list(force) for force in self.forces],
-            "colour": [self.colour_sum.tolist(), self.colour_rows.tolist(), self.colour_count],
+            "colour": [self.colour_sum.tolist(), self.colour_rows.tolist(), self.colour_count.tolist()],
             "bursts": self.bursts.to_dict(),
             "bursts_in_row": self.bursts_in_row,
         }
@@ -287,8 +288,10 @@ class Evaluation:
         found.findings = [Finding(**item) for item in data["findings"]]
         found.event = None if data["event"] is None else Event(*data["event"])
         found.forces = [tuple(force) for force in data["forces"]]
-        total, rows, found.colour_count = data["colour"]
+        total, rows, count = data["colour"]
         found.colour_sum, found.colour_rows = np.array(total, dtype=float), np.array(rows, dtype=float)
+        # A state of an older version has one number for all joints.
+        found.colour_count = np.ones(found.n) * count
         found.bursts = BurstChart(**data["bursts"])
         found.bursts_in_row = data["bursts_in_row"]
         return found

@@ -87,7 +87,7 @@ class Colour:
 
     Attributes:
         coefficients: per joint (p_j,).
-        variances: of the innovations (n,).
+        variances: of the innovations (n,); NaN of a joint whose noise is not known yet.
     """
 
     coefficients: tuple[Array, ...]
@@ -98,6 +98,19 @@ class Colour:
         """Fits processes to autocovariances (n, lags + 1) over `rows` (n,)."""
         fits = [levinson(c, max(float(r), 2.0), 2) for c, r in zip(covariances, rows, strict=True)]
         return cls(tuple(a for a, _ in fits), np.array([variance for _, variance in fits]))
+
+    def of(self, known: NDArray[np.bool_]) -> Colour:
+        """The processes of some joints (n,) only."""
+        return Colour(self.coefficients, np.where(known, self.variances, np.nan))
+
+    def completed(self, other: Colour) -> Colour:
+        """Takes those of another one where the noise is not known."""
+        unknown = np.isnan(self.variances)
+        pairs = zip(unknown, self.coefficients, other.coefficients, strict=True)
+        return Colour(
+            tuple(theirs if missing else own for missing, own, theirs in pairs),
+            np.where(unknown, other.variances, self.variances),
+        )
 
 
 def project(
@@ -118,7 +131,8 @@ def project(
         dq: velocities (N, n).
         tau: torques (N, n) [N m or N].
         directions: the model's torques.
-        colour: of the noise; None where it is not known: then the window's own, from a first fit.
+        colour: of the noise; None where it is not known: then the window's own, from a first fit. Likewise of a joint
+            whose noise is not known: one that has rested so far.
         expected: friction factors that are expected (n,).
         usual_speed: highest usual speed (n,) [rad/s or m/s].
         edges: start and end of the window [s].
@@ -127,10 +141,11 @@ def project(
     y = tau - directions.rest
     live = np.abs(dq) >= SLOWEST * usual_speed
     scale = np.sqrt(np.mean(tau**2, axis=0))
-    if colour is None:
+    if colour is None or np.isnan(colour.variances).any():
         plain = Colour((np.zeros(0),) * n, np.maximum((0.1 * scale) ** 2, np.finfo(float).tiny))
         values, _, _ = _solve(y, directions, live, plain, expected, scale)
-        colour = Colour.fit(*_colour(y - _fitted(values, directions), live))
+        own = Colour.fit(*_colour(y - _fitted(values, directions), live))
+        colour = own if colour is None else colour.completed(own)
     values, covariance, prior = _solve(y, directions, live, colour, expected, scale)
     residual = y - _fitted(values, directions)
     covariances, rows = _colour(residual, live)
