@@ -5,7 +5,9 @@ lengths and frictions differ from the description by 10 %, with Stribeck frictio
 torque noise, half of it coloured. ur10 and panda, described without friction, get 6 % of each joint's largest torque.
 The model comes from two motions of a minute, which repeat after 20 s; the threshold from three minutes of another such
 motion. Judged are 27 minutes of other motions: three at that speed, a faster one, and two that do not repeat; and six
-pushes of 0.3 s of each size at the flange, in random directions, by pinocchio's Jacobian.
+pushes of 0.3 s of each size at the flange, in random directions, by pinocchio's Jacobian. Beside them stand ten minutes
+of point-to-point moves with stops of 0.2 to 5 s, at which friction holds any torque up to its Coulomb friction; the
+threshold for these comes from three minutes of other such moves.
 """
 
 from __future__ import annotations
@@ -56,6 +58,48 @@ def periodic(robot: Robot, seed: int, duration: float, *, base: float = 0.05, sp
     return Motion(t, scale * q + middle, scale * dq, scale * ddq)
 
 
+def with_stops(robot: Robot, seed: int, duration: float) -> Motion:
+    """Draws moves with smooth ramps of 0.15 to 0.4 s, a quarter of them of one joint, and stops of 0.2 to 5 s."""
+    rng, t = np.random.default_rng(seed), robot.period * np.arange(round(duration / robot.period))
+    lower, upper = np.maximum(robot.limits.lower, -np.pi), np.minimum(robot.limits.upper, np.pi)
+    here, begin = (lower + upper) / 2, 1.0
+    q, dq, ddq = np.tile(here, (len(t), 1)), np.zeros((len(t), robot.n)), np.zeros((len(t), robot.n))
+    while begin < duration:
+        there = lower + rng.uniform(0.15, 0.85, robot.n) * (upper - lower)
+        if rng.random() < 0.25:
+            there = np.where(np.arange(robot.n) == rng.integers(robot.n), here + 0.3 * (there - here), here)
+        ramp, change = rng.uniform(0.15, 0.4), there - here
+        length = max(2 * ramp, float(np.max(np.abs(change) / robot.limits.velocity)) / rng.uniform(0.3, 0.7) + ramp)
+        after = t >= begin
+        up, down = (_ramp(t[after] - start, ramp) for start in (begin, begin + length - ramp))
+        share, speed, rate = ((a - b) / (length - ramp) for a, b in zip(up, down, strict=True))
+        q[after] = here + share[:, None] * change
+        dq[after], ddq[after] = speed[:, None] * change, rate[:, None] * change
+        begin += length + rng.choice([rng.uniform(0.2, 1.0), rng.uniform(1.0, 5.0)])
+        here = there
+    dq[np.abs(dq) < 1e-9] = 0.0
+    return Motion(t, q, dq, ddq)
+
+
+def _ramp(t: np.ndarray, length: float) -> tuple[np.ndarray, ...]:
+    """Integral, value and derivative of a smooth step from 0 to 1 of that length [s]."""
+    u = np.clip(t / length, 0.0, 1.0)
+    inside = (t > 0.0) & (t < length)
+    area = length * (u**2 / 2 + (np.cos(2 * np.pi * u) - 1) / (4 * np.pi**2)) + np.maximum(t - length, 0.0)
+    return area, u - np.sin(2 * np.pi * u) / (2 * np.pi), np.where(inside, (1 - np.cos(2 * np.pi * u)) / length, 0.0)
+
+
+def held(robot: Robot, log: Log, motion: Motion, seed: int) -> Log:
+    """Adds the torque that friction holds while a joint stands: another one at each stop."""
+    rng, tau = np.random.default_rng([seed, 3]), np.array(log.tau)
+    for j, coulomb in enumerate(np.asarray(robot.friction)[:, 0]):
+        still = motion.dq[:, j] == 0.0
+        stops = np.cumsum(np.diff(still.astype(int), prepend=0) == 1)
+        share = rng.uniform(-1.0, 1.0, stops[-1] + 1)
+        tau[:, j] += np.where(still, coulomb * share[stops], 0.0)
+    return replace(log, tau=tau)
+
+
 def robot_of(arm: str) -> Robot:
     """The arm with friction, and a period of 8 ms."""
     robot = replace(load_robot(arm), period=PERIOD)
@@ -73,6 +117,8 @@ class Tally:
 
     false: int = 0
     hours: float = 0.0
+    stop_false: int = 0
+    stop_hours: float = 0.0
     refused: int = 0
     detected: dict[float, list[bool]] = field(default_factory=lambda: {size: [] for size in SIZES})
     events: dict[float, list[int]] = field(default_factory=lambda: {size: [] for size in SIZES})
@@ -92,9 +138,8 @@ class Tally:
 
     def text(self) -> str:
         """Says false contacts, detections, events per push, errors and coverage."""
-        low, high = chi2.ppf([0.025, 0.975], [2 * self.false, 2 * self.false + 2]) / 2 / self.hours
-        rate = f"{self.false / self.hours:.1f} ({np.nan_to_num(low):.1f} to {high:.1f}) per hour"
-        lines = [f"{self.false} false contacts in {self.hours:.2f} h: {rate}; {self.refused} logs with pushes refused"]
+        lines = [f"{_rate(self.false, self.hours)}; {self.refused} logs with pushes refused"]
+        lines.append(f"  moves with stops: {_rate(self.stop_false, self.stop_hours)}")
         for size in SIZES:
             known, errors = self.detected[size], np.array(self.errors[size])
             words = f"  {size:g} N: {sum(known)} of {len(known)} detected"
@@ -103,6 +148,12 @@ class Tally:
                 words += f" ± {100 * errors.std():.1f} %, {sum(self.inside[size])} inside their 95 % interval"
             lines.append(words)
         return "\n".join(lines)
+
+
+def _rate(count: int, hours: float) -> str:
+    """Says a count of false contacts and their rate with its 95 % interval."""
+    low, high = chi2.ppf([0.025, 0.975], [2 * count, 2 * count + 2]) / 2 / hours
+    return f"{count} false contacts in {hours:.2f} h: {count / hours:.1f} ({np.nan_to_num(low):.1f} to {high:.1f}) per hour"
 
 
 def run_seed(arm: str, seed: int, tally: Tally) -> None:
@@ -125,6 +176,14 @@ def run_seed(arm: str, seed: int, tally: Tally) -> None:
         calibration = found.calibration
         tally.false += len(found.contacts)
         tally.hours += found.duration / 3600.0
+    stops = []
+    for k, duration in enumerate((180.0, 300.0, 300.0)):
+        motion = with_stops(robot, first + 40 + k, duration)
+        stops.append(held(robot, log_of(motion, 50 + k), motion, first + k))
+    for log in stops[1:]:
+        found = estimate_forces(model, log, healthy=[healthy, stops[0]])
+        tally.stop_false += len(found.contacts)
+        tally.stop_hours += found.duration / 3600.0
     for k, size in enumerate(SIZES):
         log = log_of(periodic(robot, first + 10, 120.0), 60 + k)
         tau, times = np.array(log.tau), []

@@ -30,7 +30,7 @@ BANDWIDTH = 4.0
 """Default bandwidth of the observer [Hz]: a push of 0.2 s is five of its time constants."""
 
 SHARPNESS = 5.0
-"""Least cut-off of the positions' smoothing over the observer's bandwidth: what it smears must be short for the observer.
+"""Least cut-off of the positions' smoothing over the observer's bandwidth, so that it smears nothing that passes.
 
 Noise of the positions above the bandwidth does not pass the observer, so that a higher cut-off costs nothing.
 """

@@ -121,9 +121,9 @@ class StreamWindows:
         if len(t) <= back:
             return t[t >= start] - start
         speed = np.abs(q[back:] - q[:-back]) / (t[back:] - t[:-back])[:, None]
-        moves = (speed >= self.slowest).any(axis=1)
+        moves = np.asarray((speed >= self.slowest).any(axis=1))
         # The first rows have none before them.
-        moves = np.concatenate([np.full(back, moves[0]), moves])[t >= start]
+        moves = np.concatenate([np.repeat(moves[:1], back), moves])[t >= start]
         inside = t[t >= start]
         rest = np.where(moves[1:], 0.0, np.diff(inside))
         return np.asarray(inside - start - np.concatenate([[0.0], np.cumsum(rest)]))

@@ -117,3 +117,25 @@ def pushed_log(limb: Robot) -> Callable[..., Log]:
         return replace(log, tau=tau, dq=motion.dq, name=f"log {seed}")
 
     return build
+
+
+@pytest.fixture(scope="session")
+def log_with_stops(limb: Robot) -> Callable[[int], Log]:
+    """Sixty moves of 0.8 s between random points, with rests of 0.8 s, at which friction holds any torque."""
+    plant, step = nominal_plant(limb, friction="coulomb-viscous", sensors=Sensors(torque_noise=0.01)), 0.008
+    x = np.linspace(0.0, 1.0, 100, endpoint=False)
+    shapes = (10 * x**3 - 15 * x**4 + 6 * x**5, 30 * x**2 - 60 * x**3 + 30 * x**4, 60 * x - 180 * x**2 + 120 * x**3)
+
+    def build(seed: int) -> Log:
+        rng = np.random.default_rng(seed)
+        points, parts = rng.uniform(-0.8, 0.8, (61, limb.n)), []
+        for order, (shape, end) in enumerate(zip(shapes, (1.0, 0.0, 0.0), strict=True)):
+            whole = np.concatenate([shape, np.full(100, end)]) / 0.8**order
+            parts.append(np.concatenate([whole[:, None] * change for change in np.diff(points, axis=0)]))
+        q, dq, ddq = parts
+        q += np.repeat(points[:-1], 200, axis=0)
+        log = simulate(plant, Motion(t=step * np.arange(len(q)), q=q, dq=dq, ddq=ddq), seed=seed)
+        held = np.repeat(rng.uniform(-1.0, 1.0, (60, limb.n)), 200, axis=0) * np.asarray(limb.friction)[:, 0]
+        return replace(log, tau=np.asarray(log.tau) + np.where(dq == 0.0, held, 0.0), name=f"stops {seed}")
+
+    return build

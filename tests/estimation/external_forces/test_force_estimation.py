@@ -102,6 +102,17 @@ def test_direct_residual_agrees_with_the_momentum(found):
         assert found.direct[at, joint] == pytest.approx(found.torque[at, joint], rel=0.1)
 
 
+def test_stops_are_no_contacts(exact, healthy, log_with_stops):
+    """A model that was fitted with a low cut-off does not see contacts at stops, where a low-pass rings.
+
+    Nor does the ringing hide contacts: with it the threshold is 72, without it 34.
+    """
+    slow = replace(exact, provenance={**exact.provenance, "cutoff_hz": 1.5})
+    found = estimate_forces(slow, log_with_stops(31), healthy=[healthy, log_with_stops(32)])
+    assert found.contacts == ()
+    assert found.calibration.threshold.value < 50.0
+
+
 def test_log_without_healthy_one_finds_its_own_threshold(exact, touched):
     """Both pushes are found without another log, and a note says where the threshold comes from."""
     found = estimate_forces(exact, touched)

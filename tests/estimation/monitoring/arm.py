@@ -107,6 +107,34 @@ class Arm:
             tau = tau + extra(t, index)
         return Log(t, self.q[index], tau + NOISE * self.size * rng.normal(size=tau.shape), name=name)
 
+    def moves_with_stops(self, start, count, *, seed=0, name=""):
+        """A log of moves of 1 s between random points, with rests of 1 s, in which friction holds any torque.
+
+        Args:
+            start: its first time [s].
+            count: of the moves.
+            seed: of the points, of what friction holds, and of the noise.
+            name: of the log.
+        """
+        rng = np.random.default_rng([seed, round(start), 5])
+        low, high = self.q.min(axis=0), self.q.max(axis=0)
+        points = (low + high) / 2 + rng.uniform(-0.25, 0.25, (count + 1, 6)) * (high - low)
+        x = np.arange(round(1.0 / STEP)) * STEP
+        shapes = np.stack([
+            10 * x**3 - 15 * x**4 + 6 * x**5, 30 * x**2 - 60 * x**3 + 30 * x**4, 60 * x - 180 * x**2 + 120 * x**3,
+        ])  # fmt: skip
+        ends = np.stack([np.ones(len(x)), np.zeros(len(x)), np.zeros(len(x))])
+        shape = np.concatenate([shapes, ends], axis=1)
+        change = np.diff(points, axis=0)
+        q, v, a = (np.concatenate([part[:, None] * step for step in change]) for part in shape)
+        q += np.repeat(points[:-1], shape.shape[1], axis=0)
+        held = np.repeat(rng.uniform(-1.0, 1.0, (count, 6)), shape.shape[1], axis=0)
+        m, own = self.machine, self.machine.friction
+        friction = own[:, 0] * np.where(v == 0.0, held, np.sign(v)) + own[:, 1] * v
+        tau = rigid_torque(m.model, q, v, a) + m.rotor * a + m.offset + friction
+        t = start + np.arange(len(q)) * STEP
+        return Log(t, q, tau + NOISE * self.size * rng.normal(size=tau.shape), name=name)
+
 
 def write(log, file):
     """Writes a log as CSV, with its folder."""

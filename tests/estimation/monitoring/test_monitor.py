@@ -1,13 +1,14 @@
 """The monitor on an arm whose torque comes from pinocchio: what it names, and that restarts change nothing."""
 
+from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
 import pytest
 
-from estimation.monitoring import Monitor, MonitorSettings
+from estimation.monitoring import Monitor, MonitorSettings, baseline_of
 from robots.common.errors import InputError
-from tests.estimation.monitoring.arm import NOISE
+from tests.estimation.monitoring.arm import NOISE, Arm
 
 pytestmark = pytest.mark.slow
 
@@ -81,6 +82,29 @@ def test_an_error_that_comes_in_each_cycle_is_no_contact(arm, monitor, amount):
 def test_healthy_robot_is_green(arm, monitor):
     """Six minutes without a change: no finding. At one false alarm in 1000 h the chance to fail is 1e-4."""
     assert send(monitor, [arm.log(300.0 * k) for k in range(6)]) == ()
+
+
+def test_moves_with_stops_are_green(arm):
+    """A model of smooth motions, fitted with a low cut-off, judges moves with stops: no finding.
+
+    A low-pass of 1.5 Hz rings at a stop: the sign of the friction followed the ringing.
+    """
+    model = replace(arm.model, provenance={**arm.model.provenance, "cutoff_hz": 1.5})
+    monitor = Monitor(baseline_of(model), MonitorSettings(heat="none"))
+    assert send(monitor, [arm.moves_with_stops(300.0 * k, 60) for k in range(4)]) == ()
+
+
+def test_damage_is_found_in_moves_with_stops(arm, monitor):
+    """Half more friction of one joint shows between the stops."""
+    logs = [arm.moves_with_stops(300.0 * k, 60) for k in range(4)]
+    worse = Arm.__new__(Arm)
+    worse.__dict__.update(arm.__dict__)
+    friction = arm.machine.friction * np.where(np.arange(6) == 3, 1.5, 1.0)[:, None]
+    worse.machine = replace(arm.machine, friction=friction)
+    logs += [worse.moves_with_stops(300.0 * k, 60) for k in range(4, 8)]
+    (found,) = send(monitor, logs)
+    assert (found.kind, found.joint) == ("damage", 4)
+    assert found.low < 50.0 < found.high
 
 
 def test_chunks_and_restarts_change_nothing(arm, baseline, tmp_path):

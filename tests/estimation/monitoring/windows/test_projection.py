@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter
 
-from estimation.monitoring.windows.projection import Directions, project
+from estimation.monitoring.windows.projection import Colour, Directions, project
 
 
-def window(noise, resting=()):
+def window(noise, resting=(), colour=None):
     """Projects noise (N, n) of an arm whose friction changes sign every second; some joints rest throughout."""
     count, n = noise.shape
     t = 0.01 * np.arange(count)
@@ -21,7 +21,7 @@ def window(noise, resting=()):
         dq,
         friction + noise,
         Directions(rest=np.zeros((count, n)), friction=friction, payload=np.zeros((count, n, 0))),
-        colour=None,
+        colour=colour,
         expected=np.ones(n),
         usual_speed=np.ones(n),
         edges=(0.0, 0.01 * count),
@@ -49,3 +49,13 @@ def test_scatter_of_the_residual_is_stated(memory):
     scatter = np.std([np.log(one.residual_rms[0]) for one in windows])
     stated = np.sqrt(np.median([one.residual_variance(0) for one in windows]))
     assert stated == pytest.approx(scatter, rel=0.25)
+
+
+def test_a_joint_whose_noise_is_not_known_takes_that_of_the_window():
+    """A joint that has rested so far has no noise of its own yet; it must not spoil the window of the others."""
+    noise = 0.05 * np.random.default_rng(3).normal(size=(1000, 2))
+    rested = window(noise, resting=[1])
+    known = Colour.fit(rested.colour, rested.rows).of(rested.moves)
+    found = window(noise, colour=known)
+    assert np.isfinite(found.covariance).all()
+    assert found.values[:2] == pytest.approx([1.0, 1.0], abs=0.02)
