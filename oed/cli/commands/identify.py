@@ -118,7 +118,7 @@ def identify(
                 "progress": progress,
             }
             table = None
-            if stream or (stream is None and mapping is None and method in METHODS and is_large(log)):
+            if stream or (stream is None and method in METHODS and is_large(log)):
                 result = identify_stream(
                     described,
                     _opened(described, log, mapping, payload, gravity, torque_is),
@@ -181,13 +181,9 @@ def _opened(
         raise InputError(
             f"--stream with {len(logs)} logs", allowed="one Parquet file or folder", remedy="put the parts in a folder"
         )
-    if mapping is not None:
-        raise InputError(
-            "--stream with --mapping", allowed="columns t, q1.. and tau1.. or i1..", remedy="rename the columns"
-        )
     if torque_is is not None:
         parse_meaning(torque_is, robot.n)
-    opened = open_stream(logs[0], robot.n, kinds=robot.chain.kinds, torque_is=torque_is)
+    opened = open_stream(logs[0], robot.n, kinds=robot.chain.kinds, torque_is=torque_is, mapping=mapping)
     (known,) = with_known_setup([opened], payload, gravity)
     return known
 
