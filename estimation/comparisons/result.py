@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -20,6 +20,7 @@ from estimation.comparisons.merging import MergedModel
 from estimation.comparisons.payload_differences import PayloadDifference
 from estimation.comparisons.runs import Run
 from robots.common.files import write_atomic
+from robots.common.plain import joints_in_words
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -128,7 +129,7 @@ class ModelComparison:
         carried = " ".join(item.sentence(self.labels) for item in self.payloads)
         parts = sorted({name for run in self.compared for name in self.parts(run)})
         if parts:
-            text = f"The runs differ significantly in {len(parts)} part{'s' * (len(parts) > 1)}: {_listed(parts)}."
+            text = f"The runs differ significantly in {_listed(_grouped(parts))}."
         elif self.significant:
             text = "The runs differ significantly, but no single part of a joint does."
         else:
@@ -146,6 +147,10 @@ class ModelComparison:
                 f" In {self.labels[-1]} friction common to all joints {warmer} "
                 f"({percent_of(mean)}, {interval_of(mean, error)})."
             )
+            if any(item.kind == "unequal" for item in self.friction if item.run == len(self.runs) - 1):
+                text += (
+                    " Joints heat unequally, which hides smaller changes of one joint: compare runs of one temperature."
+                )
         return text
 
     def shared_change(self, run: int) -> tuple[float, float] | None:
@@ -185,7 +190,7 @@ class ModelComparison:
             label = "all together" if compared is None else self.labels[compared]
             yield (
                 f"  {label[:24]:24} {whole.statistic:10.1f} {whole.dof:6d} {whole.adjusted:12.2g}   "
-                f"{_listed(parts) if parts else 'none'}"
+                f"{_listed(_grouped(parts)) if parts else 'none'}"
             )
         last = len(self.runs) - 1
         yield f"  friction, {self.labels[last]} against {self.labels[0]}:"
@@ -291,6 +296,15 @@ class ModelComparison:
         text = json.dumps(self.to_dict(), indent=2, allow_nan=False) + "\n"
         write_atomic(Path(folder) / COMPARISON, text, force=force)
         self.merged.model.save(Path(folder) / MODEL, force=force)
+
+
+def _grouped(parts: Iterable[str]) -> list[str]:
+    """Puts the parts of one kind together: friction of joints 1, 2 and 4."""
+    kinds: dict[str, list[str]] = {}
+    for part in parts:
+        kind, _, joint = part.partition(" of joint ")
+        kinds.setdefault(kind, []).append(joint)
+    return [kind if not joints[0] else f"{kind} of {joints_in_words(joints)}" for kind, joints in kinds.items()]
 
 
 def _listed(names: list[str], most: int = 6) -> str:
