@@ -17,7 +17,7 @@ from estimation.regressions.braking_friction import with_braking_friction
 from estimation.regressions.joint_regressor import CHUNK, JointRegressor, chunks
 from estimation.regressions.moments import Moments
 from estimation.regressions.preparation import Prepared, Rows
-from estimation.uncertainty import Part, batch_factors, covariance, repeated_covariance
+from estimation.uncertainty import Part, Played, batch_factors, covariance, with_repetitions
 from robots.base_parameters import BaseParameters
 from robots.common.parallel import threaded
 
@@ -105,7 +105,7 @@ def fit(base: BaseParameters, logs: Sequence[Prepared], estimator: Estimator, ch
         fitted = [Fitted(*some) for some in zip(rows, predicted, factors, strict=True)]
         scores = _scores(regressor, fitted, solution.weights) if long else scores
     averaged = round(AVERAGED / float(np.median([log.positions.period for log in logs])))
-    periods = [log.period for log in logs] if whole and not long else None
+    periods = [log.period for log in logs] if whole and len(rows) == len(logs) else None
     full, white, prior_share = covariances(
         regressor, fitted, scores, moments, solution, choice.ridge, averaged, seed, periods=periods
     )
@@ -209,7 +209,7 @@ def covariances(
         averaged: rows that are averaged at a time, in a long log.
         seed: of the drawn noise.
         rows: of the whole log, where `fitted` are stretches of it; None where they are all.
-        periods: of the motion of each of `fitted` [s], None where it does not repeat; None for none.
+        periods: of the logs' motions [s], None where one does not repeat itself; None if `fitted` are not the logs.
     """
     weights = solution.weights
     inverse = moments.inverse(weights, ridge)
@@ -226,14 +226,17 @@ def covariances(
     seen = sum(part.rows for part in parts)
     share = seen / total
     averaged = min(averaged, seen // LEAST_AVERAGES)
-    if periods is not None:
-        times = [some.rows.motion.t for some in fitted]
-        full = repeated_covariance(parts, times, periods, weights, inverse, seed, averaged)
-    else:
-        full = covariance(parts, weights, inverse, seed, share=share, averaged=averaged)
+    full = covariance(parts, weights, inverse, seed, share=share, averaged=averaged)
     if share < 1:
         factors = batch_factors(scores, inverse, full)
         full = full * factors[:, None] * factors
+    if periods is not None:
+        whole = [_part(regressor, some, 0, len(some.torque)) for some in fitted]
+        played = [
+            Played(some.rows.motion.t, some.rows.motion.q, period, some.rows.gravity)
+            for some, period in zip(fitted, periods, strict=True)
+        ]
+        full = with_repetitions(full, whole, played, weights, inverse, seed, averaged)
     total_variance = np.maximum(np.diag(full + scatter), np.finfo(float).tiny)
     return full + scatter, white, np.clip(np.diag(scatter) / total_variance, 0.0, 1.0)
 
