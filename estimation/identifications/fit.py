@@ -43,7 +43,7 @@ class Fit:
         rows: what was fitted, in order.
         torque: predicted, of all rows (N, n).
         predicted: the same, part by part.
-        nominal: sum of each joint's squared errors (n,) by the robot's description, over all rows; NaN without one.
+        nominal: sum of each joint's squared errors (n,) by the robot's description, but for rows at rest; NaN without.
         covariance: of the parameters (b, b).
         white: standard errors (b,) that white noise would have.
         prior_share: share of each parameter's variance (b,) that the prior's scatter makes; None where the estimator
@@ -174,7 +174,8 @@ def second_pass(regressor: JointRegressor, part: Rows, solution: Solution, torqu
             torque[at, joint] = fitted
             measured = part.tau[at, joint]
             expected = measured - expected
-            nominal[joint] = expected @ expected
+            judged = slice(None) if part.rest is None else ~part.rest[at, joint]
+            nominal[joint] = expected[judged] @ expected[judged]
             if scored:
                 score[used] += ((measured - fitted) * part.mask[at, joint] * solution.weights[joint]) @ Y
         return nominal, score
