@@ -135,16 +135,15 @@ class Comparison:
         motion, mask, tau = part.motion, part.mask[place], np.ascontiguousarray(part.tau[place].T)
         signals = motion.q[place], motion.dq[place], motion.ddq[place]
         all_sums = self.regressor.sums(*signals, size, part.gravity)
+        judged = part.judged[place]
         # Few rows do not count in full: their columns are asked for once more.
-        slow = np.flatnonzero((mask != 1).any(axis=1))
+        slow = np.flatnonzero((mask != 1).any(axis=1) | ~judged.all(axis=1))
         q, dq, ddq = (signal[slow] for signal in signals)
         slow_rows = self.regressor(q, dq, ddq, part.gravity)
         missing, speeds = 1 - mask[slow].T, np.ascontiguousarray(signals[1].T)
         groups, ones = len(mask) // size, np.ones(size)
-        judged = part.judged[place]
-        missing = missing * judged[slow].T
         for joint, (sums, some, used) in enumerate(zip(all_sums, slow_rows, self.regressor.used, strict=True)):
-            if not judged[:, joint].any():
+            if not (judged[:, joint].any() or mask[:, joint].any()):
                 continue
             wide = np.tanh(speeds[joint] / WIDER[:, None])
             count = len(used)
@@ -153,17 +152,13 @@ class Comparison:
             # A product: numpy's own sum along so short an axis takes four times as long.
             rows[:, count:-1] = (wide.reshape(-1, size) @ ones).reshape(len(WIDER), groups).T
             rows[:, -1] = tau[joint].reshape(groups, size) @ ones
-            # Rows at rest are taken out of both sides, other rows that do not count of the fitted side alone.
-            still = np.flatnonzero(~judged[slow, joint])
-            at = slow[still]
-            lost = np.column_stack([some[still], wide[:, at].T, tau[joint, at]])
-            places, lost = summed(lost, at // size)
-            rows[places] -= lost
-            own = np.flatnonzero(missing[joint])
-            at = slow[own]
-            lost = np.column_stack([some[own], wide[:, at].T, tau[joint, at]]) * missing[joint, own, None]
-            places, lost = summed(lost, at // size)
-            products = side_products(rows, lost, places, size)
+            left_out = []
+            for share in (missing[joint], ~judged[slow, joint]):
+                own = np.flatnonzero(share)
+                at = slow[own]
+                lost = np.column_stack([some[own], wide[:, at].T, tau[joint, at]]) * share[own, None]
+                left_out.append(summed(lost, at // size))
+            products = side_products(rows, left_out, size)
             chosen = np.concatenate([used, self.base.size + joint * len(WIDER) + np.arange(len(WIDER))])
             for side, product in zip((sides.fitted, sides.judged), products, strict=True):
                 side.gram[joint, block][np.ix_(chosen, chosen)] = product[:-1, :-1]

@@ -175,7 +175,7 @@ class Prepared:
         rest = rows_at_rest(self.log.t[logged], self.log.q[logged], speed) & moves | held
         if self.load is not None:
             tau = tau - self.load.torque(motion)
-        mask = ((fast | ~moves) & ~rest).astype(float)
+        mask = ((fast | ~moves) & ~held).astype(float)
         return Rows(motion, tau, mask, self.log.gravity, rest if rest.any() else None)
 
 
