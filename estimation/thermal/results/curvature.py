@@ -1,4 +1,4 @@
-"""A second fit whose friction falls exponentially: what a fit with the models' linear fall cannot know of its errors."""
+"""A second fit whose friction falls exponentially: what a fit with the linear fall cannot know of its errors."""
 
 from __future__ import annotations
 
@@ -39,8 +39,8 @@ class CurvedFit:
 def fit_curved(search: Search, solution: Solution, colour: float, predicted: Array) -> CurvedFit | None:
     """Fits beta exp(alpha (T - T0) / beta) in place of alpha (T - T0) + beta to the same measurements.
 
-    Viscosity falls exponentially with temperature. Over the temperatures of one campaign both falls fit nearly alike, with
-    different time constants and steady states.
+    Viscosity falls exponentially with temperature. Over the temperatures of one campaign both falls fit nearly alike,
+    with different time constants and steady states.
 
     Args:
         search: of the fit with the linear fall.

@@ -136,7 +136,7 @@ def _values(
 ) -> Array:
     found: list[float] = []
     for power in powers:
-        warm = curved_steady_state(model, power) if curved else model.steady_state(power, drives=0.0)[..., 0]
+        warm = curved_steady_state(model, power) if curved else float(model.steady_state(power, drives=0.0)[..., 0])
         here = curved_slope(model, warm) if curved else model
         found += here.time_constants(power).tolist()
         if friction and power > 0.0:
@@ -150,9 +150,7 @@ def _values(
     return np.array(found)
 
 
-def span(
-    channels: NDArray[np.bool_], predicted: Array, info: Information, curved: CurvedFit | None
-) -> Quantity | None:
+def span(channels: NDArray[np.bool_], predicted: Array, info: Information, curved: CurvedFit | None) -> Quantity | None:
     """Computes the largest over the smallest friction factor at the times at which friction was measured.
 
     Args:

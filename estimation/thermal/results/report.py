@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import partial
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -30,9 +32,9 @@ def report(search: Search, solution: Solution, warm: tuple[int, ...], *, bounds:
     powers = _powers(search)
     predicted = search.problem.predict(solution.coordinates, solution.states)
     curved = fit_curved(search, solution, info.colour, predicted) if bounds else None
-    how = {"friction": friction, "heat_known": search.heat_known}
-    plain = derive(search.model_at, at, covariance, powers, **how)
-    combinations = derive(search.model_at, at, covariance, powers, **how, curved=curved) if curved else plain
+    derived = partial(derive, search.model_at, at, covariance, powers, friction=friction, heat_known=search.heat_known)
+    plain = derived()
+    combinations = derived(curved=curved)
     scales = _slopes(search, at)
     parameters = _parameters(search, model, np.sqrt(np.maximum(np.diag(covariance), 0.0)) * np.abs(scales))
     lowest, notes = _slow(search, solution, info, plain, powers) if bounds else ({}, [])

@@ -1,4 +1,4 @@
-"""Intervals of a fit with a linear fall of friction, on a joint whose friction falls exponentially, and on one linear."""
+"""Intervals of a fit with a linear fall of friction, where it falls exponentially, and where it falls linearly."""
 
 import numpy as np
 import pytest
