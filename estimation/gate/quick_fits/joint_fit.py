@@ -38,6 +38,7 @@ class JointFit:
         inverse: inverse of the Gram matrix with its ridge (k, k).
         residual: (M,).
         scores: Y' residual of each block (B, k).
+        counted: which of all rows these are.
     """
 
     Y: Array
@@ -47,6 +48,7 @@ class JointFit:
     inverse: Array
     residual: Array
     scores: Array
+    counted: NDArray[np.bool_]
 
     def combination(self, weights: Array) -> tuple[float, float]:
         """Gives the value of a linear combination of parameters, and its standard error under correlated residuals.
@@ -154,25 +156,26 @@ class Rows:
         starts = np.concatenate([[0], ends[:-1]])
         return np.concatenate([np.arange(start, end, stride) for start, end in zip(starts, ends, strict=True)])
 
-    def fit(self, joint: int) -> JointFit:
-        """Fits one joint, counted from 0, alone: a fault of another joint has no effect on it."""
+    def fit(self, joint: int, *, moving: bool = False) -> JointFit:
+        """Fits one joint alone: a fault of another joint has no effect on it.
+
+        Args:
+            joint: counted from 0.
+            moving: without the rows in which it is at rest.
+        """
         own = self.joints[joint]
-        Y, tau = own.Y, self.torque(joint)
+        counted = ~self.rest[:, joint] if moving else np.ones(len(self.q), dtype=bool)
+        Y, tau = own.Y[counted], self.torque(joint)[counted]
         gram = Y.T @ Y
         values = solve_scaled(gram, Y.T @ tau, OWN_RIDGE)
         residual = tau - Y @ values
-        scores = np.array([Y[rows].T @ residual[rows] for rows in self._blocks])
+        scores = self.block_sums(Y * residual[:, None], counted)
         inverse = solve_scaled(gram, np.eye(len(gram)), OWN_RIDGE)
-        return JointFit(Y, own.scale, own.used, values, inverse, residual, scores)
+        return JointFit(Y, own.scale, own.used, values, inverse, residual, scores, counted)
 
-    @property
-    def starts(self) -> NDArray[np.intp]:
-        """The first row of each block."""
-        return np.flatnonzero(np.diff(self.block, prepend=-1))
-
-    @property
-    def _blocks(self) -> list[slice]:
-        return [slice(first, stop) for first, stop in pairwise([*self.starts.tolist(), len(self.block)])]
+    def block_sums(self, values: Array, counted: NDArray[np.bool_]) -> Array:
+        """Sums values (M', ...) of the counted rows over each block (B, ...)."""
+        return np.add.reduceat(values, np.flatnonzero(np.diff(self.block[counted], prepend=-1)), axis=0)
 
     @cached_property
     def rest(self) -> NDArray[np.bool_]:

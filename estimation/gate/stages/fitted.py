@@ -95,7 +95,7 @@ class Fitted:
         sharp = self._smoothed.choice.sharp
         assert sharp is not None
         fits = {
-            j: fit if sharp is self.rows else sharp.fit(j)
+            j: fit if sharp is self.rows and not sharp.rest[:, j].any() else sharp.fit(j, moving=True)
             for j, fit in enumerate(self.fits)
             if fit is not None and self.unexplained[j] < HOPELESS
         }

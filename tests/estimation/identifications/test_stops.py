@@ -66,3 +66,12 @@ def test_friction_at_rest_is_no_error(arm, logs):
     assert ((error <= found.band)[found.rest].mean(axis=0) > 0.95).all()
     assert (found.band_coverage > 0.9).all()
     assert "joints at rest" in found.summary()
+
+
+@pytest.mark.slow
+def test_a_delay_shows_in_a_log_with_stops(arm, logs):
+    """Stops are no reversals at which a joint sticks: torque that is logged 12 ms late is named."""
+    (known, _), _ = logs
+    late = replace(known, tau=np.vstack([np.repeat(known.tau[:1], 3, axis=0), known.tau[:-3]]))
+    (found,) = [finding for finding in check_log(arm, late).findings if finding.name == "delay"]
+    assert found.value == pytest.approx(0.012, abs=0.001)
