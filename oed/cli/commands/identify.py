@@ -94,7 +94,7 @@ def identify(
     with console.working() as progress:
         from estimation import identify as run
         from estimation import read_logs
-        from estimation.exports import build_mjcf, urdf_text
+        from estimation.exports import build_mjcf, build_urdf
         from estimation.exports import c_code as c_text
         from estimation.identifications.streams import METHODS, identify_stream
         from estimation.logs.parquet_streams import is_large
@@ -117,7 +117,7 @@ def identify(
                 "seed": seed,
                 "progress": progress,
             }
-            table = None
+            table, stated = None, None
             if stream or (stream is None and method in METHODS and is_large(log)):
                 result = identify_stream(
                     described,
@@ -135,7 +135,8 @@ def identify(
             result.save(folder.path("model.json").parent)
             save_estimate_report(result, folder, png=png, methods=table)
             if urdf is not None:
-                streams[urdf].write(urdf_text(result.model, described).encode())
+                stated = build_urdf(result.model, described)
+                streams[urdf].write(stated.text.encode())
             written = None if mjcf is None else build_mjcf(result.model, described, folder=mjcf.parent)
             if mjcf is not None and written is not None:
                 streams[mjcf].write(written.text.encode())
@@ -150,6 +151,7 @@ def identify(
                 *([table.summary()] if table else []),
                 result.summary(),
                 *([f"  below 3 standard errors: {', '.join(weak)}"] if weak else []),
+                *(stated.lines() if stated else ()),
                 *(written.lines() if written else ()),
                 *(f"written to {path.resolve()}" for path in (out, urdf, mjcf, c_code) if path is not None),
             ]
