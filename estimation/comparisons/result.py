@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -17,10 +17,10 @@ from estimation.comparisons.drift import Drift
 from estimation.comparisons.friction_changes import FrictionChange, interval_of, percent_of
 from estimation.comparisons.friction_curves import FrictionCurves
 from estimation.comparisons.merging import MergedModel
+from estimation.comparisons.part_names import grouped, listed
 from estimation.comparisons.payload_differences import PayloadDifference
 from estimation.comparisons.runs import Run
 from robots.common.files import write_atomic
-from robots.common.plain import joints_in_words
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -129,7 +129,7 @@ class ModelComparison:
         carried = " ".join(item.sentence(self.labels) for item in self.payloads)
         parts = sorted({name for run in self.compared for name in self.parts(run)})
         if parts:
-            text = f"The runs differ significantly in {_listed(_grouped(parts))}."
+            text = f"The runs differ significantly in {listed(grouped(parts))}."
         elif self.significant:
             text = "The runs differ significantly, but no single part of a joint does."
         else:
@@ -138,7 +138,7 @@ class ModelComparison:
             text = f"{carried} Without the payload: {text[0].lower()}{text[1:]}"
         joints = sorted({item.joint for item in self.damaged})
         if joints:
-            text += f" Friction changed on joint {_listed([str(j) for j in joints])} alone: inspect it."
+            text += f" Friction changed on joint {listed([str(j) for j in joints])} alone: inspect it."
         shared = self.shared_change(len(self.runs) - 1)
         if shared is not None:
             mean, error = shared
@@ -190,7 +190,7 @@ class ModelComparison:
             label = "all together" if compared is None else self.labels[compared]
             yield (
                 f"  {label[:24]:24} {whole.statistic:10.1f} {whole.dof:6d} {whole.adjusted:12.2g}   "
-                f"{_listed(_grouped(parts)) if parts else 'none'}"
+                f"{listed(grouped(parts)) if parts else 'none'}"
             )
         last = len(self.runs) - 1
         yield f"  friction, {self.labels[last]} against {self.labels[0]}:"
@@ -296,17 +296,3 @@ class ModelComparison:
         text = json.dumps(self.to_dict(), indent=2, allow_nan=False) + "\n"
         write_atomic(Path(folder) / COMPARISON, text, force=force)
         self.merged.model.save(Path(folder) / MODEL, force=force)
-
-
-def _grouped(parts: Iterable[str]) -> list[str]:
-    """Puts the parts of one kind together: friction of joints 1, 2 and 4."""
-    kinds: dict[str, list[str]] = {}
-    for part in parts:
-        kind, _, joint = part.partition(" of joint ")
-        kinds.setdefault(kind, []).append(joint)
-    return [kind if not joints[0] else f"{kind} of {joints_in_words(joints)}" for kind, joints in kinds.items()]
-
-
-def _listed(names: list[str], most: int = 6) -> str:
-    shown = ", ".join(names[:most])
-    return shown if len(names) <= most else f"{shown} and {len(names) - most} more"
