@@ -110,13 +110,13 @@ class FrictionChange:
             return f"{text}." if self.curve is None else f"{text} in the mean; {self.curve.text()}."
         if self.kind == "changed":
             return f"{head}, significant; too few joints to separate heat from damage."
-        common = f"{percent_of(self.common)} common to all joints"
-        own = f"{percent_of(self.own)} ({interval_of(self.own, self.own_scatter)}) of this joint alone"
+        others = f"the other joints {percent_of(self.common)}"
+        own = f"{percent_of(self.own)} ({interval_of(self.own, self.own_scatter)})"
         if self.kind == "own":
-            return f"{head}: {common}, {own}, significant: inspect this joint."
+            return f"{head}; {others}; this joint alone {own}, significant: inspect this joint."
         if self.kind == "unequal":
-            return f"{head}: {common}, {own}, which unequal heating may explain: compare runs of one temperature."
-        return f"{head}: {common}, {own}, not significant."
+            return f"{head}; {others}. Unequal heating may explain the difference, {own}."
+        return f"{head}; {others}: no difference beyond the errors."
 
     def to_dict(self, labels: Sequence[str]) -> dict[str, Any]:
         """Gives plain data; changes in per cent."""

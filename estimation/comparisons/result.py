@@ -17,6 +17,7 @@ from estimation.comparisons.drift import Drift
 from estimation.comparisons.friction_changes import FrictionChange, interval_of, percent_of
 from estimation.comparisons.friction_curves import FrictionCurves
 from estimation.comparisons.merging import MergedModel
+from estimation.comparisons.part_names import grouped, listed
 from estimation.comparisons.payload_differences import PayloadDifference
 from estimation.comparisons.runs import Run
 from robots.common.files import write_atomic
@@ -128,7 +129,7 @@ class ModelComparison:
         carried = " ".join(item.sentence(self.labels) for item in self.payloads)
         parts = sorted({name for run in self.compared for name in self.parts(run)})
         if parts:
-            text = f"The runs differ significantly in {len(parts)} part{'s' * (len(parts) > 1)}: {_listed(parts)}."
+            text = f"The runs differ significantly in {listed(grouped(parts))}."
         elif self.significant:
             text = "The runs differ significantly, but no single part of a joint does."
         else:
@@ -137,7 +138,7 @@ class ModelComparison:
             text = f"{carried} Without the payload: {text[0].lower()}{text[1:]}"
         joints = sorted({item.joint for item in self.damaged})
         if joints:
-            text += f" Friction changed on joint {_listed([str(j) for j in joints])} alone: inspect it."
+            text += f" Friction changed on joint {listed([str(j) for j in joints])} alone: inspect it."
         shared = self.shared_change(len(self.runs) - 1)
         if shared is not None:
             mean, error = shared
@@ -146,6 +147,10 @@ class ModelComparison:
                 f" In {self.labels[-1]} friction common to all joints {warmer} "
                 f"({percent_of(mean)}, {interval_of(mean, error)})."
             )
+            if any(item.kind == "unequal" for item in self.friction if item.run == len(self.runs) - 1):
+                text += (
+                    " Joints heat unequally, which hides smaller changes of one joint: compare runs of one temperature."
+                )
         return text
 
     def shared_change(self, run: int) -> tuple[float, float] | None:
@@ -185,7 +190,7 @@ class ModelComparison:
             label = "all together" if compared is None else self.labels[compared]
             yield (
                 f"  {label[:24]:24} {whole.statistic:10.1f} {whole.dof:6d} {whole.adjusted:12.2g}   "
-                f"{_listed(parts) if parts else 'none'}"
+                f"{listed(grouped(parts)) if parts else 'none'}"
             )
         last = len(self.runs) - 1
         yield f"  friction, {self.labels[last]} against {self.labels[0]}:"
@@ -291,8 +296,3 @@ class ModelComparison:
         text = json.dumps(self.to_dict(), indent=2, allow_nan=False) + "\n"
         write_atomic(Path(folder) / COMPARISON, text, force=force)
         self.merged.model.save(Path(folder) / MODEL, force=force)
-
-
-def _listed(names: list[str], most: int = 6) -> str:
-    shown = ", ".join(names[:most])
-    return shown if len(names) <= most else f"{shown} and {len(names) - most} more"

@@ -3,10 +3,11 @@
 from estimation.exports.c_code import c_code, export_c
 from estimation.exports.mjcf import build_mjcf, export_mjcf, recorded_ranges
 from estimation.exports.standard import standard_parameters
-from estimation.exports.urdf import export_urdf, urdf_text
+from estimation.exports.urdf import build_urdf, export_urdf, urdf_text
 
 __all__ = [
     "build_mjcf",
+    "build_urdf",
     "c_code",
     "export_c",
     "export_mjcf",

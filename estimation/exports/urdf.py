@@ -5,6 +5,7 @@ from __future__ import annotations
 import warnings
 from collections.abc import Sequence
 from pathlib import Path
+from typing import NamedTuple
 from xml.etree import ElementTree
 
 import numpy as np
@@ -12,12 +13,14 @@ from numpy.typing import NDArray
 
 from estimation.exports.feasible import NEAREST, nearest_feasible
 from estimation.exports.friction import LinearFriction, linear_friction
+from estimation.exports.remainders import remainder
 from estimation.exports.standard import REMEDY, standard_parameters
 from estimation.models.model import Model
 from robots.common.errors import InfeasibleError, InputError, NearestBodiesWarning
 from robots.common.files import write_atomic
 from robots.geometry.chain import Joint
-from robots.geometry.inertia import symmetric
+from robots.geometry.inertia import inertial_parameters, symmetric
+from robots.geometry.urdf_xml import read_elements
 from robots.geometry.xacro_ import is_description, split_arguments, urdf_bytes
 from robots.robot import Robot
 from robots.version import VERSION
@@ -25,6 +28,7 @@ from robots.version import VERSION
 Array = NDArray[np.float64]
 Element = ElementTree.Element
 
+EYE = np.eye(4)
 ROUGH = 0.02  # of the friction: a larger difference from the identified curve is named in the file
 
 
@@ -49,11 +53,27 @@ def urdf_text(model: Model, robot: Robot | None = None) -> str:
     """Writes the URDF of `export_urdf` as text.
 
     If the robot came from a URDF or xacro, its file is kept with its meshes; the inertials, and damping and friction of
-    the moving joints change. The link that a joint moves gets all the inertia that moves with it; links fixed or locked
-    to it lose theirs. Any other robot gets a plain chain. A comment says what a URDF cannot state. If no bodies that
-    can exist have the identified parameters, the nearest ones are written; a `NearestBodiesWarning` says how far off
-    they are.
+    the moving joints change. The link that a joint moves gets the inertia that moves with it; links fixed to it lose
+    theirs, and links on locked joints, such as a second arm, keep theirs. Any other robot gets a plain chain. A comment
+    says what a URDF cannot state. If no bodies that can exist have the identified parameters, the nearest ones are
+    written; a `NearestBodiesWarning` says how far off they are.
     """
+    return build_urdf(model, robot).text
+
+
+class Urdf(NamedTuple):
+    """A written URDF: its text, and the remarks in its comment, what it states first and what it cannot state."""
+
+    text: str
+    remarks: tuple[str, ...]
+
+    def lines(self) -> list[str]:
+        """Writes the remarks, one a line."""
+        return [f"the URDF states {self.remarks[0]}", *(f"  {remark}" for remark in self.remarks[1:])]
+
+
+def build_urdf(model: Model, robot: Robot | None = None) -> Urdf:
+    """Writes a URDF as `urdf_text` does, and says what it states."""
     known = robot or model.robot
     described = np.asarray(known.inertia, dtype=float)
     moved = 0.0
@@ -69,12 +89,16 @@ def urdf_text(model: Model, robot: Robot | None = None) -> str:
     friction = linear_friction(model)
     source = known.origin
     from_file = is_description(source) and split_arguments(source)[0].is_file()
-    root = _updated(source, known, inertia) if from_file else _chain(known, inertia)
+    kept: list[str] = []
+    root = _updated(source, known, inertia, kept) if from_file else _chain(known, inertia)
     if friction is not None:
         _state_friction(root, known, friction)
-    root.insert(0, ElementTree.Comment(f" {_remarks(model, friction, moved)} "))
+    remarks = (*_remarks(model, friction, moved), *kept)
+    # Two hyphens end a comment.
+    comment = f"identified by robot-oed {VERSION}: {'; '.join(remarks)}".replace("--", "-")
+    root.insert(0, ElementTree.Comment(f" {comment} "))
     ElementTree.indent(root)
-    return ElementTree.tostring(root, encoding="unicode", xml_declaration=True) + "\n"
+    return Urdf(ElementTree.tostring(root, encoding="unicode", xml_declaration=True) + "\n", remarks)
 
 
 def _state_friction(root: Element, robot: Robot, friction: LinearFriction) -> None:
@@ -87,9 +111,9 @@ def _state_friction(root: Element, robot: Robot, friction: LinearFriction) -> No
         dynamics.set("friction", repr(float(coulomb)))
 
 
-def _remarks(model: Model, friction: LinearFriction | None, moved: float) -> str:
+def _remarks(model: Model, friction: LinearFriction | None, moved: float) -> list[str]:
     """What the numbers are, and what of the model the file does not state; `moved` as by `nearest_feasible`."""
-    parts = [f"identified by robot-oed {VERSION}: inertials"]
+    parts = ["inertials"]
     if friction is not None:
         parts[0] += ", damping and friction"
         rough = [
@@ -107,35 +131,54 @@ def _remarks(model: Model, friction: LinearFriction | None, moved: float) -> str
     left += [e.effect.replace("_", " ") + ("" if e.joint is None else f" of joint {e.joint}") for e in model.extensions]
     if left:
         parts.append(f"not stated, because a URDF cannot: {', '.join(left)}")
-    # Two hyphens end a comment.
-    return "; ".join(parts).replace("--", "-")
+    return parts
 
 
-def _updated(source: str, robot: Robot, inertia: Array) -> Element:
+def _updated(source: str, robot: Robot, inertia: Array, remarks: list[str]) -> Element:
     try:
         root = ElementTree.fromstring(urdf_bytes(source))
     except (OSError, ElementTree.ParseError) as error:
         raise InputError(f"the written URDF could not be read back: {error}", file=source) from error
     links = {link.get("name"): link for link in root.findall("link")}
     moving = set(robot.joint_names)
+    fixed = {joint.get("name") for joint in root.findall("joint") if joint.get("type") == "fixed"} - moving
     bodies: dict[str | None, str | None] = {}
     ends = [(_end(joint, "parent"), _end(joint, "child"), joint.get("name")) for joint in root.findall("joint")]
     for _, child, name in ends:
         if name in moving:
             bodies[child] = name
     # Links that are rigidly attached to a moved link move with it.
-    pending = list(bodies)
+    pending, attached = list(bodies), set(bodies)
     while pending:
         parent = pending.pop()
         for above, child, name in ends:
-            if above == parent and name not in moving:
+            if above == parent and name in fixed:
                 _remove_inertial(links[child])
+                attached.add(child)
                 pending.append(child)
+    stated = {link.name: link for link in read_elements(source).links}
     for child, name in bodies.items():
-        link = links[child]
-        _remove_inertial(link)
-        link.insert(0, _inertial(inertia[robot.joint_names.index(str(name))]))
+        body = robot.joint_names.index(str(name))
+        others = {
+            place.name: inertial_parameters(link.mass, link.com, link.inertia_at_com, place.pose)
+            for place in robot.links
+            if place.body == body + 1 and place.name not in attached and (link := stated[place.name]).mass > 0
+        }
+        own, _, share = remainder(inertia[body], others, set(), str(name))
+        if others:
+            remarks.append(f"{', '.join(others)} keep their inertia beside joint {name}, at the locked positions")
+        if share < 1.0:
+            remarks[-1] += f", their mass times {share:g}, because the identified link is too light for it"
+            for other in others:
+                link = stated[other]
+                _set_inertial(links[other], share * inertial_parameters(link.mass, link.com, link.inertia_at_com, EYE))
+        _set_inertial(links[child], own)
     return root
+
+
+def _set_inertial(link: Element, parameters: Array) -> None:
+    _remove_inertial(link)
+    link.insert(0, _inertial(parameters))
 
 
 def _end(joint: Element, tag: str) -> str | None:

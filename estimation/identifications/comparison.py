@@ -127,7 +127,7 @@ class Comparison:
         return self._latest[1]
 
     def _fill(self, sides: Sides, block: int, part: Rows, piece: slice, size: int) -> None:
-        """Sums the normal equations of one block: of the rows that count in a fit, and of all rows."""
+        """Sums the normal equations of one block: of the rows that count in a fit, and of all that are judged."""
         rows = piece.stop - piece.start
         whole = rows // size * size
         place = slice(piece.start, piece.start + (whole or rows))
@@ -135,15 +135,15 @@ class Comparison:
         motion, mask, tau = part.motion, part.mask[place], np.ascontiguousarray(part.tau[place].T)
         signals = motion.q[place], motion.dq[place], motion.ddq[place]
         all_sums = self.regressor.sums(*signals, size, part.gravity)
+        judged = part.judged[place]
         # Few rows do not count in full: their columns are asked for once more.
-        slow = np.flatnonzero((mask != 1).any(axis=1))
+        slow = np.flatnonzero((mask != 1).any(axis=1) | ~judged.all(axis=1))
         q, dq, ddq = (signal[slow] for signal in signals)
         slow_rows = self.regressor(q, dq, ddq, part.gravity)
         missing, speeds = 1 - mask[slow].T, np.ascontiguousarray(signals[1].T)
         groups, ones = len(mask) // size, np.ones(size)
-        held = np.zeros(len(missing), dtype=bool) if part.held is None else part.held
         for joint, (sums, some, used) in enumerate(zip(all_sums, slow_rows, self.regressor.used, strict=True)):
-            if held[joint]:
+            if not (judged[:, joint].any() or mask[:, joint].any()):
                 continue
             wide = np.tanh(speeds[joint] / WIDER[:, None])
             count = len(used)
@@ -152,18 +152,20 @@ class Comparison:
             # A product: numpy's own sum along so short an axis takes four times as long.
             rows[:, count:-1] = (wide.reshape(-1, size) @ ones).reshape(len(WIDER), groups).T
             rows[:, -1] = tau[joint].reshape(groups, size) @ ones
-            own = np.flatnonzero(missing[joint])
-            at = slow[own]
-            lost = np.column_stack([some[own], wide[:, at].T, tau[joint, at]]) * missing[joint, own, None]
-            places, lost = summed(lost, at // size)
-            products = side_products(rows, lost, places, size)
+            left_out = []
+            for share in (missing[joint], ~judged[slow, joint]):
+                own = np.flatnonzero(share)
+                at = slow[own]
+                lost = np.column_stack([some[own], wide[:, at].T, tau[joint, at]]) * share[own, None]
+                left_out.append(summed(lost, at // size))
+            products = side_products(rows, left_out, size)
             chosen = np.concatenate([used, self.base.size + joint * len(WIDER) + np.arange(len(WIDER))])
             for side, product in zip((sides.fitted, sides.judged), products, strict=True):
                 side.gram[joint, block][np.ix_(chosen, chosen)] = product[:-1, :-1]
                 side.cross[joint, block, chosen] = product[:-1, -1]
                 side.square[joint, block] = product[-1, -1]
         sides.fitted.count[:, block] = mask.sum(axis=0) / size
-        sides.judged.count[~held, block] = len(mask) / size
+        sides.judged.count[:, block] = judged.sum(axis=0) / size
 
     def _others(self, cutoff: float) -> list[Smoother]:
         """Smoothers of other kinds and about that cut-off."""
@@ -183,7 +185,7 @@ class Comparison:
         return others
 
     def left_out(self, blocks: Sides, trial: Trial) -> Array:
-        """RMS error of all rows of each block, predicted from the others (n,) [N m or N]."""
+        """RMS error of all rows of each block, but those at rest, predicted from the others (n,) [N m or N]."""
         judged = self.of_trial(blocks.judged, trial)
         squares = judged.squares(self._without(self.of_trial(blocks.fitted, trial), trial))
         return np.asarray(np.sqrt(squares / np.maximum(judged.count.sum(axis=1), 1)))

@@ -17,7 +17,7 @@ from estimation.regressions.braking_friction import with_braking_friction
 from estimation.regressions.joint_regressor import CHUNK, JointRegressor, chunks
 from estimation.regressions.moments import Moments
 from estimation.regressions.preparation import Prepared, Rows
-from estimation.uncertainty import Part, batch_factors, covariance, repeated_covariance
+from estimation.uncertainty import Part, Played, batch_factors, covariance, with_repetitions
 from robots.base_parameters import BaseParameters
 from robots.common.parallel import threaded
 
@@ -43,7 +43,7 @@ class Fit:
         rows: what was fitted, in order.
         torque: predicted, of all rows (N, n).
         predicted: the same, part by part.
-        nominal: sum of each joint's squared errors (n,) by the robot's description, over all rows; NaN without one.
+        nominal: sum of each joint's squared errors (n,) by the robot's description, but for rows at rest; NaN without.
         covariance: of the parameters (b, b).
         white: standard errors (b,) that white noise would have.
         prior_share: share of each parameter's variance (b,) that the prior's scatter makes; None where the estimator
@@ -105,7 +105,7 @@ def fit(base: BaseParameters, logs: Sequence[Prepared], estimator: Estimator, ch
         fitted = [Fitted(*some) for some in zip(rows, predicted, factors, strict=True)]
         scores = _scores(regressor, fitted, solution.weights) if long else scores
     averaged = round(AVERAGED / float(np.median([log.positions.period for log in logs])))
-    periods = [log.period for log in logs] if whole and not long else None
+    periods = [log.period for log in logs] if whole and len(rows) == len(logs) else None
     full, white, prior_share = covariances(
         regressor, fitted, scores, moments, solution, choice.ridge, averaged, seed, periods=periods
     )
@@ -174,7 +174,8 @@ def second_pass(regressor: JointRegressor, part: Rows, solution: Solution, torqu
             torque[at, joint] = fitted
             measured = part.tau[at, joint]
             expected = measured - expected
-            nominal[joint] = expected @ expected
+            judged = slice(None) if part.rest is None else ~part.rest[at, joint]
+            nominal[joint] = expected[judged] @ expected[judged]
             if scored:
                 score[used] += ((measured - fitted) * part.mask[at, joint] * solution.weights[joint]) @ Y
         return nominal, score
@@ -209,7 +210,7 @@ def covariances(
         averaged: rows that are averaged at a time, in a long log.
         seed: of the drawn noise.
         rows: of the whole log, where `fitted` are stretches of it; None where they are all.
-        periods: of the motion of each of `fitted` [s], None where it does not repeat; None for none.
+        periods: of the logs' motions [s], None where one does not repeat itself; None if `fitted` are not the logs.
     """
     weights = solution.weights
     inverse = moments.inverse(weights, ridge)
@@ -226,14 +227,17 @@ def covariances(
     seen = sum(part.rows for part in parts)
     share = seen / total
     averaged = min(averaged, seen // LEAST_AVERAGES)
-    if periods is not None:
-        times = [some.rows.motion.t for some in fitted]
-        full = repeated_covariance(parts, times, periods, weights, inverse, seed, averaged)
-    else:
-        full = covariance(parts, weights, inverse, seed, share=share, averaged=averaged)
+    full = covariance(parts, weights, inverse, seed, share=share, averaged=averaged)
     if share < 1:
         factors = batch_factors(scores, inverse, full)
         full = full * factors[:, None] * factors
+    if periods is not None:
+        whole = [_part(regressor, some, 0, len(some.torque)) for some in fitted]
+        played = [
+            Played(some.rows.motion.t, some.rows.motion.q, period, some.rows.gravity)
+            for some, period in zip(fitted, periods, strict=True)
+        ]
+        full = with_repetitions(full, whole, played, weights, inverse, seed, averaged)
     total_variance = np.maximum(np.diag(full + scatter), np.finfo(float).tiny)
     return full + scatter, white, np.clip(np.diag(scatter) / total_variance, 0.0, 1.0)
 

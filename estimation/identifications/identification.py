@@ -188,17 +188,14 @@ def _predictable(prepared: Sequence[Prepared], choice: Choice) -> NDArray[np.boo
 def _joint_fits(found: Fit, predictable: NDArray[np.bool_]) -> tuple[JointFit, ...]:
     """Measures each joint's errors, beside what a constant and the robot's description would give."""
     base, choice = found.base, found.choice
-    total = sum(len(part.motion) for part in found.rows)
-    rms = np.sqrt(sum(np.einsum("tj,tj->j", part.tau, part.tau) for part in found.rows) / total)
-    # On all rows, as the left-out errors are: those of a joint at rest do not count in the fit, but in its verdict.
-    errors = [part.tau - torque for part, torque in zip(found.rows, found.predicted, strict=True)]
-    fitted = np.sqrt(sum(np.einsum("tj,tj->j", error, error) for error in errors) / total)
-    # Friction holds a joint that stands with any torque.
-    known = (
-        error if part.held is None else np.where(part.held, np.nan, error)
-        for part, error in zip(found.rows, errors, strict=True)
-    )
-    band = band_of(np.abs(np.concatenate(list(known))))
+    # On the rows on which the left-out errors are: friction holds a joint that stands with any torque.
+    judged = np.concatenate([part.judged for part in found.rows])
+    total = np.maximum(judged.sum(axis=0), 1)
+    torque = np.concatenate([part.tau for part in found.rows])
+    rms = np.sqrt(np.einsum("tj,tj,tj->j", torque, torque, judged) / total)
+    error = torque - np.concatenate(list(found.predicted))
+    fitted = np.sqrt(np.einsum("tj,tj,tj->j", error, error, judged) / total)
+    band = band_of(np.abs(np.where(judged, error, np.nan)))
     nominal = np.sqrt(found.nominal / total)
     floor = _noise_floor(found)
     return tuple(

@@ -193,8 +193,8 @@ class Transfer:
             kept = np.flatnonzero(place[used] >= 0)
             Y = np.concatenate([found[joint][:, kept] for found in parts])
             tau = np.concatenate([part.tau[at, joint] for _, part, at in chosen])
-            held = [np.full(len(at), part.held is not None and part.held[joint]) for _, part, at in chosen]
-            rows.append((Y, place[used[kept]], np.where(np.concatenate(held), np.nan, tau)))
+            judged = np.concatenate([part.judged[at, joint] for _, part, at in chosen])
+            rows.append((Y, place[used[kept]], np.where(judged, tau, np.nan)))
         return rows, np.concatenate([np.full(len(at), k) for k, _, at in chosen])
 
 

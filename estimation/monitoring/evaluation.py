@@ -101,7 +101,7 @@ class Evaluation:
         if found is None:
             return
         if self.end is not None:
-            self.heat.advance(np.zeros(self.n), start - self.end, found.ambient)
+            self.heat.pause(start - self.end, found.ambient)
         self.heat.temperatures = found.temperatures
         cold = np.maximum((found.directions.friction * found.dq).mean(axis=0), 0.0)
         self.heat.advance(cold * self._expected(), (end - start) / 2, found.ambient)
@@ -194,10 +194,11 @@ class Evaluation:
         if skip:
             return
         alarms = [
-            index
-            for index, value, variance, row in values
-            if self.quantities[index].observe(
-                Sample(window.start, window.end, window.t, value, variance, row), learn=self.event is None
+            v.index
+            for v in values
+            if self.quantities[v.index].observe(
+                Sample(window.start, window.end, window.t, v.value, v.variance, v.features, v.unlogged),
+                learn=self.event is None,
             )
         ]
         if self.event is not None:

@@ -59,7 +59,7 @@ def initial_quantities(
     for k in range(baseline.payload_count):
         size = level / max(float(np.sqrt(np.mean(payload[:, :, k] ** 2))), 1e-9)
         add("payload", k, zero, size * one, SHARE * size)
-    common = max(heat.common_spread, 1e-9)
+    common = max(float(heat.common_spread[0]), 1e-9)
     add("common", 0, zero, common * one, SHARE * common)
     for j in range(n):
         add("residual", j, np.log(residual[j]) * one, RESIDUAL_SPREAD * one, RESIDUAL_SCATTER)

@@ -10,6 +10,8 @@ import numpy as np
 from robots.common.errors import InputError
 
 Heat = Literal["auto", "model", "temperature", "common", "none"]
+# A longer time between windows [s] is a pause, in which the robot may work unseen.
+PAUSE = 30.0
 HEATS = ("auto", "model", "temperature", "common", "none")
 
 

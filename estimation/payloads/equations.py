@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from estimation.payloads.paths import PathMatch
 from estimation.regressions.preparation import Rows
+from estimation.uncertainty import Played
 from robots.geometry.inertia import SIZE
 from robots.regressor import TorqueModel
 from robots.signals import Motion
@@ -91,7 +92,8 @@ class Equations:
     def __init__(self, arm: Arm, source: Source) -> None:
         self.arm, self.source = arm, source
         self.target, self.mask = source.beyond, source.rows.mask
-        self.t, self.period = source.rows.motion.t, source.period
+        motion = source.rows.motion
+        self.played = Played(motion.t, motion.q, source.period, source.rows.gravity, source.carries)
 
     @property
     def rows(self) -> int:
@@ -122,7 +124,8 @@ class PairedEquations(Equations):
         self.target = _turned(loaded.beyond[self.first], free.beyond[self.second])
         both = loaded.rows.mask[self.first] * free.rows.mask[self.second]
         self.mask = np.concatenate([both, both], axis=1)
-        self.t, self.period = loaded.rows.motion.t[self.first], loaded.period
+        motion = loaded.rows.motion
+        self.played = Played(motion.t[self.first], motion.q[self.first], loaded.period, loaded.rows.gravity)
 
     def regressor(self, start: int, stop: int) -> Array:
         """Evaluates the columns of some rows (stop - start, 2 n, b + 10)."""

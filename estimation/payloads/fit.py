@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from estimation.payloads.equations import Arm, Equations
 from estimation.regressions.moments import Moments
-from estimation.uncertainty import Part, repeated_covariance
+from estimation.uncertainty import Part, covariance, with_repetitions
 from robots.geometry.inertia import SIZE
 
 Array = NDArray[np.float64]
@@ -47,7 +47,7 @@ def fit_payload(arm: Arm, equations: Sequence[Equations], *, period: float, seed
     """Fits the payload and the arm's parameters to all equations.
 
     The channels are weighted by their inverse noise. The arm's prior knowledge counts as data with its own scatter;
-    the covariance of the rest is a sandwich, see `estimation.uncertainty.repeated_covariance`.
+    the covariance of the rest is a sandwich, see `estimation.uncertainty.with_repetitions`.
 
     Args:
         arm: prior knowledge of the arm.
@@ -70,15 +70,10 @@ def fit_payload(arm: Arm, equations: Sequence[Equations], *, period: float, seed
     values = inverse @ (weights @ moments.cross + known @ target)
     used = [np.flatnonzero(np.diag(gram) > 0) for gram in moments.gram]
     rows = sum(some.rows for some in equations)
-    full = repeated_covariance(
-        [Part(some.rows, some.regressor, some.mask, _residual(some, values), used) for some in equations],
-        [some.t for some in equations],
-        [some.period for some in equations],
-        weights,
-        inverse,
-        seed,
-        averaged=min(round(AVERAGED / period), rows // LEAST_AVERAGES),
-    )
+    errors = [Part(some.rows, some.regressor, some.mask, _residual(some, values), used) for some in equations]
+    averaged = min(round(AVERAGED / period), rows // LEAST_AVERAGES)
+    full = covariance(errors, weights, inverse, seed, averaged=averaged)
+    full = with_repetitions(full, errors, [some.played for some in equations], weights, inverse, seed, averaged)
     full = full + inverse @ scatter @ inverse
     arm_alone = _without(moments, weights, known, target)
     return PayloadFit(

@@ -17,14 +17,19 @@ Array = NDArray[np.float64]
 
 # A speed, acceleration or range larger than the recorded one by this factor is said.
 BEYOND = 1.1
+# Shares of the fitted speeds at which friction is slow, and holds a joint at rest.
+SLOW = np.array([0.05, 0.1, 0.2])
 
 
-def band_of_motion(model: Model, motion: Motion, gravity: Array | None) -> tuple[Array, NDArray[np.bool_]] | None:
+def band_of_motion(
+    model: Model, motion: Motion, gravity: Array | None, rest: NDArray[np.bool_] | None = None
+) -> tuple[Array, NDArray[np.bool_]] | None:
     """Half-widths (N, n) of the 95 % band, and where (N, n) the motion is an extrapolation; None without a band.
 
     The width of the fitted logs' errors, that of the parameters' errors and that of friction beyond the fitted speeds
     add up as independent ones do. The latter two grow with the distance from what the fit has seen: speeds,
-    accelerations and places that its rows hardly held.
+    accelerations and places that its rows hardly held. A joint at rest (N, n) may be held by friction up to that of
+    slow motion, in either direction.
     """
     known = model.provenance
     if known.get("band95") is None:
@@ -33,14 +38,34 @@ def band_of_motion(model: Model, motion: Motion, gravity: Array | None) -> tuple
     if "band_covariance" not in known:
         return level.copy(), np.zeros(motion.q.shape, dtype=bool)
     growth, covariance = (np.asarray(known[key], dtype=float) for key in ("band_growth", "band_covariance"))
-    torque_model, open_, shape = model.torque_model.under(gravity), np.zeros(motion.q.shape), np.zeros(motion.q.shape)
+    torque_model, (open_, shape, held) = model.torque_model.under(gravity), np.zeros((3, *motion.q.shape))
     friction = np.array([column.friction for column in model.parameters])
+    holding = _slow_friction(model) if rest is not None and rest.any() else None
     for rows in chunks(len(motion)):
         Y = torque_model.regressor(motion.q[rows], motion.dq[rows], motion.ddq[rows], columns=model.columns)
         open_[rows] = np.sqrt(np.maximum(np.einsum("tjp,tjp->tj", Y @ covariance, Y), 0.0))
-        shape[rows] = _friction_beyond(model, Y[:, :, friction] @ model.values[friction], motion.dq[rows])
+        torque = Y[:, :, friction] @ model.values[friction]
+        shape[rows] = _friction_beyond(model, torque, motion.dq[rows])
+        if rest is not None and holding is not None:
+            held[rows] = np.where(rest[rows], holding + np.abs(torque), 0.0)
     reach = np.asarray(known["band_reach"], dtype=float)
-    return np.hypot(level, NORMAL_95 * np.hypot(growth * open_, shape)), open_ > reach
+    return np.hypot(level, NORMAL_95 * np.hypot(growth * open_, shape)) + held, open_ > reach
+
+
+def _slow_friction(model: Model) -> Array:
+    """Largest friction of each joint (n,) at speeds up to a fifth of the fitted ones [N m or N]."""
+    recorded = model.provenance.get("recorded")
+    if recorded is None:
+        return np.zeros(model.robot.n)
+    return np.asarray(np.abs(_friction_at(model, np.asarray(recorded["velocity"][0], dtype=float), SLOW)).max(axis=0))
+
+
+def _friction_at(model: Model, speed: Array, shares: Array) -> Array:
+    """Friction (m, n) at some shares (m,) of each joint's speed (n,)."""
+    names = [column.name for column in model.parameters if column.friction]
+    values = model.values[[column.friction for column in model.parameters]]
+    table = friction_table(model, names, speed, shares)
+    return np.array([[sum(row[i] * values[i] for i in own) for own in _columns_by_joint(model)] for row in table])
 
 
 def _friction_beyond(model: Model, friction: Array, dq: Array) -> Array:
@@ -58,12 +83,7 @@ def _friction_beyond(model: Model, friction: Array, dq: Array) -> Array:
     if recorded is None:
         return np.zeros(dq.shape)
     fitted = np.asarray(recorded["velocity"][0], dtype=float)
-    names = [column.name for column in model.parameters if column.friction]
-    values = model.values[[column.friction for column in model.parameters]]
-    table = friction_table(model, names, fitted, np.array([0.5, 1.0]))
-    half, whole = (
-        np.array([sum(row[i] * values[i] for i in own) for own in _columns_by_joint(model)]) for row in table
-    )
+    half, whole = _friction_at(model, fitted, np.array([0.5, 1.0]))
     slope = np.divide(2 * (whole - half), fitted, out=np.zeros_like(fitted), where=fitted > 0)
     further = np.abs(dq) - fitted
     return np.asarray(np.where(further > 0, np.abs(np.sign(dq) * friction - whole - slope * further), 0.0))

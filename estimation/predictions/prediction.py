@@ -11,12 +11,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from estimation.gate import GateReport
-from estimation.logs.clocks import clock_shift_between, earlier_logs_on_clock
 from estimation.logs.known_setup import HEAT, require_plain
 from estimation.models.model import Model
 from estimation.predictions.band import band_of_motion, beyond_the_recorded
 from estimation.predictions.checked_motions import checked_motion, joined, note_meaning, smoother_of
-from estimation.preprocessing import resample, smooth
+from estimation.predictions.earlier_logs import clock_shift, warmed
+from estimation.preprocessing import resample, rows_at_rest, smooth
 from estimation.preprocessing.smoothing import low_pass
 from estimation.regressions.preparation import torque_of
 from estimation.regressions.torque_meanings import as_joint_torque
@@ -24,7 +24,6 @@ from robots.common.errors import InputError
 from robots.common.plain import all_finite, finite, percent
 from robots.common.tables.table_files import write_table
 from robots.signals import Log, Motion
-from robots.terms.effect_bases.capabilities import Persistence
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -51,6 +50,8 @@ class Prediction:
         beyond: what exceeds the recorded motions, in words.
         cutoff: of the model's smoothing [Hz]: above it, no motion is known.
         gate: the check of the log; None without one.
+        rest: rows (N, n) in which the joint stands: friction may hold it with any torque, and the band is that wide.
+            They do not count in the errors. None for none.
     """
 
     motion: Motion
@@ -62,25 +63,26 @@ class Prediction:
     beyond: tuple[str, ...] = ()
     cutoff: float = np.inf
     gate: GateReport | None = None
+    rest: NDArray[np.bool_] | None = None
 
     @property
     def error_rms(self) -> Array:
         """RMS of measured minus predicted torque (n,); NaN without measurement."""
         if self.measured is None:
             return np.full(self.predicted.shape[1], np.nan)
-        return np.sqrt(np.mean((self.measured - self.predicted) ** 2, axis=0))
+        return self._rms(self.measured - self.predicted)
 
     @property
     def nrmse(self) -> Array:
         """Error RMS over torque RMS (n,)."""
-        return self._over(self.error_rms, None if self.measured is None else np.sqrt(np.mean(self.measured**2, axis=0)))
+        return self._over(self.error_rms, None if self.measured is None else self._rms(self.measured))
 
     @property
     def relative_spread(self) -> Array:
         """Standard deviation of the error over that of the torque (n,): 1 is no better than a constant."""
         if self.measured is None:
             return self.error_rms
-        return self._over((self.measured - self.predicted).std(axis=0), self.measured.std(axis=0))
+        return self._over(self._std(self.measured - self.predicted), self._std(self.measured))
 
     @property
     def band_limited_spread(self) -> Array:
@@ -97,7 +99,7 @@ class Prediction:
         both = (self.measured - self.predicted, self.measured)
         even = (np.column_stack([np.interp(grid, t, column) for column in x.T]) for x in both)
         error, torque = (low_pass(x, period, self.cutoff) for x in even)
-        return self._over(error.std(axis=0), torque.std(axis=0))
+        return self._over(self._std(error), self._std(torque))
 
     @property
     def band_coverage(self) -> Array:
@@ -105,6 +107,16 @@ class Prediction:
         if self.measured is None or self.band is None:
             return np.full(self.predicted.shape[1], np.nan)
         return np.asarray((np.abs(self.measured - self.predicted) <= self.band).mean(axis=0))
+
+    @property
+    def _judged(self) -> Array:
+        return np.ones(self.predicted.shape) if self.rest is None else (~self.rest).astype(float)
+
+    def _rms(self, signal: Array) -> Array:
+        return np.asarray(np.sqrt(np.average(signal**2, axis=0, weights=self._judged)))
+
+    def _std(self, signal: Array) -> Array:
+        return self._rms(signal - np.average(signal, axis=0, weights=self._judged))
 
     def _over(self, error: Array, scale: Array | None) -> Array:
         if scale is None:
@@ -127,6 +139,11 @@ class Prediction:
             share, spread, slow, covered = (f"{100 * v:.2f} %" if np.isfinite(v) else "–" for v in shares)
             lines.append(f"  {j} {name[:18]:18} {rms:12.4g} {share:>10} {spread:>14} {slow:>15} {covered:>21}")
         lines.append("  rel.: error divided by torque; last column: share of the errors within the 95 % band")
+        if self.rest is not None:
+            lines.append(
+                f"  {percent(float(self.rest.mean()))} of the torques are of joints at rest: friction may hold them "
+                "with any torque; they do not count in the errors"
+            )
         return "\n".join([*lines, *self._extrapolation()])
 
     def _extrapolation(self) -> list[str]:
@@ -151,6 +168,7 @@ class Prediction:
         return {
             "samples": len(self.motion),
             "extrapolates": None if self.extrapolates is None else self.extrapolates.mean(axis=0).tolist(),
+            "at_rest": None if self.rest is None else self.rest.mean(axis=0).tolist(),
             "beyond_the_recorded": list(self.beyond),
             "cutoff_hz": finite(self.cutoff),
             "gate": None if self.gate is None else self.gate.to_dict(),
@@ -244,7 +262,8 @@ def predict(
 
         require_plain([log], HEAT)
         predicted, _ = thermal.simulate(motion, ambient=surroundings(log, motion.t, ambient), start=start)
-    band = band_of_motion(model, motion, log.gravity)
+    rest = np.concatenate([rows_at_rest(part.t, part.q) for part in parts])
+    band = band_of_motion(model, motion, log.gravity, rest)
     return Prediction(
         motion=motion,
         predicted=predicted,
@@ -255,45 +274,5 @@ def predict(
         beyond=beyond_the_recorded(model, motion),
         cutoff=cutoff,
         gate=gate,
+        rest=rest if rest.any() else None,
     )
-
-
-def clock_shift(model: Model, log: Log) -> tuple[float, str]:
-    """Time shift [s] of a log for a model that changes with time, and a note on it.
-
-    Time-dependent effects refer to the clock of the logs of the model's fit (`clock_shift_between`).
-    """
-    if not any(extension.source.persistence is not Persistence.STATE for extension in model.extensions):
-        return 0.0, ""
-    return clock_shift_between(model.provenance.get("logs", ()), log)
-
-
-def warmed(model: Model, before: Sequence[Log], log: Log, later: float) -> tuple[list[Log], str]:
-    """Puts earlier logs that warmed the robot up on a model's clock, and gives a note on the assumption.
-
-    A model without thermal effects needs no note.
-
-    Args:
-        model: with the effects.
-        before: the logs, in the order in which they were recorded where their clocks each began anew.
-        log: the motion.
-        later: how much later [s] than its own clock says that counts (`clock_shift`).
-
-    Raises:
-        InputError: logs that come after the motion; any, of a model that keeps no heat.
-    """
-    if not model.keeps_heat:
-        if before:
-            remedy = "use a model of oed thermal, or remove the earlier logs (--before)"
-            raise InputError("the model has no thermal part", remedy=remedy)
-        return [], ""
-    if not before:
-        return [], COLD
-    shifts = [clock_shift(model, own)[0] for own in before]
-    placed, anew = earlier_logs_on_clock(before, log, float(log.t[0]) + later, shifts)
-    count = "one log" if len(before) == 1 else f"{len(before)} logs"
-    assumed = f"thermal friction: initial temperatures from {count} before; the first is assumed to start cold"
-    return placed, f"{assumed}; {anew}" if anew else assumed
-
-
-COLD = "thermal friction: the robot is assumed cold at the start; give earlier logs with --before if it was warm"

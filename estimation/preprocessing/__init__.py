@@ -3,6 +3,7 @@
 from estimation.preprocessing.base import Smoother
 from estimation.preprocessing.harmonics import Harmonics, period_of
 from estimation.preprocessing.resampling import Resampled, between_rows, resample, stale_rows
+from estimation.preprocessing.rest import rows_at_rest
 from estimation.preprocessing.smoothing import LowPass, smooth
 from estimation.preprocessing.spline import SmoothingSpline
 
@@ -15,6 +16,7 @@ __all__ = [
     "between_rows",
     "period_of",
     "resample",
+    "rows_at_rest",
     "smooth",
     "stale_rows",
 ]

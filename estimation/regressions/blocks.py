@@ -137,23 +137,29 @@ class Sides:
         return Sides(Blocks.empty(joints, blocks, columns), Blocks.empty(joints, blocks, columns))
 
 
-def side_products(sums: Array, lost: Array, places: NDArray[np.intp], size: int) -> tuple[Array, Array]:
+def side_products(
+    sums: Array,
+    left_out: Sequence[tuple[NDArray[np.intp], Array]],
+    size: int,
+) -> list[Array]:
     """Multiplies the columns of rows that are averaged so many at a time with each other.
 
     Args:
         sums: of each group of `size` rows of one joint (G, k), all rows counting alike.
-        lost: of some groups what of their sums does not count in a fit (P, k); what is left of such an average is
-            still an equation.
-        places: which groups those are (P,).
+        left_out: of each side which groups have rows that do not count (P,), ascending, and the sum of these rows
+            (P, k); what is left of such an average is still an equation.
         size: rows of a group.
 
     Returns:
-        (k, k), of the rows as they count in a fit, and of all rows alike.
+        (k, k) of each side.
     """
-    if not len(places):
-        common = sums.T @ sums / size**2
-        return common, common
-    rest = sums[places]
-    sums[places] = 0.0
-    common, counted = sums.T @ sums, rest - lost
-    return (common + counted.T @ counted) / size**2, (common + rest.T @ rest) / size**2
+    touched = np.unique(np.concatenate([places for places, _ in left_out]))
+    whole = sums[touched]
+    sums[touched] = 0.0
+    common = sums.T @ sums
+    found = []
+    for places, lost in left_out:
+        own = whole.copy()
+        own[np.searchsorted(touched, places)] -= lost
+        found.append((common + own.T @ own) / size**2)
+    return found

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from estimation.logs.known_setup import Load, load_of
-from estimation.preprocessing import LowPass, Resampled, Smoother, period_of, resample, smooth
+from estimation.preprocessing import LowPass, Resampled, Smoother, period_of, resample, rows_at_rest, smooth
 from robots.common.errors import InputError
 from robots.common.parallel import threaded
 from robots.robot import Robot
@@ -41,14 +41,20 @@ class Rows:
         tau: measured torque (N, n), as it was logged, minus that of a known payload.
         mask: (N, n), zero where a row of a joint does not count.
         gravity: (3,) in the base frame [m/s2]; None as the robot's description says.
-        held: joints (n,) that stand here and move in another log: no prediction is judged by them; None for none.
+        rest: rows (N, n) in which the joint stands: friction may hold it with any torque, so that no prediction is
+            judged by them; None for none.
     """
 
     motion: Motion
     tau: Array
     mask: Array
     gravity: Array | None = None
-    held: NDArray[np.bool_] | None = None
+    rest: NDArray[np.bool_] | None = None
+
+    @property
+    def judged(self) -> NDArray[np.bool_]:
+        """Rows (N, n) by which a prediction is judged."""
+        return np.ones(self.tau.shape, dtype=bool) if self.rest is None else ~self.rest
 
 
 @dataclass(frozen=True)
@@ -164,9 +170,13 @@ class Prepared:
         if not moves.all():
             motion = Motion(motion.t, motion.q, motion.dq * moves, motion.ddq * moves)
         fast = np.abs(motion.dq) >= SLOW * speed
+        first = int(np.searchsorted(self.log.t, motion.t[0]))
+        logged = slice(first, first + len(motion))
+        rest = rows_at_rest(self.log.t[logged], self.log.q[logged], speed) & moves | held
         if self.load is not None:
             tau = tau - self.load.torque(motion)
-        return Rows(motion, tau, ((fast | ~moves) & ~held).astype(float), self.log.gravity, self.held)
+        mask = ((fast | ~moves) & ~held).astype(float)
+        return Rows(motion, tau, mask, self.log.gravity, rest if rest.any() else None)
 
 
 def prepare(robot: Robot, log: Log) -> Prepared:

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from estimation.thermal.results.choice import Candidate, ThermalChoice, phase_errors
 from estimation.thermal.results.estimate import ThermalEstimate
+from estimation.thermal.runs.run_temperatures import run_temperatures
 from estimation.thermal.runs.thermal_run import ThermalRun, named_apart
 from estimation.thermal.thermal_fit import fit_thermal
 from robots.common.errors import InputError, OedError
@@ -152,18 +153,7 @@ def predict_run(
         Which of the run's times each measurement belongs to (M,), and the errors (M,): friction over its cold value,
         and temperatures [K].
     """
-    around: Array | float | None = ambient
-    if run.ambient is not None:
-        values = np.asarray(run.ambient)
-        seen = np.isfinite(values)
-        around = np.interp(run.t, run.t[seen], values[seen])[:-1]
-    T3 = None
-    if run.T3 is not None and model.name == "advanced":
-        seen = np.isfinite(run.T3)
-        T3 = np.interp(run.t, run.t[seen], run.T3[seen])[:-1]
-    T = model.temperatures(
-        run.held_power, np.diff(run.t), start=list(start), ambient=around, T3=T3, drives=np.asarray(run.drives)[:-1]
-    )
+    T = run_temperatures(model, run, start, ambient=ambient)
     index, errors = [], []
     known = np.flatnonzero(np.isfinite(run.ratio))
     index.append(known)

@@ -1,101 +1,224 @@
-"""Logs that repeat one motion: what a model misses repeats with the motion, and counts once and not once a period."""
+"""Logs that repeat a motion: what a model misses repeats with the motion, and counts once and not once a repetition."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.fft import irfft, next_fast_len, rfft
 
 from estimation.uncertainty.sandwich import Part, covariance
 
 Array = NDArray[np.float64]
 
-# Fewer rows a period do not show a noise's colour.
+# Fewer rows a repetition do not show a noise's colour.
 LEAST_ROWS = 100
 # Smoothing takes the ends of a log of two periods.
 LEAST_PERIODS = 1.5
 # Steps of time that differ by more than this share make no uniform grid.
 UNEVEN = 0.5
+# Two logs play one motion if their positions differ by less than this share of each joint's standard deviation, over
+# this share of the shorter one. Half a sample of delay makes a fiftieth in a fast motion.
+ALIKE, OVERLAP = 0.05, 0.5
 
 
-def folded(part: Part, t: Array, period: float | None) -> Part:
-    """Averages the rows of equal phase over the periods of a log.
+@dataclass(frozen=True, eq=False)
+class Played:
+    """The motion behind the rows of a log.
 
-    The score Y'We of a fit is, phase by phase, the number of periods times the mean row times the mean residual. Noise
-    averages out in that mean; what the model misses does not. A covariance of the mean residual therefore holds both.
+    Attributes:
+        t: times (N,) [s].
+        q: positions (N, n) [rad or m].
+        period: with which it repeats itself [s]; None where it does not.
+        gravity: (3,) in the base frame [m/s2]; None as the robot's description says. The same motion under another
+            gravity has another regressor, and does not repeat this one.
+        carries: nor with another load.
+    """
+
+    t: Array
+    q: Array
+    period: float | None
+    gravity: Array | None = None
+    carries: bool = False
+
+    def is_like(self, other: Played) -> bool:
+        """Whether equal positions of both have equal regressors, row by row."""
+        if self.step is None or other.step is None or self.q.shape[1] != other.q.shape[1]:
+            return False
+        same_clock = abs(self.step / other.step - 1) * min(len(self.t), len(other.t)) < 1
+        if not same_clock or self.carries != other.carries or (self.gravity is None) != (other.gravity is None):
+            return False
+        return self.gravity is None or other.gravity is None or np.array_equal(self.gravity, other.gravity)
+
+    @property
+    def step(self) -> float | None:
+        """Period of the rows [s]; None where they are on no uniform grid."""
+        steps = np.diff(self.t)
+        step = float(np.median(steps)) if len(steps) else 0.0
+        return step if step > 0 and float(np.ptp(steps)) <= UNEVEN * step else None
+
+
+class Place(NamedTuple):
+    """Where a repetition begins: the number of its log, and its first row, which may lie before the log's first."""
+
+    log: int
+    row: int
+
+
+def repetitions(logs: Sequence[Played]) -> list[tuple[int, list[Place]]]:
+    """Groups the logs by their motions, and finds where each repetition of a motion begins.
 
     Args:
-        part: the log's rows.
-        t: times (N,) [s].
-        period: of the motion [s]; None for none.
+        logs: in any order.
 
     Returns:
-        One period, which counts as often as the motion repeats; the same part where it does not, or not on a grid.
+        Of each motion the rows of one repetition, and where it begins. A log that neither repeats itself nor another
+        has one place.
     """
-    steps = np.diff(t)
-    step = float(np.median(steps)) if len(steps) else 0.0
-    if period is None or step <= 0 or float(np.ptp(steps)) > UNEVEN * step:
-        return part
-    rows = round(period / step)
-    begins = [round(k * period / step) for k in range(int(part.rows * step / period) + 1)]
-    begins = [begin for begin in begins if begin < part.rows]
-    if rows < LEAST_ROWS or part.rows < LEAST_PERIODS * rows:
-        return part
-    counts, errors = np.zeros((rows, part.mask.shape[1])), np.zeros((rows, part.mask.shape[1]))
-    for begin in begins:
-        length = min(rows, part.rows - begin)
-        counts[:length] += part.mask[begin : begin + length]
-        errors[:length] += part.residual[begin : begin + length]
+    found: list[tuple[int, list[Place]]] = []
+    leaders: list[int] = []
+    for log in sorted(range(len(logs)), key=lambda i: -len(logs[i].t)):
+        for number, leader in enumerate(leaders):
+            shift = _shift(logs[leader], logs[log])
+            if shift is not None:
+                rows, places = found[number]
+                found[number] = (rows, [*places, *_places(logs[leader], logs[log], log, -shift, rows)])
+                break
+        else:
+            leaders.append(log)
+            rows = _rows(logs[log])
+            found.append((rows, _places(logs[log], logs[log], log, 0, rows)))
+    return found
+
+
+def _rows(log: Played) -> int:
+    """Rows of one period, or of the log."""
+    whole = len(log.t)
+    if log.period is None or log.step is None:
+        return whole
+    rows = round(log.period / log.step)
+    return rows if rows >= LEAST_ROWS and whole >= LEAST_PERIODS * rows else whole
+
+
+def _places(leader: Played, log: Played, number: int, first: int, rows: int) -> list[Place]:
+    """Repetitions within a log, of which one begins at a row that may lie outside."""
+    if rows == len(leader.t) or leader.period is None or leader.step is None:
+        return [Place(number, first)]
+    exact = leader.period / leader.step
+    numbers = np.arange(np.floor(-first / exact), np.ceil((len(log.t) - first) / exact))
+    begins = np.round(first + numbers * exact).astype(int).tolist()
+    return [Place(number, begin) for begin in begins if begin > -rows and begin < len(log.t)]
+
+
+def _shift(one: Played, other: Played) -> int | None:
+    """The rows by which the motion of another log comes before that of the first; None if it is not the same."""
+    least = max(LEAST_ROWS, int(OVERLAP * min(len(one.q), len(other.q))))
+    if not one.is_like(other) or min(len(one.q), len(other.q)) < least:
+        return None
+    spread = one.q.std(axis=0)
+    scale = np.where(spread > 1e-6 * max(1.0, float(spread.max())), spread, max(float(spread.max()), 1e-12))
+    a, b = (one.q - one.q.mean(axis=0)) / scale, (other.q - one.q.mean(axis=0)) / scale
+    length = next_fast_len(len(a) + len(b), real=True)
+    product = np.conj(rfft(b, length, axis=0)) * rfft(a, length, axis=0)
+    shifts = np.arange(least - len(b), len(a) - least + 1)
+    cross = irfft(product.sum(axis=1), length)[shifts]
+    first, last = np.maximum(shifts, 0), np.minimum(len(a), len(b) + shifts)
+    sums = (np.concatenate([[0.0], np.cumsum((x**2).sum(axis=1))]) for x in (a, b))
+    square_a, square_b = sums
+    squares = square_a[last] - square_a[first] + square_b[last - shifts] - square_b[first - shifts]
+    best = int(np.argmin((squares - 2 * cross) / (last - first)))
+    begin, end, shift = int(first[best]), int(last[best]), int(shifts[best])
+    miss = np.sqrt(np.mean((a[begin:end] - b[begin - shift : end - shift]) ** 2, axis=0))
+    return shift if float(miss.max()) < ALIKE else None
+
+
+def folded(parts: Sequence[Part], rows: int, places: Sequence[Place]) -> Part:
+    """Averages the rows of equal phase over the repetitions of a motion.
+
+    The score Y'We of a fit is, phase by phase, the number of repetitions times the mean row times the mean residual.
+    Noise averages out in that mean; what the model misses does not. A covariance of the mean residual therefore holds
+    both.
+
+    Args:
+        parts: the logs' rows.
+        rows: of one repetition.
+        places: where the repetitions begin.
+
+    Returns:
+        One repetition, which counts as often as the motion repeats; the log itself where it plays once.
+    """
+    if len(places) == 1:
+        return parts[places[0].log]
+    first = parts[places[0].log]
+    ends = [min(place.row + rows, parts[place.log].rows) for place in places]
+    counts, errors = np.zeros((rows, first.mask.shape[1])), np.zeros((rows, first.mask.shape[1]))
+    for place, end in zip(places, ends, strict=True):
+        part, begin = parts[place.log], max(place.row, 0)
+        counts[begin - place.row : end - place.row] += part.mask[begin:end]
+        errors[begin - place.row : end - place.row] += part.residual[begin:end]
+
+    def mean(evaluate: Callable[[Part, int, int], Sequence[Array]], start: int, stop: int) -> list[Array]:
+        totals: list[Array] = []
+        seen = np.zeros(stop - start)
+        for place, end in zip(places, ends, strict=True):
+            begin, last = max(place.row + start, 0), min(place.row + stop, end)
+            if begin >= last:
+                continue
+            at = slice(begin - place.row - start, last - place.row - start)
+            pieces = evaluate(parts[place.log], begin, last)
+            totals = totals or [np.zeros((stop - start, *piece.shape[1:])) for piece in pieces]
+            for total, piece in zip(totals, pieces, strict=True):
+                total[at] += piece
+            seen[at] += 1
+        return [total / np.maximum(seen, 1).reshape(-1, *[1] * (total.ndim - 1)) for total in totals]
 
     def regressor(start: int, stop: int) -> Array:
-        ends = [min(begin + stop, part.rows) for begin in begins]
-        pieces = [
-            part.regressor(begin + start, end) for begin, end in zip(begins, ends, strict=True) if end > begin + start
-        ]
-        total, seen = np.zeros((stop - start, *pieces[0].shape[1:])), np.zeros(stop - start)
-        for piece in pieces:
-            total[: len(piece)] += piece
-            seen[: len(piece)] += 1
-        return total / seen[:, None, None]
+        (found,) = mean(lambda part, begin, last: [part.regressor(begin, last)], start, stop)
+        return found
+
+    def split(start: int, stop: int) -> list[Array]:
+        return mean(lambda part, begin, last: part.split(begin, last) if part.split else [], start, stop)
 
     return Part(
         rows=rows,
         regressor=regressor,
-        mask=counts / len(begins),
+        mask=counts / len(places),
         residual=errors / np.where(counts > 0, counts, 1.0),
-        used=part.used,
-        repeats=len(begins),
+        used=first.used,
+        split=None if first.split is None else split,
+        repeats=len(places),
     )
 
 
-def repeated_covariance(
+def with_repetitions(
+    plain: Array,
     parts: Sequence[Part],
-    times: Sequence[Array],
-    periods: Sequence[float | None],
+    played: Sequence[Played],
     weights: Array,
     inverse: Array,
     seed: int = 0,
     averaged: int = 1,
 ) -> Array:
-    """Estimates the covariance of weighted least squares, of logs that may repeat their motion.
+    """Raises the covariance of weighted least squares where logs repeat a motion.
 
-    It is that of `covariance`; where logs repeat, each parameter's standard error is at least that of one period.
+    Each parameter's standard error is at least that of the averaged repetitions.
 
     Args:
-        parts: the logs.
-        times: of their rows [s].
-        periods: of their motions [s]; None where a motion does not repeat.
+        plain: covariance as if the rows were of different motions (p, p).
+        parts: the whole logs.
+        played: their motions.
         weights: of the joints' rows (n,).
         inverse: of the weighted Gram matrix (p, p).
         seed: of the drawn noise.
         averaged: see `covariance`.
     """
-    plain = covariance(parts, weights, inverse, seed, averaged=averaged)
-    once = [folded(part, t, period) for part, t, period in zip(parts, times, periods, strict=True)]
-    if all(one is part for one, part in zip(once, parts, strict=True)):
+    found = repetitions(played)
+    if all(len(places) == 1 for _, places in found):
         return plain
-    repeating = covariance(once, weights, inverse, seed, averaged=averaged)
+    repeating = covariance([folded(parts, *motion) for motion in found], weights, inverse, seed, averaged=averaged)
     own = np.diag(plain)
     ratio = np.divide(np.diag(repeating), own, out=np.ones_like(own), where=own > 0)
     factor = np.sqrt(np.maximum(1.0, ratio))

@@ -60,7 +60,7 @@ def heat_of(
     import json as codec
 
     from estimation import read_logs
-    from estimation.predictions.prediction import warmed
+    from estimation.predictions.earlier_logs import warmed
     from estimation.thermal import start_temperatures, thermal_from_dict
     from robots.common.errors import InputError
 

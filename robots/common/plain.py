@@ -29,3 +29,9 @@ def two_digits(value: float) -> str:
 def percent(share: float) -> str:
     """Writes a share in per cent with two significant digits."""
     return f"{two_digits(100 * share)} %"
+
+
+def joints_in_words(numbers: Iterable[int | str]) -> str:
+    """Names joints by their numbers: ``joint 2``, or ``joints 1, 2 and 4``."""
+    *first, last = map(str, numbers)
+    return f"joints {', '.join(first)} and {last}" if first else f"joint {last}"

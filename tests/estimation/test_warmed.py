@@ -11,7 +11,7 @@ from estimation import predict
 from estimation.logs.clocks import UNKNOWN_PAUSE
 from estimation.models.extension import Extension
 from estimation.models.model import Model
-from estimation.predictions.prediction import COLD, warmed
+from estimation.predictions.earlier_logs import COLD, warmed
 from robots.common.errors import InputError
 from robots.regressor import default_model
 from robots.signals import Log

@@ -13,9 +13,8 @@ from numpy.typing import NDArray
 
 from estimation.exports.mjcf.contents import Contents
 from estimation.exports.mjcf.xml_elements import inertial, insert, no_inertial, payload_body, tendons
-from estimation.exports.standard import REMEDY
-from robots.common.errors import InfeasibleError, InputError
-from robots.consistency import normalised_eigenvalues
+from estimation.exports.remainders import remainder
+from robots.common.errors import InputError
 from robots.geometry.chain import homogeneous
 from robots.geometry.inertia import inertial_parameters
 from robots.mujoco_models.actuators import actuators_of
@@ -28,7 +27,6 @@ Array = NDArray[np.float64]
 Element = ElementTree.Element
 
 STEPS = 2.0  # time constant of dry friction in time steps, the smallest that MuJoCo accepts
-SHARES = (1.0, 0.1, 1e-2, 1e-3, 1e-4, 1e-5, 1e-6)  # of bodies on locked joints, which cannot be without mass
 DEFAULT_SOLREF = (0.02, 1.0)
 
 
@@ -147,7 +145,8 @@ def _write_bodies(source: _Source, contents: Contents, robot: Robot, numbers: li
         others = [(index[p.name], p.pose) for p in robot.links if p.body == i + 1 and p.name in index]
         others = [(b, at) for b, at in others if b != carrier and model.body_mass[b] > 0.0]
         fixed = {b for b, _ in others if model.body_weldid[b] == model.body_weldid[carrier]}
-        own, emptied, share = _remainder(contents.inertia[i], model, others, fixed, robot.joint_names[i])
+        inertias = {b: body_inertia(model, b, at) for b, at in others}
+        own, emptied, share = remainder(contents.inertia[i], inertias, fixed, robot.joint_names[i])
         to_body = homogeneous(np.eye(3), np.array(model.jnt_pos[j]))
         element = _element(source.bodies, names.bodies[carrier], source.path, "body")
         _set_inertial(element, inertial(moved_body(to_body) @ own))
@@ -161,18 +160,6 @@ def _write_bodies(source: _Source, contents: Contents, robot: Robot, numbers: li
             _set_inertial(_element(source.bodies, names.bodies[b], source.path, "body"), no_inertial())
         if i == robot.n - 1 and contents.payload is not None:
             insert(element, len(element), payload_body(contents.payload, to_body @ np.asarray(robot.chain.tip)))
-
-
-def _remainder(
-    whole: Array, model: Any, others: list[tuple[int, Array]], fixed: set[int], joint: str
-) -> tuple[Array, set[int], float]:
-    """What is left for a joint's own body, which fixed bodies must give it theirs, and what share locked ones keep."""
-    for emptied, share in ((set[int](), 1.0), *((fixed, share) for share in SHARES)):
-        kept = [share * body_inertia(model, b, at) for b, at in others if b not in emptied]
-        own = whole - np.sum(kept, axis=0) if kept else whole
-        if own[0] > 0.0 and (normalised_eigenvalues(own[None]) > 0).all():
-            return own, emptied, share if kept else 1.0
-    raise InfeasibleError("the identified link is no body that can exist", remedy=f"{REMEDY} (joint {joint})")
 
 
 def body_inertia(model: Any, body: int, at: Array) -> Array:

@@ -11,7 +11,8 @@ from scipy.optimize import minimize
 
 from estimation.gate.quick_fits.cutoff_choice import CHOICE_ROWS
 from estimation.gate.quick_fits.gravity_rows import gravity_rows
-from estimation.gate.quick_fits.joint_fit import OWN, Rows
+from estimation.gate.quick_fits.joint_columns import OWN
+from estimation.gate.quick_fits.joint_fit import Rows
 from estimation.gate.quick_fits.whole_fit import RIDGES, fit_all
 from estimation.gate.stages.fitted import Fitted
 from robots.robot import Robot

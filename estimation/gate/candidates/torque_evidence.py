@@ -11,7 +11,8 @@ from scipy.stats import norm
 
 from estimation.gate.quick_fits.cutoff_choice import CHOICE_ROWS
 from estimation.gate.quick_fits.gravity_rows import HEAVY, LINK, gravity_rows
-from estimation.gate.quick_fits.joint_fit import OWN, OWN_RIDGE
+from estimation.gate.quick_fits.joint_columns import OWN
+from estimation.gate.quick_fits.joint_fit import OWN_RIDGE
 from estimation.gate.quick_fits.whole_fit import solve_scaled
 from estimation.gate.stages.fitted import Fitted
 from estimation.regressions.parameter_priors import link_spreads

@@ -17,6 +17,8 @@ Factor = Callable[[JointEvidence], float]
 
 # Gears of a drive that are possible where none is stated.
 GEARS = (15.0, 400.0)
+# Factors of currents [A] on the torque [N m], where other joints have torques. Other units are those of a whole log.
+CURRENTS = (1 / 300, 3.0)
 # From this gear ratio on, a stated one is a gear.
 GEARED = 2.0
 
@@ -54,7 +56,9 @@ def hypotheses(robot: Robot, evidence: Sequence[JointEvidence]) -> list[Hypothes
         described=np.sum([one.described for one in evidence], axis=0),
         multiple=np.sum([one.multiple for one in evidence], axis=0),
     )
-    right = shared.right()
+    # The errors of a description are shared by the joints, or each joint has its own.
+    own = sum(one.right() for one in evidence)
+    right = float(np.logaddexp(shared.right(), own) - np.log(2))
     joints = tuple(one.joint for one in evidence)
 
     def whole(kind: str, log_evidence: float) -> Hypothesis:
@@ -65,8 +69,9 @@ def hypotheses(robot: Robot, evidence: Sequence[JointEvidence]) -> list[Hypothes
         whole("weightless", sum(one.weightless for one in evidence)),
         whole("external", sum(one.external for one in evidence)),
         whole("unit", shared.between(*FACTORS)),
+        whole("current", sum(one.between(*FACTORS) for one in evidence)),
         _some("sign", evidence, right, lambda one: one.inverted),
-        _some("current", evidence, right, lambda one: one.between(*FACTORS)),
+        _some("current", evidence, right, lambda one: one.between(*CURRENTS)),
         _some("motor", evidence, right, _geared(robot)),
     ]
     for kind, scale in (("current", np.abs(robot.torque_constant)), ("percent", np.asarray(robot.limits.torque) / 100)):

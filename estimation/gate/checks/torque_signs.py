@@ -10,7 +10,8 @@ from numpy.typing import NDArray
 from estimation.gate.check import Check
 from estimation.gate.context import Context, Stage
 from estimation.gate.finding import Finding
-from estimation.gate.quick_fits.joint_fit import OWN, JointFit
+from estimation.gate.quick_fits.joint_columns import OWN
+from estimation.gate.quick_fits.joint_fit import JointFit
 from estimation.gate.quick_fits.joint_physics import JointPhysics
 from estimation.gate.stages.fitted import Fitted
 from robots.robot import Robot

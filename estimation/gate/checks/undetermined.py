@@ -7,6 +7,7 @@ from typing import ClassVar
 from estimation.gate.check import Check
 from estimation.gate.context import Context, Stage
 from estimation.gate.finding import Finding
+from robots.common.plain import joints_in_words
 from robots.robot import Robot
 
 # Decrease of the held-out error (log) that velocities and accelerations must bring. With some 300 independent rows this
@@ -54,5 +55,4 @@ class Undetermined(Check):
 def _joints(robot: Robot, joints: list[int]) -> str:
     if len(joints) == robot.n and robot.n > 1:
         return "all joints"
-    numbers = [str(joint + 1) for joint in joints]
-    return f"joint {numbers[0]}" if len(numbers) == 1 else f"joints {', '.join(numbers[:-1])} and {numbers[-1]}"
+    return joints_in_words(joint + 1 for joint in joints)

@@ -92,7 +92,8 @@ class _Search:
         kept = rows.thinned(stride)
         self._starts = {}
         for joint, fit in fits.items():
-            Y, tau = fit.Y[kept], rows.near_torques(shifts, joint, stride)
+            counted = fit.counted[kept]
+            Y, tau = rows.joints[joint].Y[kept[counted]], rows.near_torques(shifts, joint, stride)[:, counted]
             tau -= tau.mean(axis=1, keepdims=True)
             cross, square = Y.T @ tau.T, np.einsum("st,st->s", tau, tau)
             left = square - np.einsum("ks,ks->s", cross, solve_scaled(Y.T @ Y, cross, OWN_RIDGE))
@@ -102,7 +103,7 @@ class _Search:
         """Gives the share of a joint's variance that is left at the k-th shift, from all rows."""
         if k not in self._known:
             tau = self._rows.torques(float(self.shifts[k]))
-            self._known[k] = {j: _remaining(fit, tau[:, j]) for j, fit in self._fits.items()}
+            self._known[k] = {j: _remaining(fit, tau[fit.counted, j]) for j, fit in self._fits.items()}
         return self._known[k][joint]
 
     def best(self, joint: int) -> int:
@@ -118,9 +119,10 @@ class _Search:
 
 
 def sticking_time(rows: Rows, joint: int) -> float:
-    """Gives the median time [s] for which a joint stands at its reversals, zero without any.
+    """Gives the median time [s] for which a joint sticks at its reversals, zero without any.
 
-    It is the time below a speed, extrapolated to a speed of zero by that below twice the speed.
+    It is the time below a speed, extrapolated to a speed of zero by that below twice the speed. A stop for a while is
+    no reversal.
 
     Args:
         rows: the excerpts.
@@ -128,9 +130,10 @@ def sticking_time(rows: Rows, joint: int) -> float:
     """
     excess, first = [], 0
     for part in rows.excerpts:
-        v = rows.dq[first : first + len(part.t), joint]
+        at = slice(first, first + len(part.t))
+        v, rest = rows.dq[at, joint], rows.rest[at, joint]
         first += len(part.t)
-        turns = np.flatnonzero(v[:-1] * v[1:] < 0)
+        turns = np.flatnonzero((v[:-1] * v[1:] < 0) & ~rest[1:])
         below, twice = (_lengths(np.abs(v) < k * REVERSING * rows.speed[joint], turns) for k in (1, 2))
         excess += ((2 * below - twice) * float(np.median(np.diff(part.t)))).tolist()
     return max(float(np.median(excess)), 0.0) if excess else 0.0
@@ -155,10 +158,10 @@ def _refined(rows: Rows, fit: JointFit, joint: int, search: _Search) -> Delay:
     bend = left - 2 * middle + right
     value = float(shifts[best] + 0.5 * (left - right) / bend * (shifts[1] - shifts[0])) if bend > 0 else shifts[best]
     # Gauss-Newton at the optimum gives the standard error, block by block.
-    rate, tau = rows.torques(value, 1)[:, joint], rows.torques(value)[:, joint]
+    rate, tau = rows.torques(value, 1)[fit.counted, joint], rows.torques(value)[fit.counted, joint]
     slope = rate - fit.Y @ (fit.inverse @ (fit.Y.T @ rate))
     residual = tau - fit.Y @ (fit.inverse @ (fit.Y.T @ tau))
-    scores = np.add.reduceat(slope * residual, rows.starts)
+    scores = rows.block_sums(slope * residual, fit.counted)
     curvature = float(slope @ slope)
     error = float(np.sqrt(scores @ scores)) / curvature if curvature > 0 else np.inf
     return Delay(value, error, float(1 - np.sqrt(_remaining(fit, tau) / zero)) if zero > 0 else 0.0, sticks)

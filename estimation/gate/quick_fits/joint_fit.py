@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import pairwise
 
@@ -11,9 +11,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from estimation.gate.quick_fits.excerpts import Excerpt
-from estimation.gate.quick_fits.gravity_rows import gravity_rows
+from estimation.gate.quick_fits.joint_columns import OWN, JointColumns, joined, under_gravity
 from estimation.gate.quick_fits.rigid_body import joint_rows, rigid_body, used_columns
 from estimation.gate.quick_fits.whole_fit import Moments, solve_scaled
+from estimation.preprocessing import rows_at_rest
 from robots.robot import Robot
 
 Array = NDArray[np.float64]
@@ -23,27 +24,6 @@ Places = NDArray[np.intp]
 OWN_RIDGE = 1e-6
 # Folds of the cross-validation, and blocks of rows with independent residuals. Both are contiguous in time.
 FOLDS, BLOCKS = 6, 60
-# Width of the smoothed sign(dq), over the joint's RMS speed.
-SHARP = 0.05
-# A column whose RMS is below this share of the joint's largest is rounding.
-SILENT = 1e-12
-# Number of a joint's own columns, after those of the rigid body: rotor inertia, Coulomb, viscous, offset.
-OWN = 4
-
-
-@dataclass(frozen=True, eq=False)
-class JointColumns:
-    """The regressor of one joint: columns of the rigid body, then its own.
-
-    Attributes:
-        Y: (M, k), scaled to unit mean square.
-        scale: RMS of the unscaled columns (k,).
-        used: parameters of the rigid body that the first columns belong to.
-    """
-
-    Y: Array
-    scale: Array
-    used: NDArray[np.intp]
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,6 +38,7 @@ class JointFit:
         inverse: inverse of the Gram matrix with its ridge (k, k).
         residual: (M,).
         scores: Y' residual of each block (B, k).
+        counted: which of all rows these are.
     """
 
     Y: Array
@@ -67,6 +48,7 @@ class JointFit:
     inverse: Array
     residual: Array
     scores: Array
+    counted: NDArray[np.bool_]
 
     def combination(self, weights: Array) -> tuple[float, float]:
         """Gives the value of a linear combination of parameters, and its standard error under correlated residuals.
@@ -132,9 +114,9 @@ class Rows:
         own = np.zeros_like(ddq) if static else ddq
         bodies, used = joint_rows(robot, q, np.zeros_like(dq) if static else dq, own), used_columns(robot)
         if gravity is not None:
-            bodies, used = _under_gravity(robot, q, bodies, used, gravity)
+            bodies, used = under_gravity(robot, q, bodies, used, gravity)
         joints = tuple(
-            _joined(body, columns, dq[:, j], own[:, j], float(speed[j]))
+            joined(body, columns, dq[:, j], own[:, j], float(speed[j]))
             for j, (body, columns) in enumerate(zip(bodies, used, strict=True))
         )
         return Rows(tuple(excerpts), q, dq, ddq, joints, rigid_body(robot).size, block, speed)
@@ -174,41 +156,64 @@ class Rows:
         starts = np.concatenate([[0], ends[:-1]])
         return np.concatenate([np.arange(start, end, stride) for start, end in zip(starts, ends, strict=True)])
 
-    def fit(self, joint: int) -> JointFit:
-        """Fits one joint, counted from 0, alone: a fault of another joint has no effect on it."""
+    def fit(self, joint: int, *, moving: bool = False) -> JointFit:
+        """Fits one joint alone: a fault of another joint has no effect on it.
+
+        Args:
+            joint: counted from 0.
+            moving: without the rows in which it is at rest.
+        """
         own = self.joints[joint]
-        Y, tau = own.Y, self.torque(joint)
+        counted = ~self.rest[:, joint] if moving else np.ones(len(self.q), dtype=bool)
+        Y, tau = own.Y[counted], self.torque(joint)[counted]
         gram = Y.T @ Y
         values = solve_scaled(gram, Y.T @ tau, OWN_RIDGE)
         residual = tau - Y @ values
-        scores = np.array([Y[rows].T @ residual[rows] for rows in self._blocks])
+        scores = self.block_sums(Y * residual[:, None], counted)
         inverse = solve_scaled(gram, np.eye(len(gram)), OWN_RIDGE)
-        return JointFit(Y, own.scale, own.used, values, inverse, residual, scores)
+        return JointFit(Y, own.scale, own.used, values, inverse, residual, scores, counted)
 
-    @property
-    def starts(self) -> NDArray[np.intp]:
-        """The first row of each block."""
-        return np.flatnonzero(np.diff(self.block, prepend=-1))
+    def block_sums(self, values: Array, counted: NDArray[np.bool_]) -> Array:
+        """Sums values (M', ...) of the counted rows over each block (B, ...)."""
+        return np.add.reduceat(values, np.flatnonzero(np.diff(self.block[counted], prepend=-1)), axis=0)
 
-    @property
-    def _blocks(self) -> list[slice]:
-        return [slice(first, stop) for first, stop in pairwise([*self.starts.tolist(), len(self.block)])]
+    @cached_property
+    def rest(self) -> NDArray[np.bool_]:
+        """Rows (M, n) in which each joint stands: friction may hold it with any torque."""
+        return np.concatenate([rows_at_rest(part.t, part.q, self.speed) for part in self.excerpts])
 
-    def moments(self, joints: NDArray[np.intp], *, raw: bool = False) -> Moments:
-        """Sums the normal equations of some joints, fold by fold, of smoothed torques or of those as logged (raw)."""
+    def in_motion(self) -> Rows:
+        """Gives the same rows, those of joints at rest as zeros."""
+        joints = tuple(replace(own, Y=np.where(self.rest[:, j, None], 0.0, own.Y)) for j, own in enumerate(self.joints))
+        return replace(self, joints=joints)
+
+    def moments(self, joints: NDArray[np.intp], *, raw: bool = False, moving: bool = False) -> Moments:
+        """Sums the normal equations of some joints, fold by fold.
+
+        Args:
+            joints: counted from 0.
+            raw: of the torques as logged, not of smoothed ones.
+            moving: without the rows in which a joint is at rest.
+        """
+        if moving and self.rest.any():
+            return self.in_motion()._sums(joints, raw, ~self.rest)
+        return self._sums(joints, raw, np.ones(self.q.shape, dtype=bool))
+
+    def _sums(self, joints: NDArray[np.intp], raw: bool, counted: NDArray[np.bool_]) -> Moments:
         chosen = tuple(map(int, joints))
         gram, scale, places = self._gram(chosen)
         n, folds, p = gram.shape[:3]
         cross, square = np.zeros((n, folds, p)), np.zeros((n, folds))
         for joint in chosen:
             own = self.joints[joint]
-            tau = self.raw(joint) if raw else self.torque(joint)
+            tau = (self.raw(joint) if raw else self.torque(joint)) * counted[:, joint]
             acts, place = places[joint]
             factor = own.scale[acts] / scale[place]
             for k, rows in enumerate(self._folds):
                 cross[joint, k, place] = factor * (own.Y[rows].T @ tau[rows])[acts]
                 square[joint, k] = float(tau[rows] @ tau[rows])
-        return Moments(gram, cross, square, np.array([rows.stop - rows.start for rows in self._folds], dtype=float))
+        count = np.array([counted[rows].sum(axis=0) for rows in self._folds], dtype=float).T
+        return Moments(gram, cross, square, count)
 
     def _gram(self, joints: tuple[int, ...]) -> tuple[Array, Array, dict[int, tuple[Places, Places]]]:
         """Sums the Gram matrices of the columns that are not zero, scaled to unit mean square over these joints.
@@ -254,34 +259,3 @@ class Rows:
     def _place(self, joint: int) -> NDArray[np.intp]:
         """Gives the places of a joint's columns among those of all joints."""
         return np.concatenate([self.joints[joint].used, self.bodies + OWN * joint + np.arange(OWN)])
-
-
-def _under_gravity(
-    robot: Robot, q: Array, bodies: tuple[Array, ...], used: tuple[Places, ...], gravity: Array
-) -> tuple[tuple[Array, ...], tuple[Places, ...]]:
-    """Gives the columns of the rigid body, and the parameters that they belong to, under another gravity."""
-    heavy = gravity_rows(robot, q)
-    change = np.asarray(gravity, dtype=float) - np.asarray(robot.chain.gravity)
-    found, places = [], []
-    for body, columns, own in zip(bodies, used, heavy, strict=True):
-        whole = np.einsum("mkp,k->mp", own, change)
-        whole[:, columns] += body
-        acts = np.flatnonzero(np.abs(whole).max(axis=0) > SILENT * max(float(np.abs(whole).max()), SILENT))
-        found.append(whole[:, acts])
-        places.append(acts.astype(np.intp))
-    return tuple(found), tuple(places)
-
-
-def _joined(body: Array, used: NDArray[np.intp], dq: Array, ddq: Array, speed: float) -> JointColumns:
-    """Appends rotor inertia, Coulomb and viscous friction and offset to the rigid body's columns (M, k)."""
-    Y = np.empty((len(body), body.shape[1] + OWN))
-    Y[:, :-OWN] = body
-    sign = np.tanh(dq / max(SHARP * speed, 1e-12))
-    for column, values in enumerate((ddq, sign, dq, 1.0), start=body.shape[1]):
-        Y[:, column] = values
-    scale = np.sqrt(np.einsum("ik,ik->k", Y, Y) / len(Y))
-    # Rounding scaled to unit size would be a random regressor.
-    silent = scale <= SILENT * scale.max()
-    Y[:, silent], scale[silent] = 0.0, 1.0
-    Y /= scale
-    return JointColumns(Y, scale, used)

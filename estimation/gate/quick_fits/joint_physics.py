@@ -7,7 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from estimation.gate.quick_fits.joint_fit import OWN, JointFit, Rows
+from estimation.gate.quick_fits.joint_columns import OWN
+from estimation.gate.quick_fits.joint_fit import JointFit, Rows
 from estimation.gate.quick_fits.rigid_body import joint_rows
 from robots.robot import Robot
 

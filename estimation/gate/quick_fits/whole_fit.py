@@ -32,7 +32,7 @@ class Moments:
         gram: (n, F, p, p).
         cross: (n, F, p).
         square: sum of squared torques (n, F).
-        count: number of rows (F,).
+        count: number of rows that count (n, F).
     """
 
     gram: Array
@@ -67,7 +67,7 @@ def fit_all(moments: Moments, spread: Array, ridges: Sequence[float] = RIDGES) -
         ridges: candidates, the smallest first.
     """
     gram, cross, square = (array.sum(axis=1) for array in (moments.gram, moments.cross, moments.square))
-    rows = moments.count.sum()
+    rows = np.maximum(moments.count.sum(axis=1), 1)
     floor = 1e-12 * square / rows + np.finfo(float).tiny
     used = spread > 0
     weights = np.where(used, 1.0 / np.where(used, spread, 1.0) ** 2, 0.0)

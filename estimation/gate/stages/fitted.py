@@ -64,20 +64,20 @@ class Fitted:
     def unexplained(self) -> Array:
         """Held-out error of all joints together over the torque's standard deviation (n,), NaN without a fit.
 
-        With torques as logged: smoothing would remove the noise that hides the torque of a joint.
+        With torques as logged: smoothing would remove the noise that hides the torque of a joint. Without rows at rest.
         """
-        return fit_all(self.rows.moments(self._joints, raw=True), self.logged_spread).unexplained
+        return fit_all(self.rows.moments(self._joints, raw=True, moving=True), self.logged_spread).unexplained
 
     @cached_property
     def dynamic_gain(self) -> Array:
         """Decrease of the held-out error (log) by velocities and accelerations (n,), NaN without a fit.
 
-        On some rows only, for torques as logged.
+        On some rows only, for torques as logged, without rows at rest.
         """
         errors = []
         for static in (False, True):
             rows = Rows.of(self.robot, self.rows.excerpts, CHOICE_ROWS, static=static)
-            errors.append(fit_all(rows.moments(self._joints, raw=True), self.logged_spread).unexplained)
+            errors.append(fit_all(rows.moments(self._joints, raw=True, moving=True), self.logged_spread).unexplained)
         dynamic, still = np.maximum(errors, 1e-9)
         return np.asarray(np.log(still / dynamic))
 
@@ -95,7 +95,7 @@ class Fitted:
         sharp = self._smoothed.choice.sharp
         assert sharp is not None
         fits = {
-            j: fit if sharp is self.rows else sharp.fit(j)
+            j: fit if sharp is self.rows and not sharp.rest[:, j].any() else sharp.fit(j, moving=True)
             for j, fit in enumerate(self.fits)
             if fit is not None and self.unexplained[j] < HOPELESS
         }

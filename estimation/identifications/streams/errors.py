@@ -23,8 +23,9 @@ class Errors:
 
     Attributes:
         rows: number of rows.
-        torque: squared torques (n,).
-        squares: squared errors (n,).
+        judged: number of rows (n,) in which the joint is not at rest.
+        torque: squared torques in those (n,).
+        squares: squared errors in those (n,).
         kept: rows of the stretches that are kept, and their predicted torque.
     """
 
@@ -32,7 +33,7 @@ class Errors:
         n = len(highest)
         self._scale = np.maximum(highest, np.finfo(float).tiny)
         self.rows = 0
-        self.torque, self.squares = np.zeros((2, n))
+        self.torque, self.squares, self.judged = np.zeros((3, n))
         self.kept: list[tuple[Rows, Array]] = []
         self._second, self._seconds = np.zeros(n), 0
         self._counts = np.zeros((n, BINS))
@@ -49,9 +50,10 @@ class Errors:
             part: N rows.
             predicted: torque (N, n) [N m or N].
         """
-        motion, error = part.motion, part.tau - predicted
-        self.torque += np.einsum("tj,tj->j", part.tau, part.tau)
-        self.squares += np.einsum("tj,tj->j", error, error)
+        motion, error, judged = part.motion, part.tau - predicted, part.judged
+        self.torque += np.einsum("tj,tj,tj->j", part.tau, part.tau, judged)
+        self.squares += np.einsum("tj,tj,tj->j", error, error, judged)
+        self.judged += judged.sum(axis=0)
         if len(error) > 2:
             second = error[2:] - 2 * error[1:-1] + error[:-2]
             self._second += np.einsum("tj,tj->j", second, second)
@@ -63,8 +65,7 @@ class Errors:
         sizes = np.log10(np.maximum(np.abs(error) / self._scale, 1e-300))
         bins = np.clip(((sizes + DECADES - 1) / DECADES * BINS).astype(int), 0, BINS - 1)
         for joint in range(error.shape[1]):
-            if part.held is None or not part.held[joint]:
-                self._counts[joint] += np.bincount(bins[:, joint], minlength=BINS)
+            self._counts[joint] += np.bincount(bins[judged[:, joint], joint], minlength=BINS)
         if not self._places:
             self.kept.append((part, predicted))
         for begin in self._places:
@@ -99,7 +100,8 @@ class Errors:
         begin = max(0, min(begin, len(predicted) - self._length))
         at = slice(begin, begin + self._length)
         motion = Motion(*(getattr(part.motion, name)[at].copy() for name in ("t", "q", "dq", "ddq")))
-        rows = replace(part, motion=motion, tau=part.tau[at].copy(), mask=part.mask[at].copy())
+        rest = None if part.rest is None else part.rest[at].copy()
+        rows = replace(part, motion=motion, tau=part.tau[at].copy(), mask=part.mask[at].copy(), rest=rest)
         self.kept.append((rows, predicted[at].copy()))
 
 

@@ -242,7 +242,7 @@ def _fit(
 
 
 def _joints(fitted: Fit, errors: Errors, predictable: NDArray[np.bool_]) -> tuple[JointFit, ...]:
-    total, choice = errors.rows, fitted.choice
+    total, choice = np.maximum(errors.judged, 1), fitted.choice
     figures = np.sqrt([errors.torque / total, errors.squares / total, fitted.nominal / total])
     band, floor = errors.band, errors.floor
     return tuple(

@@ -61,6 +61,23 @@ def count_joints(mapping: LogMapping, names: Sequence[str], n: int | None) -> in
     return max(joints, 1)
 
 
+def mapped_sources(mapping: LogMapping, names: Sequence[str], joints: int) -> list[str]:
+    """Names the columns of a file that a mapping uses, in the file's order.
+
+    Args:
+        mapping: of the file.
+        names: the file's columns.
+        joints: the number of joints.
+    """
+    used: set[str] = set()
+    for key in _FIELDS:
+        entry = getattr(mapping, key)
+        if entry is not None:
+            single = isinstance(entry, Single)
+            used.update([entry.column] if single else _columns(entry, mapping, joints, set(names)))
+    return [name for name in names if name in used]
+
+
 def map_table(table: Table, mapping: LogMapping, joints: int, kinds: Sequence[str] | None = None) -> Table:
     """Renames and converts a table's columns to those of a log, in SI units.
 

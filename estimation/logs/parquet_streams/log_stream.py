@@ -13,8 +13,10 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 from numpy.typing import NDArray
 
-from estimation.logs.campaigns import in_natural_order
+from estimation.logs.campaigns import MAPPING, in_natural_order
+from estimation.logs.mappings.mapping import LogMapping, read_mapping
 from estimation.logs.parquet_streams.parquet_parts import Part, open_part
+from estimation.logs.torque_source import parse_meaning
 from robots.common.errors import InputError
 from robots.common.files import sha256
 from robots.signals import Log
@@ -137,7 +139,7 @@ class LogStream:
             part = self.parts[number]
             try:
                 with pq.ParquetFile(part.path) as file:
-                    table = file.read_row_group(group, columns=list(part.factors))
+                    table = file.read_row_group(group, columns=list(part.columns))
                 self._groups[key] = part.signals(table)
             except (pa.ArrowException, OSError, ValueError) as error:
                 raise InputError(
@@ -168,7 +170,12 @@ def is_large(paths: Sequence[str | PathLike[str]]) -> bool:
 
 
 def open_stream(
-    path: str | PathLike[str], n: int | None = None, *, kinds: Sequence[str] | None = None, torque_is: str | None = None
+    path: str | PathLike[str],
+    n: int | None = None,
+    *,
+    kinds: Sequence[str] | None = None,
+    torque_is: str | None = None,
+    mapping: LogMapping | str | PathLike[str] | None = None,
 ) -> LogStream:
     """Opens a Parquet file, or a folder of them, as one log; the data stay on the disk.
 
@@ -177,6 +184,7 @@ def open_stream(
         n: number of joints of the robot, where it is known.
         kinds: "revolute" or "prismatic" of each joint.
         torque_is: what the torque columns hold, if not joint torques.
+        mapping: see `read_log`; without one, a ``mapping.yaml`` in the folder is that of its parts.
 
     Returns:
         The log.
@@ -190,10 +198,14 @@ def open_stream(
         raise InputError(
             "no Parquet file, nor a folder of them", file=path, remedy="write the log as Parquet to read it in pieces"
         )
-    opened = [open_part(file, n, kinds) for file in files]
+    own = Path(path) / MAPPING
+    if mapping is None and own.is_file():
+        mapping = own
+    known = mapping if isinstance(mapping, LogMapping) or mapping is None else read_mapping(mapping)
+    opened = [open_part(file, n, kinds, known) for file in files]
     for part in opened[1:]:
-        if list(part.factors) != list(opened[0].factors):
-            other = sorted(set(part.factors) ^ set(opened[0].factors))
+        if set(part.columns) != set(opened[0].columns):
+            other = sorted(set(part.columns) ^ set(opened[0].columns))
             raise InputError(
                 f"other columns than in {opened[0].path.name}: {', '.join(other)}",
                 file=part.path,
@@ -205,9 +217,12 @@ def open_stream(
             raise InputError(
                 f"begins at {after.start:.6f} s, before {before.path.name} ends ({before.end:.6f} s)",
                 file=after.path,
-                column="t",
+                column=after.time_column,
                 allowed="parts on one clock that do not overlap in time",
                 remedy="remove rows that are in both parts; if the clock was set back, give the parts as logs of their "
                 "own",
             )
+    if torque_is is None and known is not None and known.torque_is is not None:
+        torque_is = known.torque_is
+        parse_meaning(torque_is, opened[0].joints)
     return LogStream(Path(path), tuple(opened), torque_is=torque_is)

@@ -53,6 +53,8 @@ def fit_steps(
     covariance: Array,
     scatter: float,
     begins: NDArray[np.intp] | None = None,
+    *,
+    unlogged: Array | float = 0.0,
 ) -> StepFit:
     """Fits y = features b + step + e + noise for a step at each window, by generalised least squares.
 
@@ -65,10 +67,12 @@ def fit_steps(
         covariance: of b (m, m).
         scatter: standard deviation of the model error e.
         begins: windows with which a step may begin (c,), the results are of these; all by default.
+        unlogged: covariance of what unlogged work does to the values (k, k); none by default.
     """
     k = len(t)
     V = features @ covariance @ features.T
     V += scatter**2 * np.exp(-np.abs(t[:, None] - t[None, :]) / CORRELATION_TIME)
+    V += unlogged
     V[np.diag_indices(k)] += variances + 1e-12 * max(float(np.trace(V)) / k, 1e-300)
     root = np.linalg.cholesky(V)
     steps = np.tril(np.ones((k, k))) if begins is None else (np.arange(k)[:, None] >= begins).astype(float)

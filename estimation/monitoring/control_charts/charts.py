@@ -32,6 +32,7 @@ class Chart:
         last: the last standardised innovation.
         products: sum of products of consecutive innovations.
         squares: sum of their squares.
+        unlogged: EWMA of the standard deviation by unlogged work.
     """
 
     window: float
@@ -43,6 +44,7 @@ class Chart:
     last: float = 0.0
     products: float = 0.0
     squares: float = 0.0
+    unlogged: float = 0.0
 
     @property
     def weight(self) -> float:
@@ -65,7 +67,9 @@ class Chart:
             ewma_threshold(self.weight, self.run_length, slow),
         )
 
-    def update(self, z: float, deviation: float, scatter: float, noise: float, unsure: float) -> bool:
+    def update(
+        self, z: float, deviation: float, scatter: float, noise: float, unsure: float, unlogged: float = 0.0
+    ) -> bool:
         """Takes one window into account, and says whether there is an alarm.
 
         Args:
@@ -74,6 +78,7 @@ class Chart:
             scatter: standard deviation of the model error.
             noise: variance of the measured value.
             unsure: variance of the explained level.
+            unlogged: standard deviation of what unlogged work does to the measured value.
         """
         clipped = float(np.clip(z, -3.0, 3.0))
         self.products += clipped * self.last
@@ -83,16 +88,19 @@ class Chart:
         self.down = max(0.0, self.down - z - ALLOWANCE)
         w = max(self.weight, 1.0 / (self.count + 1))
         self.level += w * (deviation - self.level)
+        self.unlogged += w * (unlogged - self.unlogged)
         self.count += 1
         cusum, ewma = self.limits
         keep, slow = 1 - w, float(np.exp(-self.window / CORRELATION_TIME))
         share = w / (2 - w)
-        variance = scatter**2 * share * (1 + keep * slow) / (1 - keep * slow) + noise * share + unsure
+        variance = (
+            scatter**2 * share * (1 + keep * slow) / (1 - keep * slow) + noise * share + unsure + self.unlogged**2
+        )
         return max(self.up, self.down) > cusum or abs(self.level) > ewma * float(np.sqrt(variance))
 
     def reset(self) -> None:
         """Starts both charts again; the serial correlation is kept."""
-        self.up = self.down = self.level = 0.0
+        self.up = self.down = self.level = self.unlogged = 0.0
         self.count = 0
 
     def to_dict(self) -> dict[str, Any]:

@@ -67,6 +67,10 @@ class LevelFilter:
         self.covariance[-1, -1] += self.deviation**2 * (1 - keep**2)
         self.time = time
 
+    def widen(self, deviation: float) -> None:
+        """Adds an unknown error of some standard deviation to the model error, as after a pause with unlogged work."""
+        self.covariance[-1, -1] += deviation**2
+
     def innovation(self, features: Array, y: float, variance: float) -> tuple[float, float]:
         """Measured minus predicted value, and the variance of this difference.
 

@@ -12,6 +12,7 @@ from scipy.stats import chi2
 from estimation.monitoring.control_charts.change_fit import StepFit, fit_steps
 from estimation.monitoring.control_charts.charts import Chart
 from estimation.monitoring.control_charts.level_filter import LevelFilter
+from estimation.monitoring.settings import PAUSE
 
 Array = NDArray[np.float64]
 
@@ -19,8 +20,8 @@ Group = Literal["friction", "offset", "payload", "common", "residual"]
 
 # The model error projects onto each direction with this share of the model's residual.
 SHARE = 0.5
-# A longer time between windows [s] is a pause.
-PAUSE = 30.0
+# Share of the variance by unlogged work that is alike in all pauses: the same work comes again.
+LASTING_SHARE = 0.5
 # Windows kept for dating and sizing a change.
 KEPT = 150
 # Probability that any quantity of a healthy robot differs from the model at the start.
@@ -43,6 +44,7 @@ class Sample:
         y: measured value.
         variance: of its noise.
         features: (m,).
+        unlogged: standard deviation of what unlogged work in the last pause does to it.
     """
 
     start: float
@@ -51,6 +53,7 @@ class Sample:
     y: float
     variance: float
     features: Array
+    unlogged: float = 0.0
 
 
 class Quantity:
@@ -86,10 +89,13 @@ class Quantity:
         self.deviation = sample.y - explained
         if not learn:
             return False
+        paused = self.level.time is None or sample.t - self.level.time > PAUSE
         self.level.predict(sample.t)
+        if paused:
+            self.level.widen(sample.unlogged)
         scatter = self.level.deviation
         z = self.level.update(sample.features, sample.y, sample.variance)
-        return self.chart.update(z, self.deviation, scatter, sample.variance, unsure)
+        return self.chart.update(z, self.deviation, scatter, sample.variance, unsure, sample.unlogged)
 
     def step_alarm(self) -> bool:
         """Tests for a step after any of the last pauses, by the likelihood ratio (Willsky and Jones 1976).
@@ -140,7 +146,17 @@ class Quantity:
             covariance,
             self.level.deviation,
             begins,
+            unlogged=self._unlogged(),
         )
+
+    def _unlogged(self) -> Array:
+        """Covariance of what unlogged work does to the samples (k, k): one error in a log, a part of it in all logs."""
+        spread = np.array([s.unlogged for s in self.samples])
+        log = np.zeros(len(spread))
+        log[self.after_pauses()] = 1.0
+        log = np.cumsum(log)
+        same = np.where(log[:, None] == log[None, :], 1.0, LASTING_SHARE)
+        return np.asarray(same * spread[:, None] * spread[None, :])
 
     def to_dict(self) -> dict[str, Any]:
         """Gives the state as plain data."""
@@ -150,7 +166,7 @@ class Quantity:
             "level": self.level.to_dict(),
             "chart": self.chart.to_dict(),
             "margin": self.margin,
-            "samples": [[s.start, s.end, s.t, s.y, s.variance, s.features.tolist()] for s in self.samples],
+            "samples": [[s.start, s.end, s.t, s.y, s.variance, s.features.tolist(), s.unlogged] for s in self.samples],
             "before": [[mean.tolist(), covariance.tolist()] for mean, covariance in self.before],
         }
 
@@ -161,8 +177,9 @@ class Quantity:
             data["group"], data["index"], LevelFilter.from_dict(data["level"]), Chart(**data["chart"]), data["margin"]
         )
         found.samples = [
-            Sample(start, end, t, y, variance, np.array(features, dtype=float))
-            for start, end, t, y, variance, features in data["samples"]
+            # A state of an older version ends with the features.
+            Sample(start, end, t, y, variance, np.array(features, dtype=float), *unlogged)
+            for start, end, t, y, variance, features, *unlogged in data["samples"]
         ]
         found.before = [(np.array(m, dtype=float), np.array(c, dtype=float)) for m, c in data["before"]]
         return found

@@ -7,8 +7,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from estimation.monitoring.settings import Heat
+from estimation.monitoring.settings import PAUSE, Heat
 from estimation.monitoring.windows.baseline import Baseline
+from estimation.monitoring.windows.unlogged_work import DUTY_SPREAD, JOINT_SPREAD, UnloggedWork
 from robots.common.errors import InputError
 from robots.thermal import ThermalModel
 from robots.thermal.online import Step, discretise
@@ -31,8 +32,6 @@ DEGREES, ROOM = 20.0, 20.0
 # Standard deviations of what is unknown and common to all joints: the ambient temperature [K], or a share.
 AMBIENT_SPREAD, COMMON_SPREAD = 10.0, 0.5
 LOWEST_FACTOR = 0.05
-# Deviations of a joint, in standard deviations, from which it counts less, and not at all.
-FAR, TOO_FAR = 2.0, 4.0
 
 
 class HeatState:
@@ -58,6 +57,8 @@ class HeatState:
         fast = baseline.time_constant
         self.times = np.array([FAST, SLOW] if fast is None else [fast, fast * SLOW / FAST])
         self.temperatures = np.full(n, np.nan)
+        self.work = UnloggedWork(n)
+        self.work.rested = list(self.states)
         self._steps: dict[tuple[int, float], Step] = {}
 
     @property
@@ -68,13 +69,18 @@ class HeatState:
         return values[:, 0], values[:, 1]
 
     @property
-    def common_spread(self) -> float:
-        """Standard deviation of the common unknown, in its unit; zero where nothing common is explained."""
-        return {"model": AMBIENT_SPREAD, "none": 0.0}.get(self.kind, COMMON_SPREAD)
+    def common_spread(self) -> Array:
+        """Standard deviations of the common unknowns (2,): in their unit, and the duty; zero where there is none."""
+        if self.kind == "model":
+            return np.array([AMBIENT_SPREAD, DUTY_SPREAD])
+        return np.array([0.0 if self.kind == "none" else COMMON_SPREAD, 0.0])
 
     def factor(self, j: int) -> float:
         """Friction of joint j, counted from 0, over the model's, by the thermal model; 1 without one."""
-        model, state = self.models[j], self.states[j]
+        return self._factor_of(j, self.states[j])
+
+    def _factor_of(self, j: int, state: Array | None) -> float:
+        model = self.models[j]
         if model is None or state is None:
             return 1.0
         T = model.zone_temperatures(model.values, list(state))[0]
@@ -91,30 +97,67 @@ class HeatState:
             return np.array([*self.kept[j], 1.0])
         return np.ones(1)
 
-    def sensitivity(self, j: int) -> float:
-        """Change of the log of the friction of joint j per unit of the common unknown."""
+    def sensitivity(self, j: int) -> Array:
+        """Change of the log of the friction of joint j per unit of each common unknown (2,)."""
         if self.kind == "model":
-            model = self.models[j]
-            return 0.0 if model is None else model.alpha / self.factor(j)
-        return 0.0 if self.kind == "none" else 1.0
+            model, worked = self.models[j], self.work.worked[j]
+            if model is None:
+                return np.zeros(2)
+            here = self.factor(j)
+            more = 0.0 if worked is None else self._factor_of(j, worked) / here - 1.0
+            return np.array([model.alpha / here, self.work.per_duty(more)])
+        return np.array([0.0 if self.kind == "none" else 1.0, 0.0])
+
+    def unlogged(self, j: int) -> float:
+        """Standard deviation of the log of the friction of joint j by work that its logs do not show."""
+        rested, worked = self.work.rested[j], self.work.worked[j]
+        if rested is None or worked is None:
+            return 0.0
+        here = self.factor(j)
+        now = here + self.work.duty * (self._factor_of(j, worked) - here)
+        return JOINT_SPREAD * abs(float(np.log(now / self._factor_of(j, rested))))
+
+    def pause(self, duration: float, ambient: float | None) -> None:
+        """Goes on by a time without rows [s]: the joints rest, or in a long one work unseen."""
+        if duration <= 0:
+            return
+        if self.kind == "model" and duration > PAUSE:
+            self.states = self.work.settle(self.states)
+            self.work.pause(self.states, duration, ambient, self._factor_of, self._heated)
+        else:
+            self.work.worked = self._all_heated(self.work.worked, np.zeros(self.n), duration, ambient)
+        self.work.rested = self._all_heated(self.work.rested, np.zeros(self.n), duration, ambient)
+        self._go_on(np.zeros(self.n), duration, ambient)
 
     def advance(self, power: Array, duration: float, ambient: float | None) -> None:
         """Goes on by a time [s] at constant power (n,) [W], that which friction turns into heat."""
         if duration <= 0:
             return
-        for j, model in enumerate(self.models):
-            state = self.states[j]
-            if model is not None and state is not None:
-                self.states[j] = self._advanced(j, model, state, float(power[j]), duration, ambient)
+        self.work.record(power / np.array([self.factor(j) for j in range(self.n)]), duration)
+        self.work.worked = self._all_heated(self.work.worked, power, duration, ambient)
+        self.work.rested = self._all_heated(self.work.rested, power, duration, ambient)
+        self._go_on(power, duration, ambient)
+
+    def _go_on(self, power: Array, duration: float, ambient: float | None) -> None:
+        self.states = self._all_heated(self.states, power, duration, ambient)
         first = np.isnan(self.reference) & (power > 0)
         self.reference[first] = power[first]
         share = np.where(np.isnan(self.reference), 0.0, power / self.reference)
         keep = np.exp(-duration / self.times)
         self.kept = self.kept * keep + share[:, None] * (1 - keep)
 
-    def _advanced(
-        self, j: int, model: ThermalModel, state: Array, power: float, duration: float, ambient: float | None
-    ) -> Array:
+    def _all_heated(
+        self, states: list[Array | None], power: Array, duration: float, ambient: float | None
+    ) -> list[Array | None]:
+        return [
+            state if state is None else self._heated(j, state, float(power[j]), duration, ambient)
+            for j, state in enumerate(states)
+        ]
+
+    def _heated(self, j: int, state: Array, power: float, duration: float, ambient: float | None) -> Array:
+        model = self.models[j]
+        if model is None:
+            return state
         key = (j, round(duration, 3))
         step = self._steps.get(key)
         if step is None:
@@ -130,6 +173,7 @@ class HeatState:
             "kind": self.kind,
             "states": [None if state is None else state.tolist() for state in self.states],
             "kept": self.kept.tolist(),
+            "work": self.work.to_dict(),
             "reference": [None if np.isnan(value) else float(value) for value in self.reference],
         }
 
@@ -139,6 +183,8 @@ class HeatState:
         found = cls(data["kind"], baseline)
         found.states = [None if state is None else np.array(state, dtype=float) for state in data["states"]]
         found.kept = np.array(data["kept"], dtype=float)
+        if "work" in data:  # A state of an older version knows nothing of pauses.
+            found.work = UnloggedWork.from_dict(found.n, data["work"])
         found.reference = np.array([np.nan if value is None else value for value in data["reference"]], dtype=float)
         return found
 
@@ -147,38 +193,3 @@ def _start(model: ThermalModel | None) -> Array | None:
     if model is None:
         return None
     return np.array(model.start_state([model.ambient] * len(model.zones), model.state_count()), dtype=float)
-
-
-def common_change(
-    deviations: Array, variances: Array, sensitivities: Array, spread: float, leave: int | None
-) -> tuple[float, float]:
-    """Estimates the unknown that all joints share, such as an error of the ambient temperature.
-
-    Weighted least squares with a normal prior; joints that deviate from the others by more than `FAR` standard
-    deviations count less (Huber 1964), and by more than `TOO_FAR` not at all: a damaged joint must not move the others.
-
-    Args:
-        deviations: of the logs of friction (n,); NaN where unknown.
-        variances: of them (n,).
-        sensitivities: to the common unknown (n,).
-        spread: prior standard deviation of the unknown; zero for none.
-        leave: a joint that is left out, counted from 0; None for none.
-
-    Returns:
-        The unknown and its variance.
-    """
-    used = np.isfinite(deviations) & np.isfinite(variances) & (sensitivities != 0)
-    if leave is not None:
-        used[leave] = False
-    if spread == 0 or not used.any():
-        return 0.0, spread**2
-    d, s, v = deviations[used], sensitivities[used], variances[used]
-    # From the median: an iteration from zero would follow the joint that deviates most.
-    found = float(np.median(d / s))
-    precision = 0.0
-    for _ in range(10):
-        distance = np.abs(d - s * found) / np.sqrt(v)
-        weight = np.where(distance < TOO_FAR, np.minimum(1.0, FAR / np.maximum(distance, FAR)) ** 2, 0.0) / v
-        precision = float(weight @ s**2) + spread**-2
-        found = float(weight @ (s * d)) / precision
-    return found, 1.0 / precision

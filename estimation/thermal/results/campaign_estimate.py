@@ -50,27 +50,22 @@ class CampaignEstimate:
         return all(fit is not None and fit.success for fit in self.thermal)
 
     def summary(self) -> str:
-        """Gives each joint's error with and without thermal model, its time constants, and notes."""
+        """Gives each joint's error with and without thermal model, time constants, the span of friction, and notes."""
         lines = [
-            "  joint   torque error RMS  without   time constants slow / fast    cold friction over\n"
-            "          with thermal model          at the largest power          that in the steady state there"
+            "  joint   torque error RMS  without   time constants slow / fast    highest over lowest\n"
+            "          with thermal model          at the mean power, ± 95 %     friction in the logs, ± 95 %"
         ]
         for j, fit in enumerate(self.thermal):
             head = f"  {j + 1:5} {self.residual_rms[j]:14.4g} {self.residual_without[j]:11.4g}"
             if fit is None:
                 lines.append(f"{head}     does not move")
                 continue
-            constants = [q for q in fit.combinations if "time constant" in q.name][: len(fit.model.zones)]
-            cold = next((q for q in fit.combinations if q.name.startswith("friction cold")), None)
-            ratio = (
-                f"{cold.value:.2f} ± {cold.standard_error:.2f} times"
-                if cold is not None and cold.determined
-                else "not determined"
-            )
             texts = " / ".join(
-                f"{q.value / 60:.1f} ± {q.standard_error / 60:.1f} min" if q.determined else "not determined"
-                for q in constants
+                f"{q.value / 60:.1f} ± {q.half_width / 60:.1f} min" if q.determined else "not determined"
+                for q in fit.time_constants
             )
+            seen = fit.span
+            ratio = "not determined" if seen is None else f"{seen.value:.3f} ± {seen.half_width:.3f} times"
             lines.append(f"{head}     {texts}   {ratio}")
         return "\n".join([*lines, *(f"  {note}" for note in self.joint_notes)])
 

@@ -8,9 +8,13 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from estimation.thermal.results.curvature import CurvedFit, curved_factor, curved_slope, curved_steady_state
+from estimation.thermal.transcriptions.information import Information
 from robots.thermal import ThermalModel
 
 Array = NDArray[np.float64]
+
+NORMAL_95 = 1.959964
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -31,7 +35,14 @@ class Quantity:
     standard_error: float
     determined: bool
 
+    @property
+    def half_width(self) -> float:
+        """Half of the 95 % interval, in its unit."""
+        return NORMAL_95 * self.standard_error
 
+
+# Name of the ratio that is seen in the logs, without any extrapolation.
+SPAN = "highest over lowest friction in the logs"
 # A quantity is determined when its standard error is below this share of it.
 RELATIVE = 0.5
 
@@ -44,6 +55,7 @@ def derive(
     *,
     friction: bool,
     heat_known: bool,
+    curved: CurvedFit | None = None,
 ) -> tuple[Quantity, ...]:
     """Computes time constants, friction ratios and parameter ratios with their standard errors.
 
@@ -54,6 +66,7 @@ def derive(
         powers: at which to state time constants [W].
         friction: whether friction was measured.
         heat_known: whether the power is known.
+        curved: the fit with an exponential fall, whose difference counts as an error by its probability; None for none.
 
     Returns:
         The quantities; their derivatives are finite differences.
@@ -74,7 +87,11 @@ def derive(
             if at[k] < 0.0 or at[k] > 1e-4
             else (values(at + step) - central) / 1e-5
         )
-    errors = np.sqrt(np.maximum(np.einsum("ij,jk,ik->i", slopes, covariance, slopes), 0.0))
+    variances = np.maximum(np.einsum("ij,jk,ik->i", slopes, covariance, slopes), 0.0)
+    if curved is not None:
+        other = _values(curved.model, powers, friction, heat_known, curved=True)
+        variances += curved.probability * (other - central) ** 2
+    errors = np.sqrt(variances)
     return tuple(
         Quantity(
             name=name,
@@ -114,16 +131,46 @@ def _names(
     return names, units
 
 
-def _values(model: ThermalModel, powers: Sequence[float], friction: bool, heat_known: bool) -> Array:
+def _values(
+    model: ThermalModel, powers: Sequence[float], friction: bool, heat_known: bool, *, curved: bool = False
+) -> Array:
     found: list[float] = []
     for power in powers:
-        found += model.time_constants(power).tolist()
+        warm = curved_steady_state(model, power) if curved else float(model.steady_state(power, drives=0.0)[..., 0])
+        here = curved_slope(model, warm) if curved else model
+        found += here.time_constants(power).tolist()
         if friction and power > 0.0:
-            cold = model.friction_factor(model.ambient)
-            warm = model.friction_factor(model.steady_state(power, drives=0.0)[..., 0])
-            found.append(float(cold / warm))
+            ends = [np.array(T, dtype=float) for T in (model.ambient, warm)]
+            factors = [curved_factor(model, T)[0] if curved else model.friction_factor(T) for T in ends]
+            found.append(float(factors[0] / factors[1]))
     if friction and model.alpha < 0.0:
         found += [model.alpha / getattr(model, name) for name in _ratio_names(model)]
     if not heat_known:
         found += [model.beta / getattr(model, name) for name in _ratio_names(model)]
     return np.array(found)
+
+
+def span(channels: NDArray[np.bool_], predicted: Array, info: Information, curved: CurvedFit | None) -> Quantity | None:
+    """Computes the largest over the smallest friction factor at the times at which friction was measured.
+
+    Args:
+        channels: which measurements are friction (M,).
+        predicted: measurements by the fit (M,).
+        info: covariance of the coordinates, and sensitivities of the measurements.
+        curved: the fit with an exponential fall; None for none.
+
+    Returns:
+        The ratio; None without friction.
+    """
+    if not channels.any() or predicted[channels].min() <= 0.0:
+        return None
+    rows = np.flatnonzero(channels)
+    high, low = rows[np.argmax(predicted[rows])], rows[np.argmin(predicted[rows])]
+    value = float(predicted[high] / predicted[low])
+
+    slope = info.sensitivities[high] / predicted[high] - info.sensitivities[low] / predicted[low]
+    variance = float(slope @ info.covariance @ slope)
+    if curved is not None:
+        other = curved.predicted[rows]
+        variance += curved.probability * float(np.log(other.max() / other.min() / value)) ** 2
+    return Quantity(name=SPAN, value=value, unit="1", standard_error=value * float(np.sqrt(variance)), determined=True)

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from estimation.thermal.results.derived import Quantity
+from estimation.thermal.results.derived import SPAN, Quantity
 from robots.common.errors import InputError
 from robots.common.files import existing_file, write_atomic
 from robots.common.plain import finite
@@ -109,6 +109,16 @@ class ThermalEstimate:
             if quantity.name == name:
                 return quantity
         raise InputError(f"no quantity {name!r}", allowed=", ".join(quantity.name for quantity in everything))
+
+    @property
+    def time_constants(self) -> tuple[Quantity, ...]:
+        """Time constants at the largest power of a run, the slow one first."""
+        return tuple(q for q in self.combinations if "time constant" in q.name)[: len(self.model.zones)]
+
+    @property
+    def span(self) -> Quantity | None:
+        """Highest over lowest friction factor in the logs; None without friction."""
+        return next((q for q in self.combinations if q.name == SPAN), None)
 
     @property
     def aic(self) -> float:

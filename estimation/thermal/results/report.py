@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from functools import partial
+
 import numpy as np
 from numpy.typing import NDArray
 
-from estimation.thermal.results.derived import Quantity, derive
+from estimation.thermal.results.curvature import fit_curved
+from estimation.thermal.results.derived import Quantity, derive, span
 from estimation.thermal.results.estimate import RunFit, ThermalEstimate
 from estimation.thermal.runs.thermal_run import ThermalRun
 from estimation.thermal.transcriptions.coordinates import from_coordinate
@@ -27,18 +30,23 @@ def report(search: Search, solution: Solution, warm: tuple[int, ...], *, bounds:
     model = search.model_at(at)
     friction = any(run.has_friction for run in search.runs)
     powers = _powers(search)
-    combinations = derive(search.model_at, at, covariance, powers, friction=friction, heat_known=search.heat_known)
+    predicted = search.problem.predict(solution.coordinates, solution.states)
+    curved = fit_curved(search, solution, info.colour, predicted) if bounds else None
+    derived = partial(derive, search.model_at, at, covariance, powers, friction=friction, heat_known=search.heat_known)
+    plain = derived()
+    combinations = derived(curved=curved)
     scales = _slopes(search, at)
     parameters = _parameters(search, model, np.sqrt(np.maximum(np.diag(covariance), 0.0)) * np.abs(scales))
-    lowest, notes = _slow(search, solution, info, combinations, powers) if bounds else ({}, [])
+    lowest, notes = _slow(search, solution, info, plain, powers) if bounds else ({}, [])
+    channels = np.concatenate([np.full(len(row.index), row.channel == "friction") for row in search.problem.rows])
+    seen = span(channels, predicted, info, curved)
     notes = [*search.structure.notes, *notes, *_notes(search, solution, parameters, warm)]
-    predicted = search.problem.predict(solution.coordinates, solution.states)
     white = search.weights * (predicted - search.problem.measured)
     likelihood = float(-0.5 * white @ white + np.log(search.weights / np.sqrt(2 * np.pi)).sum())
     return ThermalEstimate(
         model=model,
         parameters=parameters,
-        combinations=combinations,
+        combinations=combinations if seen is None else (*combinations, seen),
         bounds=lowest,
         covariance=covariance * scales[:, None] * scales,
         runs=_run_fits(search, solution, predicted),

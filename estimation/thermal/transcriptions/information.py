@@ -28,10 +28,12 @@ class Information:
     Attributes:
         covariance: of all coordinates (P, P), zero where one is not free.
         colour: median ratio of the standard errors to those of white noise.
+        sensitivities: of the predicted measurements by the coordinates (M, P).
     """
 
     covariance: Array
     colour: float
+    sensitivities: Array
 
 
 def gather(
@@ -66,6 +68,7 @@ def gather(
     return Information(
         covariance=full,
         colour=max(1.0, float(np.median(ratios))) if len(ratios) else 1.0,
+        sensitivities=J,
     )
 
 

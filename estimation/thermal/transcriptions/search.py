@@ -106,9 +106,9 @@ class Search:
 
     def solve(self, coordinates: Array) -> Solution:
         """Minimises from coordinates."""
-        return solve(self.problem, self._tied(coordinates), self.free, self.weights, self.prior)
+        return solve(self.problem, self.tied(coordinates), self.free, self.weights, self.prior)
 
-    def _tied(self, coordinates: Array) -> Array:
+    def tied(self, coordinates: Array) -> Array:
         """Moves fixed starts to the surroundings."""
         tied = coordinates.copy()
         for r, run in enumerate(self.runs):

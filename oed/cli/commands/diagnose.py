@@ -250,7 +250,7 @@ def _diagnosis(
     from estimation import on_one_clock, read_logs
     from estimation.diagnosis.experiment_plans.experiment_motions import at_rate
     from estimation.diagnosis.pipeline import diagnose as run
-    from estimation.exports import build_mjcf, recorded_ranges, urdf_text
+    from estimation.exports import build_mjcf, build_urdf, recorded_ranges
     from oed.exports import write_trajectory
     from oed.reports import save_diagnosis_report
     from robots.common.files import ResultFolder, open_atomic
@@ -287,7 +287,9 @@ def _diagnosis(
                 data["unfit_for_simulation"] = unfit.to_dict()
         # The diagnosis is kept, even if no file can state its model.
         if urdf is not None:
-            streams[urdf].write(urdf_text(result.model, robot).encode())
+            updated = build_urdf(result.model, robot)
+            streams[urdf].write(updated.text.encode())
+            lines += updated.lines()
         if mjcf is not None:
             made_of = build_mjcf(result.model, robot, folder=mjcf.parent, recorded=recorded_ranges(both))
             streams[mjcf].write(made_of.text.encode())

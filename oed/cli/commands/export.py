@@ -34,7 +34,12 @@ def export(
         ),
     ] = "csv",
     out: Annotated[
-        Path | None, typer.Option("--out", help="File to write. Default: next to the trajectory.", show_default=False)
+        Path | None,
+        typer.Option(
+            "--out",
+            help="File to write. Default: beside the trajectory, with the format in its name.",
+            show_default=False,
+        ),
     ] = None,
     robot: Annotated[
         str | None,
@@ -87,6 +92,8 @@ def export(
             raise InputError(f"--to {to}", allowed=", ".join(FORMS))
         if to != "csv" and (degrees or positions_only or bare):
             raise InputError(f"--degrees, --positions-only or --bare with --to {to}", allowed="them with csv only")
+        suffix = ".csv" if to == "csv" else CONTROLLER_FORMS[to].suffixes[0]
+        target = out or trajectory.with_name(f"{trajectory.stem}-{to}{suffix}")
         motion, metadata = read_trajectory(trajectory)
         # Only the trajectory file itself can be written without knowing whose joints move.
         unknown = to == "csv" and not robot and not metadata.get("robot")
@@ -105,7 +112,6 @@ def export(
                     "linear"
                 )
                 warnings.warn(text, AssumedValueWarning, stacklevel=1)
-            target = out or trajectory.with_name(f"{trajectory.stem}-export.csv")
             if period is not None:
                 motion = at_period(motion, period)
                 metadata.pop("period", None)
@@ -120,7 +126,6 @@ def export(
                 force=force,
             )
         else:
-            target = out or trajectory.with_name(f"{trajectory.stem}-export{CONTROLLER_FORMS[to].suffixes[0]}")
             options = ExportOptions(start_tolerance=start_tolerance, name=name)
             motion = export_trajectory(
                 target,

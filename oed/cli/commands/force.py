@@ -82,7 +82,8 @@ def force(
         from estimation.external_forces import estimate_forces
         from estimation.external_forces.online.c_export import observer_code
         from estimation.models.model import Model
-        from estimation.predictions.prediction import Prediction, clock_shift
+        from estimation.predictions.earlier_logs import clock_shift
+        from estimation.predictions.prediction import Prediction
         from oed.reports import save_force_report
         from oed.reports.rendering.provenance import recordings_from
         from robots.common.errors import InputError

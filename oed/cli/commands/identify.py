@@ -94,7 +94,7 @@ def identify(
     with console.working() as progress:
         from estimation import identify as run
         from estimation import read_logs
-        from estimation.exports import build_mjcf, urdf_text
+        from estimation.exports import build_mjcf, build_urdf
         from estimation.exports import c_code as c_text
         from estimation.identifications.streams import METHODS, identify_stream
         from estimation.logs.parquet_streams import is_large
@@ -117,8 +117,8 @@ def identify(
                 "seed": seed,
                 "progress": progress,
             }
-            table = None
-            if stream or (stream is None and mapping is None and method in METHODS and is_large(log)):
+            table, stated = None, None
+            if stream or (stream is None and method in METHODS and is_large(log)):
                 result = identify_stream(
                     described,
                     _opened(described, log, mapping, payload, gravity, torque_is),
@@ -135,7 +135,8 @@ def identify(
             result.save(folder.path("model.json").parent)
             save_estimate_report(result, folder, png=png, methods=table)
             if urdf is not None:
-                streams[urdf].write(urdf_text(result.model, described).encode())
+                stated = build_urdf(result.model, described)
+                streams[urdf].write(stated.text.encode())
             written = None if mjcf is None else build_mjcf(result.model, described, folder=mjcf.parent)
             if mjcf is not None and written is not None:
                 streams[mjcf].write(written.text.encode())
@@ -150,6 +151,7 @@ def identify(
                 *([table.summary()] if table else []),
                 result.summary(),
                 *([f"  below 3 standard errors: {', '.join(weak)}"] if weak else []),
+                *(stated.lines() if stated else ()),
                 *(written.lines() if written else ()),
                 *(f"written to {path.resolve()}" for path in (out, urdf, mjcf, c_code) if path is not None),
             ]
@@ -181,13 +183,9 @@ def _opened(
         raise InputError(
             f"--stream with {len(logs)} logs", allowed="one Parquet file or folder", remedy="put the parts in a folder"
         )
-    if mapping is not None:
-        raise InputError(
-            "--stream with --mapping", allowed="columns t, q1.. and tau1.. or i1..", remedy="rename the columns"
-        )
     if torque_is is not None:
         parse_meaning(torque_is, robot.n)
-    opened = open_stream(logs[0], robot.n, kinds=robot.chain.kinds, torque_is=torque_is)
+    opened = open_stream(logs[0], robot.n, kinds=robot.chain.kinds, torque_is=torque_is, mapping=mapping)
     (known,) = with_known_setup([opened], payload, gravity)
     return known
 

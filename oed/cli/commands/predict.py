@@ -42,7 +42,7 @@ def predict(
     with console.working() as progress:
         from estimation import load_model, read_log
         from estimation import predict as run
-        from estimation.predictions.prediction import clock_shift
+        from estimation.predictions.earlier_logs import clock_shift
         from oed.reports import prediction_page, render
         from oed.reports.rendering.provenance import recordings_from
         from robots.common.files import open_atomic

@@ -138,15 +138,16 @@ def _joints(estimate: CampaignEstimate) -> Table:
         if fit is None:
             rows.append((*head, None, None, None, "does not move"))
             continue
-        constants = [q for q in fit.combinations if "time constant" in q.name][: len(fit.model.zones)]
         texts = [
-            f"{significant(q.value / 60, q.standard_error / 60)} ± {significant_error(q.standard_error / 60)}"
+            f"{significant(q.value / 60, q.standard_error / 60)} ± {significant_error(q.half_width / 60)}"
             if q.determined
             else "not determined"
-            for q in constants
+            for q in fit.time_constants
         ]
-        cold = next((q for q in fit.combinations if q.name.startswith("friction cold")), None)
-        ratio = cold.value if cold is not None and cold.determined else None
+        seen = fit.span
+        ratio = None
+        if seen is not None:
+            ratio = f"{significant(seen.value, seen.standard_error)} ± {significant_error(seen.half_width)}"
         bounds = "; ".join(f"{name} above {value / 60:.3g} min" for name, value in fit.bounds.items())
         fast = texts[1] if len(texts) > 1 else None
         rows.append((*head, texts[0], fast, ratio, bounds or "–"))
@@ -157,12 +158,13 @@ def _joints(estimate: CampaignEstimate) -> Table:
         "with thermal model [N m or N]",
         "slow time constant [min]",
         "fast time constant [min]",
-        "cold / warm friction [1]",
+        "highest / lowest friction [1]",
         "bounds (95 %)",
     )
     caption = (
-        "RMS torque error [N m or N]. Time constants at the largest power, with standard errors. Cold / warm: "
-        "friction at T0 divided by that in the steady state at this power."
+        "RMS torque error [N m or N]. Time constants at the mean power of the logs. Highest / lowest: friction of the "
+        "coldest and the warmest time in the logs. ± holds 95 %, and allows for friction that falls exponentially with "
+        "temperature."
     )
     return Table(headings=headings, rows=tuple(rows), caption=caption)
 

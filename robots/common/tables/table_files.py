@@ -163,7 +163,7 @@ def read_parquet(path: Path, wanted: Callable[[str], bool]) -> Table:
             check_unique(schema.names, path)
             chosen = [name for name in schema.names if wanted(name)]
             content = file.read(columns=chosen)
-        arrays = {name: _parquet_column(content.column(name), name, path) for name in chosen}
+        arrays = {name: parquet_column(content.column(name), name, path) for name in chosen}
     except (pa.ArrowException, OSError, ValueError, KeyError) as error:
         raise _no_parquet(path, error) from error
     if content.num_rows == 0:
@@ -199,7 +199,12 @@ def stored_in(metadata: Mapping[bytes, bytes]) -> tuple[dict[str, Any], dict[str
     return {key: value for key, value in foreign.items() if key not in _FOREIGN}, {}
 
 
-def _parquet_column(column: pa.ChunkedArray, name: str, path: Path) -> Column:
+def parquet_column(column: pa.ChunkedArray, name: str, path: Path) -> Column:
+    """Gives the values of a column: numbers (N,) with NaN for missing ones, seconds for moments, or text.
+
+    Raises:
+        InputError: a column of another type.
+    """
     kind = column.type
     if pa.types.is_dictionary(kind):
         column = column.cast(kind.value_type)

@@ -44,9 +44,9 @@ def test_friction_of_one_joint_is_named(draw, joint):
     (change,) = found.damaged
     assert 100 * np.expm1(change.own) == pytest.approx(10.0, abs=3.0)
     assert change.sentence().startswith(f"Joint {joint}: friction +")
-    assert "of this joint alone" in change.sentence()
+    assert "this joint alone" in change.sentence()
     assert f"Friction changed on joint {joint} alone" in found.verdict()
-    assert "differ significantly in 1 part:" in found.verdict()
+    assert f"differ significantly in friction of joint {joint}." in found.verdict()
     assert {item.name for item in found.significant if item.level == "part"} == {f"friction of joint {joint}"}
 
 

@@ -13,7 +13,7 @@ import pytest
 from estimation import load_model, predict
 from estimation.diagnosis import Diagnosis, diagnose
 from estimation.logs.clocks import UNKNOWN_PAUSE
-from estimation.predictions.prediction import clock_shift
+from estimation.predictions.earlier_logs import clock_shift
 from oed.reports.pages.diagnosis_view import view_of
 from robots.common.errors import InputError, NotIdentifiableError
 from robots.plants import simulate

@@ -156,6 +156,37 @@ def test_the_robots_own_urdf_keeps_its_other_elements(tmp_path):
     np.testing.assert_allclose(pinocchio_torque(path, q, dq, ddq), expected, atol=PARITY * np.abs(expected).max())
 
 
+def test_a_second_arm_keeps_its_bodies(tmp_path):
+    """Links on joints that are not of the chain keep their inertia, and all together move as the identified link."""
+    source = tmp_path / "two.urdf"
+    body = """<inertial><origin xyz="0.02 0 0.1" rpy="0.1 0 0"/><mass value="{m}"/><inertia ixx="0.1" ixy="0" ixz="0"
+        iyy="0.1" iyz="0" izz="0.08"/></inertial>"""
+    joint = """<joint name="{name}" type="revolute"><parent link="{a}"/><child link="{b}"/><axis xyz="{axis}"/>
+        <origin xyz="0 0.1 0.2" rpy="0.3 0 0"/><limit lower="-1" upper="1" velocity="1" effort="5"/></joint>"""
+    masses = {"trunk": 5, "right": 2, "left": 1.5, "hand": 0.4}
+    links = "".join(f'<link name="{name}">{body.format(m=m)}</link>' for name, m in masses.items())
+    joints = [("turn", "base", "trunk", "0 0 1"), ("r", "trunk", "right", "0 1 0"), ("l", "trunk", "left", "0 1 0")]
+    tree = "".join(joint.format(name=name, a=a, b=b, axis=axis) for name, a, b, axis in joints)
+    hand = '<joint name="h" type="fixed"><parent link="left"/><child link="hand"/><origin xyz="0 0 0.3"/></joint>'
+    source.write_text(f'<robot name="two"><link name="base"/>{links}{tree}{hand}</robot>')
+    robot = load_robot(source, tip="right")
+    base = find_base_parameters(TorqueModel(robot, (RigidBody(),)))
+    values = 1.1 * base.from_standard(base.model.nominal)
+    path = tmp_path / "new.urdf"
+    export_urdf(_model(base, values), path, robot=robot)
+    assert "left, hand keep their inertia" in path.read_text() or "hand, left keep" in path.read_text()
+    whole = pin.buildModelFromUrdf(str(path))
+    assert all(inertia.mass > 0 for inertia in whole.inertias[1:])
+    held = pin.buildReducedModel(whole, [whole.getJointId("l")], pin.neutral(whole))
+    data = held.createData()
+    q, dq, ddq = states(2)
+    found = np.array([pin.rnea(held, data, *row) for row in zip(q, dq, ddq, strict=True)])
+    # pinocchio sorts joints by their names within a branch.
+    order = [held.getJointId(name) - 1 for name in robot.joint_names]
+    expected = base.torque(q[:, order], dq[:, order], ddq[:, order], values)
+    np.testing.assert_allclose(found[:, order], expected, atol=PARITY * np.abs(expected).max())
+
+
 def _model(base, values):
     from estimation import Model
 

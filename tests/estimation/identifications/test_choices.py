@@ -130,5 +130,5 @@ def test_left_out_errors_are_those_of_a_prediction(arm, arm_plant):
         np.testing.assert_allclose(
             estimate.choice.held_out * scale, predict(estimate.model, unseen).error_rms, rtol=1 / 6
         )
-    # Moving rows are fitted alike from 12 Hz up; what separates cut-offs is when friction changes sign.
-    assert identify(arm, known).choice.cutoff == 50.0
+    # Moving rows are fitted alike from 12 Hz up; what separates cut-offs is how joints start and stop.
+    assert identify(arm, known).choice.cutoff >= 30.0

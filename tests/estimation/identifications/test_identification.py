@@ -78,11 +78,14 @@ def test_white_noise_errors_would_be_too_small(experiment):
 
 
 def test_a_good_experiment_is_a_success(experiment):
-    """All joints are identified, and the residual is the 2 % of noise that the sensors add."""
+    """All joints are identified, and the residual is the 2 % of noise that the sensors add.
+
+    The noise is 2 % of the whole log's torque, which is smaller than that in motion.
+    """
     for estimate in experiment[0]:
         assert all(joint.identified for joint in estimate.joints)
         # Rows about a change of direction, which the fit leaves out, add up to half a per cent.
-        assert all(0.018 < joint.residual_rms / joint.torque_rms < 0.03 for joint in estimate.joints)
+        assert all(0.014 < joint.residual_rms / joint.torque_rms < 0.03 for joint in estimate.joints)
         assert estimate.model.determined.mean() > 0.9
 
 

@@ -12,13 +12,13 @@ from estimation.regressions.preparation import Prepared
 @pytest.mark.slow
 def test_the_covariance_knows_the_period(arm, arm_log, monkeypatch) -> None:
     """The period of a log's motion reaches its covariance, so that what repeats counts once."""
-    seen, plain = [], fit.repeated_covariance
+    seen, plain = [], fit.with_repetitions
 
-    def listen(parts, times, periods, *rest):
-        seen.append([(len(t), period) for t, period in zip(times, periods, strict=True)])
-        return plain(parts, times, periods, *rest)
+    def listen(covariance, parts, played, *rest):
+        seen.append([(len(log.q), log.period) for log in played])
+        return plain(covariance, parts, played, *rest)
 
-    monkeypatch.setattr(fit, "repeated_covariance", listen)
+    monkeypatch.setattr(fit, "with_repetitions", listen)
     monkeypatch.setattr(Prepared, "period", 4.0)
     identify(arm, arm_log())
     assert seen

@@ -40,13 +40,16 @@ def test_a_prediction_smooths_as_the_fit_did(arm, arm_log):
 
 
 def test_the_errors_are_those_of_the_arrays(model, arm_log):
-    """Error RMS, NRMSE and relative spread follow from measured and predicted torque."""
+    """Error RMS, NRMSE and relative spread follow from measured and predicted torque, but for rows at rest."""
     log = arm_log(seed=1, motion_seed=1)
     prediction = predict(model, log)
-    error = log.tau - prediction.predicted
-    np.testing.assert_allclose(prediction.error_rms, np.sqrt((error**2).mean(axis=0)))
-    np.testing.assert_allclose(prediction.nrmse, prediction.error_rms / np.sqrt((log.tau**2).mean(axis=0)))
-    np.testing.assert_allclose(prediction.relative_spread, error.std(axis=0) / log.tau.std(axis=0))
+    assert prediction.rest is not None
+    moving = np.where(prediction.rest, np.nan, 1.0)
+    error, torque = (log.tau - prediction.predicted) * moving, log.tau * moving
+    np.testing.assert_allclose(prediction.error_rms, np.sqrt(np.nanmean(error**2, axis=0)))
+    np.testing.assert_allclose(prediction.nrmse, prediction.error_rms / np.sqrt(np.nanmean(torque**2, axis=0)))
+    np.testing.assert_allclose(prediction.relative_spread, np.nanstd(error, axis=0) / np.nanstd(torque, axis=0))
+    assert prediction.to_dict()["at_rest"] == pytest.approx(prediction.rest.mean(axis=0))
     assert prediction.to_dict()["nrmse"] == prediction.nrmse.tolist()
     assert "rel. RMS" in prediction.summary()
 
@@ -93,7 +96,8 @@ def test_currents_count_by_the_torque_constants(arm, arm_log):
 
 
 def by_torque_rms(estimate, log):
-    return np.sqrt(np.mean((log.tau - predict(estimate.model, log).predicted) ** 2, axis=0))
+    found = predict(estimate.model, log)
+    return np.sqrt(np.average((log.tau - found.predicted) ** 2, axis=0, weights=~found.rest))
 
 
 @pytest.mark.slow

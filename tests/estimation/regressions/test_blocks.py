@@ -96,13 +96,15 @@ def test_choices_of_columns_are_fitted_one_by_one(problem):
 @pytest.mark.parametrize("size", [1, 5])
 @pytest.mark.parametrize("counted", [1.0, 0.9, 0.0])
 def test_products_are_those_of_averaged_rows(size, counted):
-    """Of the rows as they count and of all rows, averaged by a loop."""
+    """Of two sides that leave out other rows, averaged by a loop; the second leaves out few."""
     rng = np.random.default_rng(3)
     rows = rng.normal(size=(60, 8))
-    weight = (rng.random(60) < counted).astype(float)
-    sums, missing = rows.reshape(-1, size, 8).sum(axis=1), (1 - weight)[:, None] * rows
-    places = np.flatnonzero((weight.reshape(-1, size) != 1).any(axis=1))
-    lost = missing.reshape(-1, size, 8).sum(axis=1)[places]
-    for found, weights in zip(side_products(sums, lost, places, size), (weight, np.ones(60)), strict=True):
+    sides = [(rng.random(60) < share).astype(float) for share in (counted, 0.97)]
+    sums, left_out = rows.reshape(-1, size, 8).sum(axis=1), []
+    for weight in sides:
+        missing = (1 - weight)[:, None] * rows
+        places = np.flatnonzero((weight.reshape(-1, size) != 1).any(axis=1))
+        left_out.append((places, missing.reshape(-1, size, 8).sum(axis=1)[places]))
+    for found, weights in zip(side_products(sums, left_out, size), sides, strict=True):
         means = [sum(weights[i] * rows[i] for i in range(g, g + size)) / size for g in range(0, 60, size)]
         np.testing.assert_allclose(found, sum(np.outer(mean, mean) for mean in means), rtol=1e-9, atol=1e-12)

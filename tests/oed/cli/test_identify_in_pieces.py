@@ -43,13 +43,13 @@ def test_a_payload_is_known(run, robot: Path, parts: Path, tmp_path: Path) -> No
 @pytest.mark.parametrize(
     ("options", "text"),
     [
-        (("--mapping", "columns.yaml"), "--stream with --mapping"),
+        (("--mapping", "columns.yaml"), "columns.yaml"),
         (("--method", "huber"), "needs all rows in memory"),
         (("--log", "other.parquet"), "--stream with 2 logs"),
     ],
 )
 def test_what_pieces_do_not_take(run, robot: Path, parts: Path, tmp_path: Path, options, text: str) -> None:
-    """A mapping, a method that needs all rows, and two logs are refused by name; nothing is written."""
+    """A mapping that is not there, a method that needs all rows, and two logs are refused by name."""
     out = tmp_path / "out"
     done = run("identify", "--robot", robot, "--log", parts, "--stream", "--out", out, *options)
     assert done.code == 2

@@ -5,7 +5,8 @@ import pytest
 
 from estimation.gate.quick_fits.delays import _remaining, _Search, estimate_delays
 from estimation.gate.quick_fits.excerpts import excerpts_of, stretch
-from estimation.gate.quick_fits.joint_fit import OWN, Rows
+from estimation.gate.quick_fits.joint_columns import OWN
+from estimation.gate.quick_fits.joint_fit import Rows
 from estimation.gate.quick_fits.rigid_body import joint_rows, rigid_body, used_columns
 from estimation.gate.quick_fits.whole_fit import fit_all
 

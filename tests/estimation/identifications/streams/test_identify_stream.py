@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
+import pandas as pd
 import pyarrow.parquet as pq
 import pytest
 
@@ -134,6 +135,34 @@ def test_a_value_that_is_no_number_names_part_and_row(file: Path, tmp_path: Path
         open_stream(tmp_path, 2).rows(900, 1500)
     assert "b.parquet" in str(raised.value)
     assert raised.value.row == 206
+
+
+def test_foreign_columns_with_a_mapping(file: Path, tmp_path: Path) -> None:
+    """Names, units, signs and moments of another source give the rows that the whole log has."""
+    log = pq.read_table(file).to_pandas()[:3000]
+    foreign = {"stamp": pd.to_datetime(1.7e9 + log["t"], unit="s"), "note": "free text"}
+    for joint in (1, 2):
+        foreign[f"axis_{joint}_position_deg"] = -np.degrees(log[f"q{joint}"])
+        foreign[f"axis_{joint}_torque"] = -log[f"tau{joint}"]
+    frame = pd.DataFrame(foreign)
+    frame[:1700].to_parquet(tmp_path / "b.parquet")
+    frame[1700:].to_parquet(tmp_path / "a.parquet")
+    with pytest.raises(InputError, match="column t: the column is missing") as raised:
+        open_stream(tmp_path, 2)
+    # The error proposes a mapping that names the right columns.
+    assert "axis_{joint}_position_deg" in str(raised.value)
+    (tmp_path / "mapping.yaml").write_text(
+        "time: {column: stamp}\nposition: {columns: 'axis_{joint}_position_deg', unit: deg, sign: -1}\n"
+        "torque: {columns: 'axis_{joint}_torque', sign: -1}\n"
+    )
+    stream = open_stream(tmp_path, 2)
+    read = stream.rows(1000, 2500)
+    np.testing.assert_allclose(read.t, 1.7e9 + log["t"][1000:2500], atol=1e-6, rtol=0)
+    np.testing.assert_allclose(read.q, log[["q1", "q2"]][1000:2500], atol=1e-12)
+    np.testing.assert_allclose(read.tau, log[["tau1", "tau2"]][1000:2500], atol=1e-12)
+    (tmp_path / "mapping.yaml").write_text("time: {column: stamp}\ntorque: {columns: 'axis_{joint}_torque'}\n")
+    with pytest.raises(InputError, match="column q1: the column is missing"):
+        open_stream(tmp_path, 2)
 
 
 def test_other_methods_are_refused(robot: Robot, file: Path) -> None:

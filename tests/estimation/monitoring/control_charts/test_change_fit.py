@@ -35,6 +35,24 @@ def test_date_and_size_of_a_step():
     assert 0.90 < np.mean(inside) < 0.99
 
 
+def test_error_of_a_pause_is_no_step():
+    """An error by unlogged work that lasts for one log of four is below the threshold of a step that comes to stay.
+
+    Without its covariance the same error is a step of more than five standard errors.
+    """
+    t = np.concatenate([1500.0 * log + 10.0 * np.arange(6) for log in range(4)])
+    log = np.repeat(np.arange(4), 6)
+    y = 0.12 * (log == 2) + NOISE * np.random.default_rng(0).normal(size=24)
+    spread = 0.08 * (log > 0)
+    same = np.where(log[:, None] == log, 1.0, 0.5)
+    fixed = (t, y, np.full(24, NOISE**2), np.ones((24, 1)), np.zeros(1), np.array([[0.05**2]]), 0.01)
+    begin = np.array([12])
+    plain = fit_steps(*fixed, begin)
+    found = fit_steps(*fixed, begin, unlogged=same * spread[:, None] * spread)
+    assert plain.gains[0] > 5.0**2
+    assert found.gains[0] < 3.0**2
+
+
 def test_no_step_gives_chi_square_gains():
     """Without a step the gain at a fixed window is chi-square: mean 1 within 0.4 (four standard errors of 200)."""
     assert np.mean([fitted(seed, step=0.0).gains[40] for seed in range(200)]) == pytest.approx(1.0, abs=0.4)

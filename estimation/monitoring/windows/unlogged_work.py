@@ -1,0 +1,134 @@
+"""Work that no log shows: what a pause may have done to the temperatures of each joint."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+# A pause of this length [s] leads to a steady state, whatever it holds.
+LONGEST = 6 * 3600.0
+# Within this time [s] the fall of friction by its own heat is small.
+STEP = 60.0
+# Prior standard deviation of the duty. Its mean is zero: a pause is a rest.
+DUTY_SPREAD = 0.5
+# Below this duty the log of the friction changes evenly with it.
+LEAST_DUTY = 0.05
+# Standard deviation of the change of friction by unlogged work that one joint has beside the others, as a share of that
+# change: 0.3 to 0.4 on six virtual robots of two kinds, after pauses of 10 to 60 min with other motions.
+JOINT_SPREAD = 0.35
+
+Heated = Callable[[int, Array, float, float, float | None], Array]
+"""Temperature state of a joint after a time [s] at a power [W]."""
+
+
+class UnloggedWork:
+    """Follows each joint as if the robot had worked in the whole of the last pause, beside the joint that rested in it.
+
+    The heat of the pause lies between the two. Its share of the heat of work without a rest, the duty, is one unknown
+    of all joints. It is the same in all windows of a log.
+
+    Args:
+        n: number of joints.
+    """
+
+    def __init__(self, n: int) -> None:
+        self.worked: list[Array | None] = [None] * n
+        # As if the robot had rested in all pauses so far.
+        self.rested: list[Array | None] = [None] * n
+        # Friction power at the reference temperature, summed over the logs [J], and their time [s].
+        self.energy, self.time = np.zeros(n), 0.0
+        self.duties: list[float] = []
+        self.last = DUTY_SPREAD
+
+    @property
+    def duty(self) -> float:
+        """Estimate of the duty of the last pause, between 0 and 1: the mean over the windows since then.
+
+        In the first window it is that of the pause before.
+        """
+        return float(np.clip(np.mean(self.duties), 0.0, 1.0)) if self.duties else self.last
+
+    def per_duty(self, change: float) -> float:
+        """Change of the log of a friction per unit of the duty, about the estimated one.
+
+        Args:
+            change: relative change of the friction by work in the whole pause. The duty is the share of it.
+        """
+        duty = max(self.duty, LEAST_DUTY)
+        return float(np.log1p(duty * change) / duty)
+
+    def record(self, power: Array, duration: float) -> None:
+        """Takes into account what logged motion does: friction power at the reference temperature (n,) [W]."""
+        self.energy = self.energy + power * duration
+        self.time += duration
+
+    def settle(self, states: Sequence[Array | None]) -> list[Array | None]:
+        """Ends a log: gives the states (n,) with the heat of the estimated duty."""
+        duty = self.duty if self.duties else 0.0
+        settled = [
+            state if state is None or other is None else state + duty * (other - state)
+            for state, other in zip(states, self.worked, strict=True)
+        ]
+        self.last, self.duties = self.duty, []
+        return settled
+
+    def pause(
+        self,
+        states: Sequence[Array | None],
+        duration: float,
+        ambient: float | None,
+        factor: Callable[[int, Array], float],
+        heated: Heated,
+    ) -> None:
+        """Follows a pause [s] in which the robot works as in the logs, from states (n,).
+
+        Args:
+            states: at its start.
+            duration: of the pause [s].
+            ambient: temperature of the surroundings [degC]; None for the models' own.
+            factor: friction of a joint over that at the reference temperature, by its state.
+            heated: see `Heated`.
+        """
+        self.worked = list(states)
+        if self.time == 0:
+            return
+        power = self.energy / self.time
+        rest = min(duration, LONGEST)
+        steps = [STEP] * int(rest // STEP)
+        if rest % STEP > 1e-3:
+            steps.append(rest % STEP)
+        for j, state in enumerate(states):
+            if state is None:
+                continue
+            now = state
+            for step in steps:
+                now = heated(j, now, power[j] * factor(j, now), step, ambient)
+            self.worked[j] = now
+
+    def to_dict(self) -> dict[str, Any]:
+        """Gives the state as plain data."""
+        return {
+            "worked": [None if state is None else state.tolist() for state in self.worked],
+            "rested": [None if state is None else state.tolist() for state in self.rested],
+            "energy": self.energy.tolist(),
+            "time": self.time,
+            "duties": self.duties,
+            "last": self.last,
+        }
+
+    @classmethod
+    def from_dict(cls, n: int, data: dict[str, Any]) -> UnloggedWork:
+        """Reads `to_dict`."""
+        found = cls(n)
+        found.worked, found.rested = (
+            [None if state is None else np.array(state, dtype=float) for state in data[name]]
+            for name in ("worked", "rested")
+        )
+        found.energy, found.time = np.array(data["energy"], dtype=float), float(data["time"])
+        found.duties, found.last = [float(value) for value in data["duties"]], float(data["last"])
+        return found
