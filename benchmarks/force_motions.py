@@ -153,7 +153,8 @@ class Tally:
 def _rate(count: int, hours: float) -> str:
     """Says a count of false contacts and their rate with its 95 % interval."""
     low, high = chi2.ppf([0.025, 0.975], [2 * count, 2 * count + 2]) / 2 / hours
-    return f"{count} false contacts in {hours:.2f} h: {count / hours:.1f} ({np.nan_to_num(low):.1f} to {high:.1f}) per hour"
+    interval = f"{np.nan_to_num(low):.1f} to {high:.1f}"
+    return f"{count} false contacts in {hours:.2f} h: {count / hours:.1f} ({interval}) per hour"
 
 
 def run_seed(arm: str, seed: int, tally: Tally) -> None:
