@@ -96,6 +96,7 @@ def observer_code(
         "BEYOND": errors.beyond,
         "REACH2": errors.reach**2,
         "HOLDING": errors.holding,
+        "SLIDING": errors.sliding,
         "HOLD": errors.coulomb / np.sqrt(3.0),
         "INVERSE": np.linalg.inv(errors.correlation),
         "SQUARE": calibration.friction_square,
@@ -206,6 +207,7 @@ int NAME_observer_step(NAME_observer *s, double t, const double *q, const double
 {
     double momentum[NAME_N], rest[NAME_N], friction[NAME_N], J[6 * NAME_N], variance[NAME_N];
     double other[NAME_N], z[NAME_N], external[NAME_N], mean[NAME_N], work[NAME_WORK], a = 0.0;
+    int slides[NAME_N];
     const double *in[3] = {q, dq, s->acceleration};
     double *out[4] = {momentum, rest, friction, J};
     double *spread[1] = {variance};
@@ -223,6 +225,7 @@ int NAME_observer_step(NAME_observer *s, double t, const double *q, const double
         for (int j = 0; j < NAME_N; ++j) {
             external[j] = (momentum[j] - s->momentum[j]) / step - (other[j] + s->other[j]) / 2.0;
             mean[j] = (friction[j] + s->before[j]) / 2.0;
+            slides[j] = fmin(fabs(dq[j]), fabs(s->dq[j])) >= NAME_SLIDING[j];
             s->residual[j] = a * s->residual[j] + (1.0 - a) * (external[j] + mean[j] * s->cross[j] / s->square[j]);
             s->acceleration[j] = a * s->acceleration[j] + (1.0 - a) * (dq[j] - s->dq[j]) / step;
         }
@@ -258,6 +261,7 @@ int NAME_observer_step(NAME_observer *s, double t, const double *q, const double
         const double b = exp(-fmin(step, 2.0 * NAME_PERIOD) / NAME_MEMORY);
         const double counts = (1.0 - b) / sqrt(fmax(*statistic, 1.0));
         for (int j = 0; j < NAME_N; ++j) {
+            if (!slides[j]) continue;
             s->cross[j] = b * s->cross[j] - counts * external[j] * mean[j];
             s->square[j] = b * s->square[j] + counts * mean[j] * mean[j];
         }

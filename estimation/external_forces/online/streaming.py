@@ -111,6 +111,7 @@ class ForceObserver:
         self.calibration = calibration
         self._step = StepFunction(dynamics_of(model, gravity=gravity, payload=payload, tool=tool))
         self._errors = StepErrors(calibration.errors)
+        self._sliding = calibration.errors.sliding
         self._constant, self._threshold = calibration.constant, calibration.threshold.value
         self._friction = [None if own is None else OnlineFriction(own, np.zeros(4), RESOLUTION) for own in thermal]
         self.reset()
@@ -175,6 +176,7 @@ class ForceObserver:
         else:
             fresh = False
             a = math.exp(-step / constant)
+            slides = np.minimum(np.abs(speed), np.abs(self._dq)) >= self._sliding
             external = (momentum - self._momentum) / step - (other + self._other) / 2.0
             mean = (friction + self._before) / 2.0
             levelled = external + mean * self._cross / self._square
@@ -188,9 +190,10 @@ class ForceObserver:
         statistic = errors.statistic(self._residual, deviation) / self._threshold
         if step is not None and not fresh:
             b = math.exp(-min(step, 2.0 * self.calibration.period) / MEMORY)
-            counts = (1.0 - b) * float(contact_weight(statistic))
-            self._cross = b * self._cross - counts * external * mean
-            self._square = b * self._square + counts * mean * mean
+            counts = np.where(slides, (1.0 - b) * float(contact_weight(statistic)), 0.0)
+            kept = np.where(slides, b, 1.0)
+            self._cross = kept * self._cross - counts * external * mean
+            self._square = kept * self._square + counts * mean * mean
         if statistic > 1.0 and t - self._begun > SETTLING * constant:
             self._touched = t
         contact = t - self._touched <= self.calibration.memory

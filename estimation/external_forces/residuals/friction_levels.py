@@ -14,7 +14,12 @@ MEMORY = 30.0
 
 
 def friction_excess(
-    t: Array, external: Array, friction: Array, begins: NDArray[np.bool_], weights: Array | None = None
+    t: Array,
+    external: Array,
+    friction: Array,
+    begins: NDArray[np.bool_],
+    weights: Array | None = None,
+    slides: NDArray[np.bool_] | None = None,
 ) -> Array:
     """Follows the excess s of friction f over the model's, tau_f = (1 + s) f (N, n), by least squares that forgets.
 
@@ -22,7 +27,8 @@ def friction_excess(
 
     u is the external torque by the model's own friction. It begins with the least squares of the log's first memory.
     With the weights of `contact_weight` a push adds no more than one at the threshold would. A contact of many seconds
-    is taken for friction in part, the later the stronger it is.
+    is taken for friction in part, the later the stronger it is. While a joint does not slide its level is kept, and time
+    does not count: static friction says nothing of sliding, and the model's is then of the sign of the velocity's noise.
 
     Args:
         t: times (N,) [s].
@@ -30,20 +36,35 @@ def friction_excess(
         friction: f of the model (N, n) [N m or N].
         begins: where (N,) the observer begins anew: such samples do not count.
         weights: of the samples (N,), one each by default.
+        slides: where (N, n) the joints slide, everywhere by default.
 
     Returns:
         s at the sample before each (N, n).
     """
-    known = np.where(begins[:, None], 0.0, friction)
-    clock, once = steady_clock(t), np.zeros(len(t), dtype=bool)
-    once[0] = True
-    first = clock <= clock[0] + MEMORY
-    sums, counts = [], np.ones((len(t), 1)) if weights is None else weights[:, None]
-    for product in (-counts * external * known, counts * known**2):
-        product[0] = product[first].mean(axis=0)
-        sums.append(filtered(product, clock, MEMORY, once))
-    excess = np.divide(sums[0], sums[1], out=np.zeros_like(sums[0]), where=sums[1] > 0.0)
+    excess = np.zeros_like(external)
+    steps = np.diff(steady_clock(t), prepend=0.0)
+    counts = np.ones(len(t)) if weights is None else weights
+    for j in range(external.shape[1]):
+        used = ~begins if slides is None else ~begins & slides[:, j]
+        rows = np.flatnonzero(used)
+        if not len(rows):
+            continue
+        own = _followed(steps[rows], counts[rows], external[rows, j], friction[rows, j])
+        latest = np.cumsum(used) - 1
+        excess[:, j] = own[np.maximum(latest, 0)]
     return np.concatenate([excess[:1], excess[:-1]])
+
+
+def _followed(steps: Array, counts: Array, external: Array, friction: Array) -> Array:
+    """The excess (M,) at the rows of one joint that count, `steps` [s] after each other."""
+    clock, once = np.cumsum(steps) - steps[0], np.zeros(len(steps), dtype=bool)
+    once[0] = True
+    first = clock <= MEMORY
+    sums = []
+    for product in (-counts * external * friction, counts * friction**2):
+        product[0] = product[first].mean()
+        sums.append(filtered(product[:, None], clock, MEMORY, once)[:, 0])
+    return np.divide(sums[0], sums[1], out=np.zeros_like(sums[0]), where=sums[1] > 0.0)
 
 
 def contact_weight(statistic: ArrayLike) -> Array:

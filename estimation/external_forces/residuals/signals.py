@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from estimation.external_forces.residuals.dynamics import Dynamics
 from estimation.external_forces.residuals.filters import external_torque, filtered, restarts, time_constant
 from estimation.external_forces.residuals.friction_levels import friction_excess
+from estimation.external_forces.residuals.velocity_noise import logged_noise, sliding_speed, smoothed_noise
 from estimation.models.model import Model
 from estimation.predictions.checked_motions import smoother_of
 from estimation.predictions.prediction import Prediction
@@ -45,6 +46,7 @@ class Signals:
         external: `raw` with the level of friction that is followed (N, n) [N m or N].
         direct: the same by inverse dynamics (N, n) [N m or N].
         excess: of the friction over the model's, as a share of it (N, n).
+        velocity_noise: standard deviation of the velocities' noise (N, n), one for each log [rad/s or m/s].
         extrapolates: where (N, n) the prediction extrapolates.
         begins: where (N,) the observer begins anew.
     """
@@ -61,6 +63,7 @@ class Signals:
     external: Array
     direct: Array
     excess: Array
+    velocity_noise: Array
     extrapolates: NDArray[np.bool_]
     begins: NDArray[np.bool_]
 
@@ -71,7 +74,10 @@ class Signals:
 
     def levelled(self, weights: Array) -> Signals:
         """Follows the level of friction anew, with weights (N,) of the samples."""
-        excess = friction_excess(self.t, self.raw, self.mean_friction, self.begins, weights)
+        fast = np.abs(self.dq) >= sliding_speed(self.velocity_noise)
+        # Through the whole step.
+        slides = fast & np.concatenate([fast[:1], fast[:-1]])
+        excess = friction_excess(self.t, self.raw, self.mean_friction, self.begins, weights, slides)
         return replace(
             self,
             external=np.where(self.begins[:, None], 0.0, self.raw + excess * self.mean_friction),
@@ -109,8 +115,10 @@ def signals_of(
     q, dq, ddq = motion.q, motion.dq, motion.ddq
     cold = model.torque(q, dq, ddq, gravity=log.gravity, payload=log.payload)
     begins = _unsettled(motion.t, restarts(motion.t, constant), constant, smoother_of(model, prediction.cutoff))
+    noise = smoothed_noise(log, motion, prediction.cutoff)
     if velocity == "logged":
         q, dq = logged_motion(log, motion.t)
+        noise = logged_noise(dq)
         ddq = filtered(_differences(dq, motion.t, begins), motion.t, constant, begins)
     momentum, rest, friction, jacobian = dynamics(q, dq)
     # What the model adds to its terms, heat and extensions, acts at the joints as friction does.
@@ -131,6 +139,7 @@ def signals_of(
         external=external,
         direct=prediction.predicted - prediction.measured,
         excess=zeros,
+        velocity_noise=noise + zeros,
         extrapolates=zeros.astype(bool) if prediction.extrapolates is None else prediction.extrapolates,
         begins=begins,
     )

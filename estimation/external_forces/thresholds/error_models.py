@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from scipy.optimize import nnls
 
 from estimation.exports.friction import linear_friction
+from estimation.external_forces.residuals.velocity_noise import NOISY, SLIDING
 from estimation.models.model import Model
 from robots.terms.friction import SLOWEST
 
@@ -21,7 +22,7 @@ WIDTHS = np.geomspace(1e-3, 0.3, 16)
 # Rounds of the weighted fit; rows that stand for a longer log.
 ROUNDS, MOST_ROWS = 4, 20_000
 # Speeds [rad/s or m/s] that are compared: below such a one the sign of the friction is open.
-HOLDING = (SLOWEST, 2 * SLOWEST, 5 * SLOWEST, 10 * SLOWEST)
+HOLDING = (SLOWEST, 2 * SLOWEST, 5 * SLOWEST, SLIDING)
 # Seconds of new healthy motion that count as much as the fit's band of other motions. On arms that
 # `benchmarks/force_motions.py` draws, the residual of motions that neither has seen is then as large as stated.
 PRIOR = 10.0
@@ -95,6 +96,11 @@ class ErrorModel:
         return np.stack([self.reversal, self.friction, ones, ones])
 
     @property
+    def sliding(self) -> Array:
+        """Speeds (n,) from which a joint surely slides [rad/s or m/s]: the level of friction is followed above them."""
+        return np.maximum(SLIDING, self.holding)
+
+    @property
     def seen(self) -> ErrorModel:
         """The same for the healthy logs themselves: what they leave open for other motions does not act in them."""
         none = np.zeros_like(self.level)
@@ -149,11 +155,13 @@ def fit_error_model(
     lagged: Callable[[Array], Array],
     *,
     seconds: float,
+    velocity_noise: Array | float = 0.0,
 ) -> ErrorModel:
     """Fits the variances to squared residuals by weighted least squares with non-negative coefficients.
 
     Variance-function estimation (Davidian and Carroll 1987); the width of the reversals and the speed of holding are
-    those of the highest Gaussian likelihood.
+    those of the highest Gaussian likelihood. Below the noise of the velocity the sign of the friction is open, whatever
+    the healthy logs show: they may have no stops.
 
     What the fit's splits say of other motions is the growth g of the model's band: g^2 v. Where v is as in the healthy
     logs, it counts beside their residual as much as `PRIOR` seconds do, so that inside = g^2 PRIOR / (PRIOR + seconds).
@@ -168,6 +176,7 @@ def fit_error_model(
         counts: which samples (N,) are healthy.
         lagged: the observer's filter.
         seconds: of motion in the healthy logs that neither they nor the fit had before [s].
+        velocity_noise: standard deviation of the velocities' noise (n,) [rad/s or m/s].
     """
     n = residual.shape[1]
     friction_of = linear_friction(model)
@@ -176,7 +185,8 @@ def fit_error_model(
     rows = np.flatnonzero(counts)[:: max(1, int(counts.sum()) // MOST_ROWS)]
     square = residual[rows] ** 2
     known = np.stack([lagged(np.abs(friction))[rows] ** 2, lagged(np.sqrt(variance))[rows] ** 2])
-    held = [lagged(holding_amplitude(dq, coulomb, np.full(n, speed)))[rows] ** 2 for speed in HOLDING]
+    holding = np.maximum(np.array(HOLDING)[:, None], NOISY * np.broadcast_to(velocity_noise, (n,)))
+    held = [lagged(holding_amplitude(dq, coulomb, speed))[rows] ** 2 for speed in holding]
     best, fitted, slowest = np.full(n, np.inf), np.zeros((5, n)), np.zeros(n, dtype=int)
     tried = [(share, 0) for share in WIDTHS] + [(None, k) for k in range(1, len(HOLDING))]
     for share, k in tried:
@@ -198,7 +208,7 @@ def fit_error_model(
         reach=np.sqrt(np.quantile(variance[counts], LARGEST, axis=0)),
         width=fitted[4],
         coulomb=coulomb,
-        holding=np.array(HOLDING)[slowest],
+        holding=holding[slowest, np.arange(n)],
         correlation=np.eye(n),
     )
     w = lagged(found.seen.amplitudes(dq, friction, variance))[rows]

@@ -71,12 +71,16 @@ def calibrate_signals(
             f"the healthy log of {whole.t[-1] - whole.t[0]:.3g} s is too short for the observer to settle",
             remedy="give a longer healthy log with --healthy: a minute or more",
         )
+    noise = np.median(whole.velocity_noise, axis=0)
     for number in range(ROUNDS if own else 1):
         first = own and number == 0
         residual = lag(whole.external, from_zero=True)
         # Contacts are not known at first: they must not enter the size of the errors.
         fitted = _winsorised(residual, settled) if first else residual
-        errors = fit_error_model(model, fitted, whole.dq, whole.friction, whole.variance, counts, lag, seconds=seconds)
+        errors = fit_error_model(
+            model, fitted, whole.dq, whole.friction, whole.variance, counts, lag,
+            seconds=seconds, velocity_noise=noise,
+        )  # fmt: skip
         seen = observe(whole, errors.seen, bandwidth)
         statistic, deviation = seen.statistic, seen.deviation
         threshold = alarm_threshold(statistic[counts & new], whole.period, false_alarms, robust=first)

@@ -105,11 +105,12 @@ def test_direct_residual_agrees_with_the_momentum(found):
 def test_stops_are_no_contacts(exact, healthy, log_with_stops):
     """A model that was fitted with a low cut-off does not see contacts at stops, where a low-pass rings.
 
-    Nor does the ringing hide contacts: with it the threshold is 72, without it 34.
+    Nor does the ringing hide contacts: with it the threshold is 72, without it 34. The healthy log of 96 s leaves the
+    threshold of an hour open to some percent; ringing would be thousands of thresholds high.
     """
     slow = replace(exact, provenance={**exact.provenance, "cutoff_hz": 1.5})
     found = estimate_forces(slow, log_with_stops(31), healthy=[healthy, log_with_stops(32)])
-    assert found.contacts == ()
+    assert found.statistic.max() < 1.5
     assert found.calibration.threshold.value < 50.0
 
 

@@ -57,3 +57,15 @@ def test_joint_without_friction_has_no_excess():
 def test_pause_counts_as_two_steps():
     """One sample after a pause does not stand for the pause."""
     np.testing.assert_allclose(steady_clock(np.array([0.0, 1.0, 2.0, 50.0, 51.0])), [0, 1, 2, 4, 5])
+
+
+def test_rests_do_not_change_the_level():
+    """At rest the model's friction has the sign of the velocity's noise; the level stays that of the sliding before."""
+    t, external, friction, begins = signals(600.0, lambda t: 0.2 + 0 * t)
+    slides = (t % 60.0 < 20.0)[:, None]
+    noise = np.random.default_rng(1).choice([-5.0, 5.0], (len(t), 1))
+    # What does not act counts as an external torque.
+    external, friction = np.where(slides, external, noise), np.where(slides, friction, noise)
+    found = friction_excess(t, external, friction, begins, slides=slides)
+    np.testing.assert_allclose(found, 0.2, atol=1e-9)
+    assert friction_excess(t, external, friction, begins).min() < -0.5
