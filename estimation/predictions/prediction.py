@@ -142,8 +142,8 @@ class Prediction:
         worse = np.flatnonzero(self.relative_spread > 1.0) + 1
         if len(worse):
             lines.append(
-                f"  worse than a constant on {joints_in_words(worse.tolist())}: check that the log is of this robot, and "
-                "what its torque columns hold (oed check)"
+                f"  worse than a constant on {joints_in_words(worse.tolist())}: check that the log is of this robot, "
+                "and what its torque columns hold (oed check)"
             )
         if self.rest is not None:
             lines.append(
