@@ -157,7 +157,9 @@ def judge(path: Path) -> tuple[str, str]:
             estimate = identify(arm(), log, friction="coulomb-viscous", candidates=CANDIDATES)
     except OedError as error:
         text = str(error)
-        return ("message", text[:300]) if len(text) > 10 and "\n" not in text else ("traceback", f"unclear: {text!r}")
+        # A mapping that would fit is printed line by line.
+        clear = len(text) > 10 and ("\n" not in text or "mapping" in text)
+        return ("message", text[:300]) if clear else ("traceback", f"unclear: {text!r}")
     except Exception:
         return "traceback", traceback.format_exc()[-1500:]
     wrong = wrong_parameters(estimate.model)

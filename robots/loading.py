@@ -77,8 +77,10 @@ def load_robot(
         notes = () if robot.origin in catalogue() else robot.notes
         if robot.assumed:
             notes = (f"these values are assumptions without a source: {', '.join(robot.assumed)}", *notes)
+        # As a command line takes it.
+        chosen = f" --tip {tip}" if tip is not None else f" --joints {','.join(joints)}" if joints is not None else ""
         for note in notes:
-            warnings.warn(DescriptionWarning(f"{robot.name}: {note}", robot.origin), stacklevel=2)
+            warnings.warn(DescriptionWarning(f"{robot.name}: {note}", robot.origin + chosen), stacklevel=2)
     return robot
 
 

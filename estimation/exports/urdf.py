@@ -15,6 +15,7 @@ from estimation.exports.feasible import NEAREST, nearest_feasible
 from estimation.exports.friction import LinearFriction, linear_friction
 from estimation.exports.remainders import remainder
 from estimation.exports.standard import REMEDY, standard_parameters
+from estimation.exports.unstated import unstated_terms
 from estimation.models.model import Model
 from robots.common.errors import InfeasibleError, InputError, NearestBodiesWarning
 from robots.common.files import write_atomic
@@ -126,8 +127,7 @@ def _remarks(model: Model, friction: LinearFriction | None, moved: float) -> lis
             parts.append(f"{text} recorded speed: {', '.join(rough)}")
     if moved:
         parts.append(NEAREST.format(moved))
-    other = {column.term for column in model.parameters if not column.friction and column.term != "rigid_body"}
-    left = [f"{term.replace('_', ' ')} parameters" for term in sorted(other)]
+    left = unstated_terms(model, {"rigid_body"})
     left += [e.effect.replace("_", " ") + ("" if e.joint is None else f" of joint {e.joint}") for e in model.extensions]
     if left:
         parts.append(f"not stated, because a URDF cannot: {', '.join(left)}")

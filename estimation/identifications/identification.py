@@ -193,6 +193,7 @@ def _joint_fits(found: Fit, predictable: NDArray[np.bool_]) -> tuple[JointFit, .
     total = np.maximum(judged.sum(axis=0), 1)
     torque = np.concatenate([part.tau for part in found.rows])
     rms = np.sqrt(np.einsum("tj,tj,tj->j", torque, torque, judged) / total)
+    spread = np.sqrt(np.maximum(rms**2 - (np.einsum("tj,tj->j", torque, judged) / total) ** 2, 0.0))
     error = torque - np.concatenate(list(found.predicted))
     fitted = np.sqrt(np.einsum("tj,tj,tj->j", error, error, judged) / total)
     band = band_of(np.abs(np.where(judged, error, np.nan)))
@@ -203,7 +204,7 @@ def _joint_fits(found: Fit, predictable: NDArray[np.bool_]) -> tuple[JointFit, .
             joint=j + 1,
             name=base.model.robot.joint_names[j],
             torque_rms=float(rms[j]),
-            torque_spread=float(choice.spread[j]),
+            torque_spread=float(spread[j]),
             residual_rms=float(fitted[j]),
             held_out_rms=float(choice.held_out[j]),
             nominal_rms=float(nominal[j]),

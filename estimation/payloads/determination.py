@@ -67,7 +67,7 @@ def require_determined(found: Sequence[Quantity], robot: Robot, q: ArrayLike, gr
     if free < 0 and free + mass.half_width < 0:
         raise InputError(
             f"the payload has a mass of {free:.3g} kg: the robot carries less in the log with the payload",
-            remedy="swap --log and --without, or check which log has the payload",
+            remedy="check which log has the payload; of two logs, swap --log and --without",
         )
     open_ = [name for name in SHOWABLE if not known[name]]
     if not open_:

@@ -21,7 +21,7 @@ from estimation.preprocessing.smoothing import low_pass
 from estimation.regressions.preparation import torque_of
 from estimation.regressions.torque_meanings import as_joint_torque
 from robots.common.errors import InputError
-from robots.common.plain import all_finite, finite, percent
+from robots.common.plain import all_finite, finite, joints_in_words, percent
 from robots.common.tables.table_files import write_table
 from robots.signals import Log, Motion
 
@@ -139,6 +139,12 @@ class Prediction:
             share, spread, slow, covered = (f"{100 * v:.2f} %" if np.isfinite(v) else "–" for v in shares)
             lines.append(f"  {j} {name[:18]:18} {rms:12.4g} {share:>10} {spread:>14} {slow:>15} {covered:>21}")
         lines.append("  rel.: error divided by torque; last column: share of the errors within the 95 % band")
+        worse = np.flatnonzero(self.relative_spread > 1.0) + 1
+        if len(worse):
+            lines.append(
+                f"  worse than a constant on {joints_in_words(worse.tolist())}: check that the log is of this robot, "
+                "and what its torque columns hold (oed check)"
+            )
         if self.rest is not None:
             lines.append(
                 f"  {percent(float(self.rest.mean()))} of the torques are of joints at rest: friction may hold them "

@@ -154,6 +154,8 @@ def robot_of_file(
     stated = str(metadata.get("robot") or "")
     if not robot and not stated:
         raise InputError("the file does not name its robot", file=file, remedy="give --robot")
+    if not robot and Path(stated).suffix and not Path(stated).is_file():
+        raise InputError(f"the file names the robot {stated}, which is not there", file=file, remedy="give --robot")
     return robot_from(robot or stated, tip, joints, lock)
 
 

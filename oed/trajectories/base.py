@@ -84,9 +84,10 @@ def count_periods(duration: float, period: float) -> int:
         raise InputError(f"found the sample period {period} s", allowed="a positive number")
     count = round(duration / period)
     if abs(duration / period - count) > WHOLE_PERIOD_TOLERANCE * max(1, count * 1e-3):
+        longer = np.ceil(duration / period) * period
         raise InputError(
             f"the duration {duration:.9g} s is not a multiple of the sample period {period:.9g} s",
-            remedy=f"use {np.ceil(duration / period) * period:.9g} s, or another period",
+            remedy=f"use {longer:.9g} s (a base frequency of {1 / longer:.9g} Hz), or another period",
         )
     return count
 

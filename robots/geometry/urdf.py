@@ -153,6 +153,7 @@ class UrdfTree:
         inertia = np.zeros((len(moving), SIZE))
         lumped: list[list[str]] = [[] for _ in moving]
         places: list[LinkPlace] = []
+        held: list[str] = []
         flange: Array = np.eye(4)
         stack: list[tuple[str, int, Array]] = [(self.root, -1, np.eye(4))]
         while stack:
@@ -174,6 +175,9 @@ class UrdfTree:
                     stack.append((joint.child, moving[joint.name], np.eye(4)))
                 else:
                     stack.append((joint.child, body, placement @ self._locked_motion(joint, selection)))
+                    stated = joint.name in selection.locked or joint.mimic is not None
+                    if joint.moves and body >= 0 and not stated and self.links[joint.child].mass > 0:
+                        held.append(joint.name)
         for i, names in enumerate(lumped):
             if not inertia[i, 0] > 0.0:
                 listed = ", ".join(repr(name) for name in names)
@@ -191,6 +195,7 @@ class UrdfTree:
         notes = [
             *self._limit_notes(chain.names, bounds),
             *self._body_notes(chain, lumped),
+            *self._held_notes(held),
             *(
                 f"joint {joint.name} mimics the moving joint {joint.mimic[0]}; it is treated as locked"
                 for joint in self.joints.values()
@@ -228,6 +233,13 @@ class UrdfTree:
         return [
             f"{'joints' if len(named) > 1 else 'joint'} {', '.join(named)}: {note}" for note, named in shared.items()
         ]
+
+    def _held_notes(self, names: Sequence[str]) -> list[str]:
+        """One note for all joints whose links move as a part of the chain without a word of the user."""
+        if not names:
+            return []
+        joints = f"joint {names[0]} is" if len(names) == 1 else f"joints {', '.join(sorted(names))} are"
+        return [f"{joints} no part of the chain: held at rest, their links count with those that carry them (--lock)"]
 
     def _body_notes(self, chain: Chain, lumped: Sequence[Sequence[str]]) -> list[str]:
         size = sum(float(np.linalg.norm(joint.translation)) for joint in chain.joints)

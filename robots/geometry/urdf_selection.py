@@ -164,7 +164,7 @@ def _only_one(tree: _Tree, locked: Mapping[str, float]) -> tuple[UrdfJoint, ...]
         f"the {tree.kind} branches into {len(whole)} chains",
         file=tree.file,
         allowed="a tip link of these (tip: joints): " + "; ".join(lines[:_LISTED]) + more,
-        remedy="choose by tip, by joints, or lock joints (locked)",
+        remedy="choose one by its tip (--tip) or its joints (--joints), or lock joints (--lock)",
     )
 
 

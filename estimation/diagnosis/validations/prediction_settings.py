@@ -120,7 +120,7 @@ def with_band(model: Model, logs: Sequence[Log], held_out: Sequence[Log], unseen
     """Sets the half-widths of a band that contains 95 % of the model's errors on held-out data.
 
     The provenance also gets the coverage (n,): the share of each part of the held-out logs that lies in the band from
-    the other parts. It also gets the NRMSE on all rows (n,).
+    the other parts. It also gets the NRMSE on all rows but those at rest (n,).
 
     Args:
         model: extended model.
@@ -138,13 +138,13 @@ def with_band(model: Model, logs: Sequence[Log], held_out: Sequence[Log], unseen
     covered = np.full(model.robot.n, np.nan)
     if held_out:
         parts = [part for error in errors for part in np.array_split(error, PARTS)]
-        shares = [
-            np.mean(part <= band_of(np.concatenate(parts[:k] + parts[k + 1 :])), axis=0) for k, part in enumerate(parts)
+        inside = [
+            np.sum(part <= band_of(np.concatenate(parts[:k] + parts[k + 1 :])), axis=0) for k, part in enumerate(parts)
         ]
-        covered = np.average(shares, axis=0, weights=[len(part) for part in parts])
+        covered = np.sum(inside, axis=0) / np.maximum(np.isfinite(np.concatenate(errors)).sum(axis=0), 1)
     found, torque = np.concatenate(errors), np.concatenate([torque_of(model.robot, log) for log in held_out or logs])
     with np.errstate(divide="ignore", invalid="ignore"):
-        share = np.sqrt(np.mean(found**2, axis=0) / np.mean(torque**2, axis=0))
+        share = np.sqrt(np.nansum(found**2, axis=0) / np.sum(torque**2 * np.isfinite(found), axis=0))
     stated = {
         "band95": all_finite(band_of(found)),
         "band95_coverage": all_finite(covered),
@@ -172,5 +172,7 @@ def _predicted(model: Model, log: Log, before: Sequence[Log] = ()) -> Prediction
 
 
 def _error(prediction: Prediction) -> Array:
+    """Errors (N, n), NaN where the joint is at rest: friction may hold it with any torque."""
     assert prediction.measured is not None
-    return prediction.measured - prediction.predicted
+    error = prediction.measured - prediction.predicted
+    return error if prediction.rest is None else np.where(prediction.rest, np.nan, error)

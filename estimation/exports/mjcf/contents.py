@@ -11,6 +11,7 @@ from estimation.exports.feasible import NEAREST, nearest_feasible
 from estimation.exports.friction import LinearFriction, linear_friction
 from estimation.exports.mjcf.couplings import Coupling, coupling_of
 from estimation.exports.standard import REMEDY, standard_and_rotors
+from estimation.exports.unstated import unstated_terms
 from estimation.models.extension import Extension
 from estimation.models.model import Model
 from robots.common.errors import InfeasibleError
@@ -98,9 +99,7 @@ def contents_of(model: Model, robot: Robot) -> Contents:
         contents.remarks += _rough_friction(robot, friction)
     left = [extension for extension in model.extensions if not _state(contents, model, robot, extension)]
     _offsets(contents, model, robot)
-    known = {"rigid_body", "rotor_inertia", "torque_offset"}
-    other = sorted({c.term for c in model.parameters if not c.friction and c.term not in known})
-    words = [f"{term.replace('_', ' ')} parameters" for term in other]
+    words = unstated_terms(model, {"rigid_body", "rotor_inertia", "torque_offset"})
     words += [e.effect.replace("_", " ") + ("" if e.joint is None else f" of joint {e.joint}") for e in left]
     if words:
         contents.remarks.append(f"MJCF cannot state: {', '.join(words)}")

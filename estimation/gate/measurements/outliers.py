@@ -21,6 +21,8 @@ MANY = 0.03
 # Peaks of torque within so many rows of a reversal of any joint are real if more than MOST of all peaks are there:
 # friction that changes its direction shakes the arm, and a sharp fall of it makes a peak.
 BESIDE, MOST = 4, 0.5
+# Share of the speed nearby below which a joint stands between two moves: its friction falls to nothing for a row.
+STANDS = 0.1
 # Number of values of a column from which its usual range and changes are estimated.
 SAMPLES = 20_000
 
@@ -118,12 +120,15 @@ def _lost_values(values: Array, q: Array, step: float) -> Rows:
 
 
 def _reversing_rows(columns: Columns) -> NDArray[np.bool_]:
-    """Marks the rows (N,) near those in which any joint reverses, starts or stops."""
+    """Marks the rows (N,) near those in which any joint reverses, starts or stops, be it for a row."""
     reversing = np.zeros(len(columns.q[0]), dtype=bool)
     for q in columns.q:
         # Over some rows: the noise of an encoder is no reversal.
         direction = np.sign(q[BESIDE:] - q[:-BESIDE])
         turns = np.flatnonzero(direction[1:] != direction[:-1]) + BESIDE // 2
+        here, around = np.abs(q[2:] - q[:-2]) / 2, np.abs(q[2 * BESIDE :] - q[: -2 * BESIDE]) / (2 * BESIDE)
+        stands = np.flatnonzero(here[BESIDE - 1 : 1 - BESIDE] < STANDS * around) + BESIDE
+        turns = np.concatenate([turns, stands])
         reversing[np.unique(np.clip(turns[:, None] + np.arange(-BESIDE, BESIDE + 1), 0, len(q) - 1))] = True
     return reversing
 

@@ -25,6 +25,7 @@ class Errors:
         rows: number of rows.
         judged: number of rows (n,) in which the joint is not at rest.
         torque: squared torques in those (n,).
+        sums: torques in those (n,).
         squares: squared errors in those (n,).
         kept: rows of the stretches that are kept, and their predicted torque.
     """
@@ -33,7 +34,7 @@ class Errors:
         n = len(highest)
         self._scale = np.maximum(highest, np.finfo(float).tiny)
         self.rows = 0
-        self.torque, self.squares, self.judged = np.zeros((3, n))
+        self.torque, self.sums, self.squares, self.judged = np.zeros((4, n))
         self.kept: list[tuple[Rows, Array]] = []
         self._second, self._seconds = np.zeros(n), 0
         self._counts = np.zeros((n, BINS))
@@ -52,6 +53,7 @@ class Errors:
         """
         motion, error, judged = part.motion, part.tau - predicted, part.judged
         self.torque += np.einsum("tj,tj,tj->j", part.tau, part.tau, judged)
+        self.sums += np.einsum("tj,tj->j", part.tau, judged)
         self.squares += np.einsum("tj,tj,tj->j", error, error, judged)
         self.judged += judged.sum(axis=0)
         if len(error) > 2:

@@ -244,13 +244,14 @@ def _fit(
 def _joints(fitted: Fit, errors: Errors, predictable: NDArray[np.bool_]) -> tuple[JointFit, ...]:
     total, choice = np.maximum(errors.judged, 1), fitted.choice
     figures = np.sqrt([errors.torque / total, errors.squares / total, fitted.nominal / total])
+    spread = np.sqrt(np.maximum(figures[0] ** 2 - (errors.sums / total) ** 2, 0.0))
     band, floor = errors.band, errors.floor
     return tuple(
         JointFit(
             joint=j + 1,
             name=name,
             torque_rms=float(figures[0, j]),
-            torque_spread=float(choice.spread[j]),
+            torque_spread=float(spread[j]),
             residual_rms=float(figures[1, j]),
             held_out_rms=float(choice.held_out[j]),
             nominal_rms=float(figures[2, j]),

@@ -196,12 +196,16 @@ def _table(
                 )
             rows[prefix].append([float(signal[place]) for place in order] if len(signal) else [])
     if not times:
+        remedy = "list `joints` in a mapping (--mapping), in the robot's order"
+        if first and len(first) < len(names or ()):
+            remedy = f"record {', '.join(name for name in names or () if name not in first)}, too, or choose the robot"
+        elif first:
+            remedy += f":\njoints: [{', '.join(first)}]"
         raise InputError(
             f"no message has the joints {', '.join(names or ())}",
             file=path,
             allowed=f"names in the messages: {', '.join(first) or 'none'}",
-            remedy="list `joints` in a mapping (--mapping), in the robot's order"
-            + (f":\njoints: [{', '.join(first)}]" if first else ""),
+            remedy=remedy,
         )
     columns: dict[str, Column] = {"t": np.array(times)}
     for prefix, signals in rows.items():

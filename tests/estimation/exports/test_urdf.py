@@ -6,12 +6,13 @@ import pytest
 
 from estimation import identify, load_model
 from estimation.exports import export_urdf, standard_parameters
+from estimation.exports.unstated import unstated_terms
 from robots import load_robot, nominal_plant, simulate
 from robots.base_parameters import find_base_parameters
 from robots.common.errors import InfeasibleError, InputError, NearestBodiesWarning
 from robots.consistency import normalised_eigenvalues
 from robots.regressor import TorqueModel
-from robots.terms import RigidBody
+from robots.terms import PositionTorque, RigidBody
 
 pytestmark = pytest.mark.slow
 
@@ -185,6 +186,21 @@ def test_a_second_arm_keeps_its_bodies(tmp_path):
     order = [held.getJointId(name) - 1 for name in robot.joint_names]
     expected = base.torque(q[:, order], dq[:, order], ddq[:, order], values)
     np.testing.assert_allclose(found[:, order], expected, atol=PARITY * np.abs(expected).max())
+
+
+def test_torques_by_position_are_named_with_their_size():
+    """A file that cannot state them says how large they are, and what to do."""
+    robot = load_robot("er3a")
+    base = find_base_parameters(TorqueModel(robot, (RigidBody(), PositionTorque())))
+    values = base.from_standard(base.model.nominal)
+    values[[column.name == "sin1_2" for column in base.columns]] = 4.0
+    recorded = {"position": [[-1.0] * 6, [1.0] * 6]}
+    model = replace(_model(base, values), provenance={"recorded": recorded})
+    (text,) = unstated_terms(model, {"rigid_body"})
+    assert text.startswith("position torque parameters (up to 3.4 N m at joint 2; ")
+    assert "--no-position" in text
+    (plain,) = unstated_terms(replace(model, provenance={}), {"rigid_body"})
+    assert plain == "position torque parameters"
 
 
 def _model(base, values):

@@ -62,6 +62,19 @@ def test_peaks_at_reversals_are_no_outliers(good, spoilt):
         assert spoilt(tau=tau).spikes.tolist() == left_out
 
 
+def test_a_stop_for_one_row_is_no_outlier(er3a):
+    """Between two moves in one direction a joint stands for a row, and its friction is nothing there; not elsewhere."""
+    rng, t = np.random.default_rng(0), 0.004 * np.arange(4001)
+    # Every second the speed is zero for a row.
+    q = 0.15 * (t - np.sin(2 * np.pi * t) / (2 * np.pi))[:, None] * np.ones(6) - 1.0
+    tau = 1.5 + q + 0.02 * rng.normal(size=q.shape)
+    stops = np.arange(250, 4000, 250)
+    for rows, left_out in ((stops, []), (stops - 60, (stops - 60).tolist())):
+        spoilt = tau.copy()
+        spoilt[rows, 1] = 0.0 + 0.02 * rng.normal(size=len(rows))
+        assert check_log(er3a, Log(t, q, tau=spoilt)).spikes.tolist() == left_out
+
+
 def test_a_joint_at_rest_may_flicker_by_an_encoder_step(good, spoilt):
     """An encoder at rest between two steps alternates between them: these are no outliers."""
     q = good().q.copy()

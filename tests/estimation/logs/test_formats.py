@@ -145,6 +145,14 @@ def test_joints_that_a_bag_lacks_are_named(tmp_path):
     np.testing.assert_array_equal(read_log(path, mapping=tmp_path / "m.yaml", joints=["J1", "J2"]).q, Q)
 
 
+def test_a_bag_with_too_few_joints_asks_to_record_the_others(tmp_path):
+    """A mapping cannot name joints that were not recorded: the message does not propose one."""
+    path = write_bag(tmp_path / "log", "mcap")
+    error = refused(path, joints=["shoulder", "elbow", "wrist"])
+    assert "record wrist, too" in error.remedy
+    assert "mapping" not in error.remedy
+
+
 def test_bag_without_effort_is_a_motion(tmp_path):
     """Joint states without effort are refused for want of torque."""
     path = write_bag(tmp_path / "log", "db3", effort=False)

@@ -54,6 +54,14 @@ def test_the_errors_are_those_of_the_arrays(model, arm_log):
     assert "rel. RMS" in prediction.summary()
 
 
+def test_a_model_of_another_robot_is_said_not_to_fit(model, arm_log):
+    """Where the error is larger than the torque's own changes, the summary asks for the cause; else it does not."""
+    log = arm_log(seed=1, motion_seed=1)
+    assert "worse than a constant" not in predict(model, log).summary()
+    other = predict(model, replace(log, tau=log.tau * np.array([1.0, 0.05])), check=False)
+    assert "worse than a constant on joint 2: check that the log is of this robot" in other.summary()
+
+
 def test_below_the_cut_off_only_what_the_model_lacks_is_left():
     """Torque a tenth larger than predicted and noisy, in uneven time: below the cut-off the tenth remains."""
     rng = np.random.default_rng(2)

@@ -42,7 +42,7 @@ def test_a_gripper_makes_the_choice_ambiguous(write_urdf):
     message = str(caught.value)
     assert "branches into 2 chains" in message
     assert "left_finger: j1, j2, j3, left; right_finger: j1, j2, j3, right" in message
-    assert "choose by tip, by joints, or lock joints" in message
+    assert "choose one by its tip (--tip) or its joints (--joints), or lock joints (--lock)" in message
 
 
 @pytest.mark.parametrize(

@@ -105,7 +105,10 @@ def test_heat_of_the_logs_before_counts_in_its_errors(quiet: Model, arm_log: Cal
 def test_its_band_grows_as_errors_do_on_parts_left_out(noisy: Model, arm_log: Callable[..., Log]) -> None:
     """The band grows by each joint's ratio of held-out to fit error, and is at least that of the fit."""
     log, model = arm_log(torque_noise=0.05), noisy
-    seen = np.quantile(np.abs(log.tau - predict(model, log).predicted), 0.95, axis=0)
+    found = predict(model, log)
+    error = np.abs(log.tau - found.predicted)
+    pairs = zip(error.T, found.rest.T, strict=True)
+    seen = np.array([np.quantile(column[~rest], 0.95) for column, rest in pairs])
     parts = np.ones((50, 2))
     fitted = (parts, np.array([1.5, 4.0]) * parts)
     unseen = HeldOutErrors("", np.arange(50.0), 1.0, parts, (parts, 3.0 * parts), parts > 0, fitted)
@@ -122,7 +125,7 @@ def test_friction_turns_round_as_sharply_as_all_rows_say(quiet: Model, arm_log: 
     """
     log, other = (arm_log(torque_noise=0.02, motion_seed=k, seed=k) for k in range(2))
     model = quiet
-    for v0, worse in ((5e-4, 1.0), (0.016, 1.3)):
+    for v0, worse in ((5e-4, 1.0), (0.016, 1.15)):
         terms = tuple(
             replace(term, velocity_scale=v0) if isinstance(term, FrictionTerm) else term
             for term in model.torque_model.terms
