@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.fft import irfft, next_fast_len, rfft
 
-from estimation.uncertainty.sandwich import Part, covariance
+from estimation.uncertainty.sandwich import Part, at_least, covariance
 
 Array = NDArray[np.float64]
 
@@ -104,7 +104,7 @@ def _rows(log: Played) -> int:
 
 
 def _places(leader: Played, log: Played, number: int, first: int, rows: int) -> list[Place]:
-    """Repetitions within a log, of which one begins at a row that may lie outside."""
+    """Repetitions within a log: one begins at a given row, which may lie outside."""
     if rows == len(leader.t) or leader.period is None or leader.step is None:
         return [Place(number, first)]
     exact = leader.period / leader.step
@@ -126,8 +126,7 @@ def _shift(one: Played, other: Played) -> int | None:
     shifts = np.arange(least - len(b), len(a) - least + 1)
     cross = irfft(product.sum(axis=1), length)[shifts]
     first, last = np.maximum(shifts, 0), np.minimum(len(a), len(b) + shifts)
-    sums = (np.concatenate([[0.0], np.cumsum((x**2).sum(axis=1))]) for x in (a, b))
-    square_a, square_b = sums
+    square_a, square_b = (np.concatenate([[0.0], np.cumsum((x**2).sum(axis=1))]) for x in (a, b))
     squares = square_a[last] - square_a[first] + square_b[last - shifts] - square_b[first - shifts]
     best = int(np.argmin((squares - 2 * cross) / (last - first)))
     begin, end, shift = int(first[best]), int(last[best]), int(shifts[best])
@@ -219,7 +218,4 @@ def with_repetitions(
     if all(len(places) == 1 for _, places in found):
         return plain
     repeating = covariance([folded(parts, *motion) for motion in found], weights, inverse, seed, averaged=averaged)
-    own = np.diag(plain)
-    ratio = np.divide(np.diag(repeating), own, out=np.ones_like(own), where=own > 0)
-    factor = np.sqrt(np.maximum(1.0, ratio))
-    return plain * factor[:, None] * factor
+    return at_least(plain, np.diag(repeating))

@@ -100,9 +100,14 @@ def covariance(
     model, robust = ((meat + lost) / share for meat in _meats(seen, weights, noise, len(inverse)))
     scale = float(np.mean(np.diag(noise.covariance) / np.diag(plain.covariance)))
     first, second = spread_of(model, inverse), scale * spread_of(robust, inverse)
-    own, other = np.diag(first), np.diag(second)
-    factor = np.sqrt(np.maximum(1.0, np.divide(other, own, out=np.ones_like(own), where=own > 0)))
-    return first * factor[:, None] * factor
+    return at_least(first, np.diag(second))
+
+
+def at_least(covariance: Array, variances: Array) -> Array:
+    """Raises a covariance (p, p) so that each variance is at least a given one (p,); the correlations stay."""
+    own = np.diag(covariance)
+    factor = np.sqrt(np.maximum(1.0, np.divide(variances, own, out=np.ones_like(own), where=own > 0)))
+    return covariance * factor[:, None] * factor
 
 
 def spread_of(meat: Array, inverse: Array) -> Array:

@@ -78,9 +78,16 @@ def calibrate_signals(
         # Contacts are not known at first: they must not enter the size of the errors.
         fitted = _winsorised(residual, settled) if first else residual
         errors = fit_error_model(
-            model, fitted, whole.dq, whole.friction, whole.variance, counts, lag,
-            seconds=seconds, velocity_noise=noise,
-        )  # fmt: skip
+            model,
+            fitted,
+            whole.dq,
+            whole.friction,
+            whole.variance,
+            counts,
+            lag,
+            seconds=seconds,
+            velocity_noise=noise,
+        )
         seen = observe(whole, errors.seen, bandwidth)
         statistic, deviation = seen.statistic, seen.deviation
         threshold = alarm_threshold(statistic[counts & new], whole.period, false_alarms, robust=first)

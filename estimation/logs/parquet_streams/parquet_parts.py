@@ -130,7 +130,7 @@ def open_part(path: Path, n: int | None, kinds: Sequence[str] | None, mapping: L
             full = [k for k, rows in enumerate(groups) if rows]
             first, last = (part.times(file.read_row_group(k, [part.time_column])) for k in (full[0], full[-1]))
             # A mapping that does not suit the columns is refused now, not after an hour.
-            part.signals(file.read_row_group(full[0], list(part.columns)).slice(0, 1))
+            part.signals(pa.Table.from_batches([next(file.iter_batches(1, columns=list(part.columns)))]))
     except (pa.ArrowException, OSError, ValueError) as error:
         if isinstance(error, InputError):
             raise

@@ -128,7 +128,7 @@ def test_logs_of_one_motion_are_found() -> None:
 
 
 def test_a_fold_over_logs_keeps_the_score() -> None:
-    """Periods of two logs, one of which begins within a period: the summed Y'We is that of both logs."""
+    """Periods of two logs; the second log begins within a period: the summed Y'We is that of both logs."""
     rng = np.random.default_rng(4)
     whole = regressor(ROWS * 4)
     sizes, firsts = (3 * ROWS + 57, 2 * ROWS - 31), (0, 130)
