@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from estimation.comparisons.common_parameters import CommonParameters, friction_table
 from estimation.comparisons.runs import Run
+from estimation.uncertainty.normal import NORMAL_95
 from robots.common.plain import all_finite
 
 Array = NDArray[np.float64]
@@ -19,7 +20,6 @@ Array = NDArray[np.float64]
 SHARES = np.linspace(0.05, 1.0, 40)
 # Share of the largest speed at which the thesis follows friction over time (its Figs. 39 and 40).
 LEVEL_SHARE = 0.6
-POINTWISE_95 = 1.959964
 # Draws of the largest standardised deviation of a curve: they give its 95 % point to 2 %.
 DRAWS, BAND_SEED = 4000, 0
 
@@ -145,7 +145,7 @@ def simultaneous_factor(rows: Array, covariance: Array, confidence: float = 0.95
     scale = _errors(rows, covariance)
     used = scale > 0
     if not used.any():
-        return POINTWISE_95
+        return NORMAL_95
     variance, ways = np.linalg.eigh(covariance)
     root = ways * np.sqrt(np.maximum(variance, 0.0))
     standard = (rows[used] / scale[used, None]) @ root

@@ -8,6 +8,7 @@ from typing import Any, Literal
 
 import numpy as np
 
+from estimation.uncertainty.normal import NORMAL_95
 from robots.common.plain import finite
 
 Kind = Literal["damage", "friction_decrease", "payload", "contact", "heat", "offset", "misfit", "unknown"]
@@ -37,7 +38,6 @@ SEVERITIES: dict[str, Severity] = {
 }
 LIGHTS = {"info": "green", "watch": "amber", "act": "red"}
 ORDER = ("info", "watch", "act")
-NORMAL_95 = 1.959964
 # A clock that counts from 1970 is past this time [s]: the year 2000.
 ABSOLUTE = 946_684_800.0
 DAY = 86_400.0

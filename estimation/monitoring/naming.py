@@ -11,8 +11,9 @@ from scipy.stats import chi2
 
 from estimation.monitoring.control_charts.change_fit import StepFit
 from estimation.monitoring.control_charts.quantities import Quantity, start_limit
-from estimation.monitoring.findings import NORMAL_95, Finding, Kind, relative
+from estimation.monitoring.findings import Finding, Kind, relative
 from estimation.monitoring.windows.baseline import PAYLOAD
+from estimation.uncertainty.normal import NORMAL_95
 
 Array = NDArray[np.float64]
 

@@ -8,10 +8,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from estimation.payloads.body import central_inertia
+from estimation.uncertainty.normal import NORMAL_95
 
 Array = NDArray[np.float64]
 
-NORMAL_95 = 1.959964
 AXES = "xyz"
 MOMENTS = ("Ixx", "Ixy", "Ixz", "Iyy", "Iyz", "Izz")
 _UPPER = np.triu_indices(3)

@@ -10,11 +10,10 @@ from numpy.typing import NDArray
 
 from estimation.thermal.results.curvature import CurvedFit, curved_factor, curved_slope, curved_steady_state
 from estimation.thermal.transcriptions.information import Information
+from estimation.uncertainty.normal import NORMAL_95
 from robots.thermal import ThermalModel
 
 Array = NDArray[np.float64]
-
-NORMAL_95 = 1.959964
 
 
 @dataclass(frozen=True, kw_only=True)
