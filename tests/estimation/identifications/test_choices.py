@@ -10,7 +10,7 @@ from estimation.regressions.preparation import prepare
 from robots.base_parameters import find_base_parameters
 from robots.plants import simulate
 from robots.regressor import default_model
-from robots.signals import Motion
+from tests.estimation.identifications.stops import stop_and_go
 
 
 @pytest.fixture(scope="module")
@@ -97,32 +97,11 @@ def test_ideal_data_are_no_trouble(chosen, arm_log):
     assert np.isfinite(chosen(arm_log(encoder_counts=0.0, torque_noise=0.0)).cost)
 
 
-def stop_and_go(rng, moves=50, period=0.004):
-    """Moves of two joints between random places, at rest for a moment before each: cosine velocity, at most 3 rad/s."""
-    q, dq, ddq = [], [], []
-    here = np.zeros(2)
-    for _ in range(moves):
-        there = rng.uniform(-1.8, 1.8, 2)
-        duration = np.pi / 2 * np.abs(there - here).max() / 3.0 + 0.3
-        x = np.pi * np.arange(0, duration, period)[:, None] / duration
-        step = there - here
-        q.append(here + step * (1 - np.cos(x)) / 2)
-        dq.append(step * np.sin(x) / 2 * np.pi / duration)
-        ddq.append(step * np.cos(x) / 2 * (np.pi / duration) ** 2)
-        rest = np.zeros((int(0.1 / period), 2))
-        q.append(there + rest)
-        dq.append(rest)
-        ddq.append(rest)
-        here = there
-    q, dq, ddq = (np.concatenate(parts) for parts in (q, dq, ddq))
-    return Motion(t=period * np.arange(len(q)), q=q, dq=dq, ddq=ddq)
-
-
 @pytest.mark.slow
 def test_left_out_errors_are_those_of_a_prediction(arm, arm_plant):
     """Where joints start from rest, left-out errors are those of an unseen log, and the cut-off is among the best."""
     plant = arm_plant(torque_noise=0.02)
-    known, unseen = (simulate(plant, stop_and_go(np.random.default_rng(seed)), seed=seed) for seed in (0, 1))
+    known, unseen = (simulate(plant, stop_and_go(np.random.default_rng(seed))[0], seed=seed) for seed in (0, 1))
     scale = np.sqrt(np.mean(unseen.tau**2, axis=0) / np.mean(known.tau**2, axis=0))
     for cutoff in (12.0, 30.0):
         estimate = identify(arm, known, candidates=Candidates(cutoffs=(cutoff,), smoothers=()))

@@ -10,33 +10,13 @@ import pytest
 from estimation import identify, predict
 from estimation.gate import check_log
 from robots.plants import simulate
-from robots.signals import Log, Motion
-
-PERIOD, STOP = 0.004, 0.6
-
-
-def stop_and_go(seed: int, moves: int = 25) -> tuple[Motion, np.ndarray]:
-    """Moves between random places with stops, and the number of the stop of each row, -1 in motion."""
-    rng = np.random.default_rng(seed)
-    here, states, stops = np.zeros(2), [], []
-    for number in range(moves):
-        there = rng.uniform(-1.8, 1.8, 2)
-        duration = np.pi / 2 * np.abs(there - here).max() / 3.0 + 0.3
-        x = np.pi * np.arange(0, duration, PERIOD)[:, None] / duration
-        step = there - here
-        rate = np.pi / duration
-        states.append((here + step * (1 - np.cos(x)) / 2, step * np.sin(x) / 2 * rate, step * np.cos(x) / 2 * rate**2))
-        rest = np.zeros((int(STOP / PERIOD), 2))
-        states.append((there + rest, rest, rest))
-        stops += [-1] * len(x) + [number] * len(rest)
-        here = there
-    q, dq, ddq = (np.concatenate(parts) for parts in zip(*states, strict=True))
-    return Motion(t=PERIOD * np.arange(len(q)), q=q, dq=dq, ddq=ddq), np.array(stops)
+from robots.signals import Log
+from tests.estimation.identifications.stops import stop_and_go
 
 
 def held_log(arm, plant, seed: int) -> tuple[Log, np.ndarray]:
     """A log in which friction holds each joint at each stop with some torque up to that of breaking away."""
-    motion, stops = stop_and_go(seed)
+    motion, stops = stop_and_go(np.random.default_rng(seed), moves=25, stop=0.6)
     log = simulate(plant, motion, seed=seed)
     most = np.asarray(arm.friction)[:, 0]
     held = np.random.default_rng(seed + 100).uniform(-most, most, (stops.max() + 1, 2))
