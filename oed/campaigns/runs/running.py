@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import shutil
 import time
+from dataclasses import replace
 from os import PathLike
 from pathlib import Path
 
@@ -184,20 +185,21 @@ class _Run:
                 file=self.folder / stage.file,
                 progress=StageProgress(self.progress, slot.start - self.origin, stage.duration, note),
             )
-            self.state.recorded.append(
-                RecordedStage(
-                    number=number,
-                    stage=stage.name,
-                    cycle=slot.cycle,
-                    file=f"{LOGS}/{name}.csv",
-                    recording=f"{INTERRUPTED}/{recording.name}",
-                    rows=result.rows,
-                    lost=result.feedback["lost"],
-                    delay=result.delay,
-                    end=end,
-                )
+            recorded = RecordedStage(
+                number=number,
+                stage=stage.name,
+                cycle=slot.cycle,
+                file=f"{LOGS}/{name}.csv",
+                recording=f"{INTERRUPTED}/{recording.name}",
+                rows=result.rows,
+                lost=result.feedback["lost"],
+                delay=result.delay,
+                end=end,
             )
-            self.state.save(self.folder)
+            following = replace(self.state, recorded=[*self.state.recorded, recorded])
+            # A disk without room for the state leaves the stage to be played again.
+            following.save(self.folder)
+            self.state = following
         except OedError as error:
             raise self._goes_on(error) from None
         self._move_recording()

@@ -21,6 +21,7 @@ from oed.controllers.links import Endpoint, open_link
 from oed.controllers.recording.clock import ClockAnchor
 from oed.controllers.recording.log_file import check_log_path
 from oed.controllers.recording.recorder import Recorder
+from oed.controllers.recording.recording import with_rows
 from oed.controllers.recording.reported_joints import require_no_further_joints
 from oed.exports.simple_message import trajectory_points
 from oed.exports.simple_message.kinds import JOINTS
@@ -96,10 +97,15 @@ def stream(
     source = f"feedback of {endpoint.place(endpoint.state_port)}"
     known = {"robot": robot.name, "source": source, "tool": VERSION, **(header or {})}
     requests: Requests | None = None
-    rows, note, begin, ended = 0, "", time.monotonic(), "interrupted"
+    begin, ended = time.monotonic(), "interrupted"
+    failure: OedError | None = None
     try:
         pose = recorder.wait_for_feedback()
         require_no_further_joints(pose[robot.n :], robot)
+        if not options.ignore_status and recorder.is_moving(options.start_tolerance):
+            raise ControllerError(
+                "the robot is moving", remedy="wait for the end of its motion; another client may be playing it"
+            )
         check_start(motion.q[0], pose[: robot.n], options.start_tolerance)
         with open_link(endpoint, endpoint.motion_port) as link:
             if needs_torque and not recorder.has_torque:
@@ -113,8 +119,6 @@ def stream(
             if not options.ignore_status and status_problem(recorder.status) is not None:
                 # The error of an interrupted motion ends with the link of the next client.
                 check_status(recorder.renewed_status(), endpoint.place(endpoint.state_port))
-            if not options.ignore_status and recorder.status is not None and recorder.status.in_motion == 1:
-                raise ControllerError("the robot is moving", remedy="wait for the end of its motion")
             if not dry_run:
                 assert log is not None
                 recorder.begin(log, known, anchor=anchor, delay=requests.traffic.delay, force=force)
@@ -126,13 +130,7 @@ def stream(
                         requests.stop()
         ended = "done"
     except OedError as error:
-        ended = error.problem
-        if recorder.statistics.rows:
-            stop = "" if requests and requests.traffic.stopped else "the controller did not confirm the stop; "
-            error.remedy = "; ".join(
-                filter(None, [error.remedy, f"{stop}{recorder.statistics.rows} rows are in {log}"])
-            )
-        raise
+        failure, ended = error, error.problem
     finally:
         duration = time.monotonic() - begin
         progress.finish()
@@ -147,9 +145,13 @@ def stream(
         }
         with signals_held():
             try:
-                rows = recorder.finish(final)
+                recorder.finish(final)
             except OedError as error:
-                note = f"the log lacks the measured delay and loss: {error}"
+                failure = failure or error
+    if failure is not None:
+        stop = "" if requests and requests.traffic.stopped else "the controller did not confirm the stop"
+        raise with_rows(failure, recorder.rows, log, stop)
+    assert requests is not None
     return StreamResult(
         robot=robot.name,
         place=endpoint.place(endpoint.motion_port),
@@ -161,11 +163,11 @@ def stream(
         delay=delay,
         stopped=requests.traffic.stopped,
         log="" if dry_run else fspath(log or ""),
-        rows=rows,
+        rows=recorder.rows,
         feedback=recorder.statistics.summary(),
         status={} if recorder.status is None else asdict(recorder.status),
         dry_run=dry_run,
-        note=note,
+        note=recorder.note,
         anchor=None if dry_run else recorder.anchor(),
     )
 

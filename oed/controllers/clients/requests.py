@@ -9,7 +9,7 @@ from contextlib import suppress
 
 from oed.controllers.clients.options import StreamOptions
 from oed.controllers.clients.traffic import Request, Traffic
-from oed.controllers.errors import ControllerError, LinkError, PointRefusedError
+from oed.controllers.errors import ControllerError, LinkError, PointRefusedError, ProtocolError
 from oed.controllers.links import Link
 from oed.exports.simple_message import (
     Bare,
@@ -48,26 +48,28 @@ class Requests:
         self._form = form
         self._options = options
         self._last_sent = 0.0
+        self._last_data = b""
 
     def ping(self, patience: float | None = None) -> float:
         """Pings until an answer comes, and returns its round trip [s].
 
         Raises:
-            LinkError: no answer, or none that is a reply to a ping.
+            ProtocolError: no ping was ever answered.
+            LinkError: no answer any more.
         """
         data = self._form.encode(Frame(Ping(), Comm.REQUEST))
         end = time.monotonic() + (self._options.patience if patience is None else patience)
         wrong: str | None = None
         while time.monotonic() < end:
             start = time.monotonic()
-            self.link.send(data)
+            self._put(data)
             until = min(end, start + (self._options.patience if self.link.reliable else self._options.reply_time))
             while (left := until - time.monotonic()) > 0:
                 try:
                     frame = self._received(left, strict=True)
                 except MessageError as error:
                     if self.link.reliable:
-                        raise LinkError(f"{self.link.place} speaks another protocol: {error}") from error
+                        raise ProtocolError(f"{self.link.place} speaks another protocol: {error}") from error
                     wrong = str(error)
                     continue
                 if frame is not None and frame.comm == Comm.REPLY and frame.message.kind == Kind.PING:
@@ -77,10 +79,10 @@ class Requests:
                     self._last_sent = start
                     return self.traffic.pings[-1]
         if wrong is not None:
-            raise LinkError(f"{self.link.place} speaks another protocol or format: {wrong}")
-        raise LinkError(
+            raise ProtocolError(f"{self.link.place} speaks another protocol or format: {wrong}")
+        raise (LinkError if self.traffic.pings else ProtocolError)(
             f"{self.link.place} does not answer a ping",
-            remedy="check host and port; a controller that knows no pings needs --no-ping",
+            remedy="check host and motion port; a controller that knows no pings needs --no-ping",
         )
 
     def keep_alive(self) -> None:
@@ -182,7 +184,7 @@ class Requests:
         data = self._form.encode(Frame(order, Comm.REQUEST))
         with suppress(OedError):
             for _ in range(1 if self.link.reliable else STOPS):
-                self.link.send(data)
+                self._put(data)
                 end = time.monotonic() + (0.5 if self.link.reliable else self._options.reply_time)
                 while (left := end - time.monotonic()) > 0:
                     frame = self._received(left)
@@ -193,7 +195,7 @@ class Requests:
 
     def _send(self, waiting: OrderedDict[int, Request], point: FullPoint | Point) -> None:
         data = self._form.encode(Frame(point, Comm.REQUEST))
-        self.link.send(data)
+        self._put(data)
         self._last_sent = now = time.monotonic()
         waiting[point.sequence] = Request(data, now, now)
 
@@ -212,7 +214,7 @@ class Requests:
             numbered = Point(
                 sequence=number, positions=point.positions, velocity=point.velocity, duration=point.duration
             )
-        self.link.send(self._form.encode(Frame(numbered, Comm.TOPIC)))
+        self._put(self._form.encode(Frame(numbered, Comm.TOPIC)))
         self._last_sent = time.monotonic()
         self.traffic.sent += 1
 
@@ -242,7 +244,7 @@ class Requests:
             if now - request.first > patience:
                 self._give_up(number, now - request.first)
             if not self.link.reliable and now - request.sent >= self._options.reply_time:
-                self.link.send(request.data)
+                self._put(request.data)
                 request.sent = now
                 request.tries += 1
                 self.traffic.resent += 1
@@ -256,7 +258,7 @@ class Requests:
         if alive:
             raise ControllerError(
                 f"the controller takes no points: no reply to point {number} for {waited:.1f} s, but it answers pings",
-                remedy="its buffer does not empty: check drives, mode and the running program",
+                remedy="its buffer does not empty: check drives, mode, the running program and the motion port",
             )
         raise LinkError(
             f"no reply to point {number} for {waited:.1f} s from {self.link.place}",
@@ -271,11 +273,17 @@ class Requests:
                 self.traffic.unexpected += 1
                 most -= 1
 
+    def _put(self, data: bytes) -> None:
+        self._last_data = data
+        self.link.send(data)
+
     def _received(self, timeout: float, *, strict: bool = False) -> Frame | None:
         """Waits for a message; a datagram that is none counts as unexpected."""
         data = self.link.receive(timeout)
         if data is None:
             return None
+        if data == self._last_data:
+            raise ProtocolError(f"{self.link.place} sends back what it is sent: it is no simple_message controller")
         try:
             return self._form.decode(data)
         except MessageError:

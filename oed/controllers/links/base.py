@@ -42,8 +42,10 @@ class Endpoint:
         """Checks the settings.
 
         Raises:
-            InputError: another transport, a port or byte out of range, or a time that is not positive.
+            InputError: no host, another transport, a port or byte out of range, or a time that is not positive.
         """
+        if not self.host.strip():
+            raise InputError("the host is empty", allowed="the name or the IP address of the controller")
         if self.transport not in ("udp", "tcp"):
             raise InputError(f"transport {self.transport!r}", allowed="udp or tcp")
         for name in ("motion_port", "state_port"):

@@ -30,7 +30,7 @@ class TcpLink(Link):
         self._patience = endpoint.connect_time
         try:
             self._socket = socket.create_connection((endpoint.host, port), timeout=endpoint.connect_time)
-        except socket.gaierror as error:
+        except (socket.gaierror, UnicodeError) as error:
             raise unknown_host(endpoint.host) from error
         except ConnectionRefusedError as error:
             raise LinkError(

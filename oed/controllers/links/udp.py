@@ -6,7 +6,7 @@ import select
 import socket
 import time
 
-from oed.controllers.errors import LinkError
+from oed.controllers.errors import LinkError, ProtocolError
 from oed.controllers.links.base import Endpoint, Link
 from robots.common.errors import InputError
 
@@ -33,7 +33,7 @@ class UdpLink(Link):
             self._socket.setblocking(False)
             try:
                 self._socket.connect((endpoint.host, port))
-            except socket.gaierror as error:
+            except (socket.gaierror, UnicodeError) as error:
                 raise unknown_host(endpoint.host) from error
             except OSError as error:
                 raise LinkError(f"{self.place} cannot be reached ({error.strerror})") from error
@@ -63,7 +63,7 @@ class UdpLink(Link):
                 f"nothing listens at {self.place}",
                 remedy="check host and port, and that the driver program runs on the controller",
             )
-        raise LinkError(
+        raise (ProtocolError if other else LinkError)(
             f"{self.place} does not answer the handshake 0x{endpoint.handshake:02X} within {endpoint.connect_time:g} s",
             remedy=(
                 "check the host; another client may be connected; old controllers use the handshake 0xFF"

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import os
 import time
 from collections.abc import Mapping, Sequence
@@ -12,7 +13,8 @@ from typing import Any
 
 import numpy as np
 
-from robots.common.errors import InputError, OedError
+from oed.controllers.errors import RecordingError
+from robots.common.errors import InputError
 from robots.common.files import open_atomic
 from robots.common.tables.ecsv import format_header
 
@@ -21,12 +23,19 @@ EVERY = 0.2
 
 BLOCK = 2**20
 
+FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
+"""A disk, a quota or a file that has no room left."""
+
 
 class FeedbackLog:
     """Appends rows to a CSV file below an ECSV block.
 
     Rows reach the system in whole lines, so a killed program leaves a log that can be read. Where the disk is full,
     the last whole line stays the last.
+
+    Attributes:
+        path: the file.
+        rows: those that were appended, without those that a full disk did not take.
 
     Args:
         path: the file, ending in .csv.
@@ -57,8 +66,7 @@ class FeedbackLog:
         self._held: list[str] = []
         self._written = time.monotonic()
         try:
-            flags = os.O_WRONLY | os.O_CREAT | (os.O_TRUNC if force else os.O_EXCL)
-            self._file: int | None = os.open(self.path, flags, 0o644)
+            self._file: int | None = os.open(self.path, os.O_WRONLY | os.O_CREAT | (0 if force else os.O_EXCL), 0o644)
         except OSError as error:
             raise InputError(
                 f"cannot be written ({(error.strerror or str(error)).lower()})",
@@ -66,7 +74,12 @@ class FeedbackLog:
                 remedy="choose another folder",
             ) from error
         self._size = 0
-        self._put(self._header(self._metadata))
+        self._claim()
+        try:
+            self._put(self._header(self._metadata))
+        except RecordingError:
+            self.discard()
+            raise
         self._head = self._size
 
     def append(self, t: float, values: Sequence[float]) -> None:
@@ -77,7 +90,7 @@ class FeedbackLog:
             values: of the other columns.
 
         Raises:
-            OedError: the disk is full.
+            RecordingError: the disk is full.
         """
         self._held.append(f"{t!r},{','.join([self._number % value for value in values])}\n")
         self.rows += 1
@@ -88,7 +101,7 @@ class FeedbackLog:
         """Writes what is held.
 
         Raises:
-            OedError: the disk is full.
+            RecordingError: the disk is full.
         """
         data = "".join(self._held).encode()
         self._held.clear()
@@ -96,15 +109,11 @@ class FeedbackLog:
         if data:
             self._put(data)
 
-    def close(self, metadata: Mapping[str, Any] | None = None) -> None:
+    def close(self) -> None:
         """Writes what is held and closes the file.
 
-        Args:
-            metadata: what is known at the end. The file is replaced by one with it in its block; where that fails, the
-                file stays as it was recorded.
-
         Raises:
-            OedError: the disk is full; the rows that were recorded stay.
+            RecordingError: the disk is full; the rows that were recorded stay.
         """
         if self._file is None:
             return
@@ -113,8 +122,16 @@ class FeedbackLog:
         finally:
             os.close(self._file)
             self._file = None
-        if metadata is None:
-            return
+
+    def complete(self, metadata: Mapping[str, Any]) -> None:
+        """Replaces the closed file by one that states more in its block; where that fails, it stays as it is.
+
+        Args:
+            metadata: what is known at the end.
+
+        Raises:
+            InputError: the disk has no room for both.
+        """
         with open_atomic(self.path, force=True) as target, self.path.open("rb") as source:
             try:
                 target.write(self._header({**self._metadata, **metadata}))
@@ -122,7 +139,7 @@ class FeedbackLog:
                 while block := source.read(BLOCK):
                     target.write(block)
             except OSError as error:
-                raise self._full(error) from error
+                raise self._stopped(error) from error
 
     def discard(self) -> None:
         """Removes a file without rows."""
@@ -131,6 +148,20 @@ class FeedbackLog:
             self._file = None
         with suppress(OSError):
             self.path.unlink()
+
+    def _claim(self) -> None:
+        """Empties the file, unless another program is recording into it: its lock ends with it, also by a kill."""
+        assert self._file is not None
+        try:
+            _lock(self._file)
+        except BlockingIOError as error:
+            os.close(self._file)
+            self._file = None
+            raise InputError(
+                "another program is recording into this file", file=self.path, remedy="choose another name"
+            ) from error
+        with suppress(OSError):  # A device cannot be emptied.
+            os.ftruncate(self._file, 0)
 
     def _header(self, metadata: Mapping[str, Any]) -> bytes:
         kinds = {name: np.zeros(0) for name in self._columns}
@@ -143,19 +174,36 @@ class FeedbackLog:
             while view:
                 view = view[os.write(self._file, view) :]
         except OSError as error:
-            part = data[: len(data) - len(view)]
-            whole = self._size + part.rfind(b"\n") + 1
+            whole = data.rfind(b"\n", 0, len(data) - len(view)) + 1
+            self.rows -= data.count(b"\n", whole)
             with suppress(OSError):
-                os.ftruncate(self._file, whole)
-            raise self._full(error) from error
+                os.ftruncate(self._file, self._size + whole)
+            raise self._stopped(error) from error
         self._size += len(data)
 
-    def _full(self, error: OSError) -> OedError:
-        return OedError(
+    def _stopped(self, error: OSError) -> RecordingError:
+        return RecordingError(
             f"recording stopped ({(error.strerror or str(error)).lower()})",
             file=self.path,
-            remedy="make room on the disk; the rows up to here are in the file",
+            remedy="make room on the disk" if error.errno in FULL else "check the disk",
         )
+
+
+def _lock(number: int) -> None:
+    """Locks a file for this program; Windows and some network drives have no such lock.
+
+    Raises:
+        BlockingIOError: another program has locked it.
+    """
+    try:
+        import fcntl
+    except ImportError:
+        return
+    try:
+        fcntl.flock(number, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except OSError as error:
+        if isinstance(error, BlockingIOError):
+            raise
 
 
 def check_log_path(path: str | PathLike[str], force: bool) -> Path:

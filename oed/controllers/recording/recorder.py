@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from oed.controllers.errors import ControllerError, LinkError
+from oed.controllers.errors import ControllerError, LinkError, ProtocolError, RecordingError
 from oed.controllers.links import Link
 from oed.controllers.recording.clock import ClockAnchor
 from oed.controllers.recording.feedback import RANKS, Layout, is_valid, layout_of, stamp_of
@@ -71,6 +71,10 @@ class Recorder:
         self.rest_since = self.last_heard = time.monotonic()
         self.error: OedError | None = None
         self.received = 0
+        self.rows = 0
+        """Rows of the log, once it has ended."""
+        self.note = ""
+        """What the log lacks, though it has all its rows."""
         self._thread = threading.Thread(target=self._run, name="feedback", daemon=True)
         self._thread.start()
 
@@ -78,17 +82,18 @@ class Recorder:
         """Waits for the first feedback and returns its ten positions.
 
         Raises:
-            LinkError: none within the time to connect.
+            ProtocolError: none within the time to connect.
+            LinkError: the link is closed.
         """
         begin = time.monotonic()
         while time.monotonic() - begin < self._connect_time and self.error is None and not self._heard.is_set():
             self._heard.wait(0.05)
         self.check()
         if self.positions is None:
-            raise LinkError(
+            raise ProtocolError(
                 f"no feedback from {self._link.place} within {self._connect_time:g} s"
                 + (f"; what came is no message: {self._problem}" if self._problem else ""),
-                remedy="check the state port and the message format",
+                remedy="check the state port and the message format; it may be no simple_message controller",
             )
         # Other kinds, and the status, may come less often.
         time.sleep(LOOK)
@@ -108,6 +113,14 @@ class Recorder:
             raise LinkError(
                 f"{self._link.place} is silent for {silence:.1f} s", remedy="check the controller and the network"
             )
+
+    def is_moving(self, tolerance: float) -> bool:
+        """Whether the robot moves: its controller says so, or its positions so far differ by more than a tolerance."""
+        if self.status is not None and self.status.in_motion >= 0:
+            return self.status.in_motion == 1
+        if self.lowest is None or self.highest is None:
+            return False
+        return float(np.abs(self.highest - self.lowest).max()) > tolerance
 
     @property
     def has_torque(self) -> bool:
@@ -167,17 +180,14 @@ class Recorder:
         end = self.statistics.end
         return None if end is None else ClockAnchor(t=end, unix=time.time(), offset=self._offset)
 
-    def finish(self, metadata: Mapping[str, Any]) -> int:
+    def finish(self, metadata: Mapping[str, Any]) -> None:
         """Ends the log and the thread, and closes the link.
 
         Args:
             metadata: what is known at the end; the measured rate, loss and jitter are added.
 
-        Returns:
-            The number of rows.
-
         Raises:
-            OedError: the disk is full; what was recorded stays.
+            RecordingError: the disk is full, and the last rows are lost; what was recorded stays.
         """
         self._end.set()
         self._thread.join()
@@ -185,13 +195,19 @@ class Recorder:
         with self._lock:
             log, self._log = self._log, None
         if log is None:
-            return 0
-        if not log.rows:
-            log.discard()
-            return 0
-        full = self.error if type(self.error) is OedError else None
-        log.close(None if full else {"complete": True, **metadata, "feedback": self.statistics.summary()})
-        return log.rows
+            return
+        try:
+            log.close()
+        finally:
+            self.rows = log.rows
+            if not log.rows:
+                log.discard()
+        if not log.rows or isinstance(self.error, RecordingError):
+            return
+        try:
+            log.complete({"complete": True, **metadata, "feedback": self.statistics.summary()})
+        except OedError as error:
+            self.note = f"the log does not state the measured delay and loss: {error}"
 
     def _run(self) -> None:
         try:
@@ -210,7 +226,7 @@ class Recorder:
                     continue
                 self._take(frame, time.monotonic())
         except MessageError as error:
-            self.error = LinkError(f"{self._link.place} speaks another protocol: {error}")
+            self.error = ProtocolError(f"{self._link.place} speaks another protocol: {error}")
         except OedError as error:
             self.error = error
 

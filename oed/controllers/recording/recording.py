@@ -93,7 +93,8 @@ def record(
     check_log_path(log, force)
     place = endpoint.place(endpoint.state_port)
     recorder = Recorder(open_link(endpoint, endpoint.state_port), robot, endpoint.form, patience, endpoint.connect_time)
-    rows, note, begin, ended, interrupted = 0, "", time.monotonic(), "interrupted", False
+    begin, ended, interrupted = time.monotonic(), "interrupted", False
+    failure: OedError | None = None
     try:
         require_no_further_joints(recorder.wait_for_feedback()[robot.n :], robot)
         recorder.begin(log, {"robot": robot.name, "source": f"feedback of {place}", "tool": VERSION}, force=force)
@@ -109,18 +110,17 @@ def record(
             raise
         interrupted = True
     except OedError as error:
-        ended = error.problem
-        if recorder.statistics.rows:
-            error.remedy = "; ".join(filter(None, [error.remedy, f"{recorder.statistics.rows} rows are in {log}"]))
-        raise
+        failure, ended = error, error.problem
     finally:
         length = time.monotonic() - begin
         progress.finish()
         with signals_held():
             try:
-                rows = recorder.finish({"complete": ended in ("done", "interrupted"), "ended": ended})
+                recorder.finish({"complete": ended in ("done", "interrupted"), "ended": ended})
             except OedError as error:
-                note = f"the log lacks the measured loss: {error}"
+                failure = failure or error
+    if failure is not None:
+        raise with_rows(failure, recorder.rows, log)
     if recorder.lowest is not None and recorder.highest is not None:
         for doubt in doubts_about_robot(robot, recorder.lowest, recorder.highest):
             warnings.warn(OtherRobotWarning(doubt), stacklevel=2)
@@ -128,9 +128,23 @@ def record(
         robot=robot.name,
         place=place,
         log=fspath(log),
-        rows=rows,
+        rows=recorder.rows,
         duration=length,
         interrupted=interrupted,
         feedback=recorder.statistics.summary(),
-        note=note,
+        note=recorder.note,
     )
+
+
+def with_rows(error: OedError, rows: int, log: str | PathLike[str] | None, *further: str) -> OedError:
+    """Adds to an error where the rows are that were recorded before it.
+
+    Args:
+        error: what ended the recording.
+        rows: of the log; nothing is added without any.
+        log: the file.
+        further: what is said before.
+    """
+    if rows:
+        error.remedy = "; ".join([*filter(None, [error.remedy, *further]), f"{rows} rows are in {fspath(log or '')}"])
+    return error

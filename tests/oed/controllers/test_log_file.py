@@ -9,9 +9,10 @@ import numpy as np
 import pytest
 
 from estimation import read_log
+from oed.controllers.errors import RecordingError
 from oed.controllers.recording.log_file import FeedbackLog
 from oed.controllers.recording.statistics import Statistics
-from robots.common.errors import InputError, OedError
+from robots.common.errors import InputError
 
 COLUMNS = ["t", "q1", "q2"]
 UNITS = {"t": "s", "q1": "rad", "q2": "rad"}
@@ -24,7 +25,8 @@ def test_rows_and_header(tmp_path: Path) -> None:
     rows = np.random.default_rng(0).standard_normal((100, 2))
     for k, row in enumerate(rows):
         log.append(0.004 * k, row.tolist())
-    log.close({"complete": True, "message_delay": 0.001})
+    log.close()
+    log.complete({"complete": True, "message_delay": 0.001})
     read = read_log(path, 2, torque=False)
     np.testing.assert_array_equal(read.q, rows)
     np.testing.assert_array_equal(read.t, 0.004 * np.arange(100))
@@ -68,14 +70,48 @@ def test_full_disk(tmp_path: Path) -> None:
     before = resource.getrlimit(resource.RLIMIT_FSIZE)
     resource.setrlimit(resource.RLIMIT_FSIZE, (20_000, before[1]))
     try:
-        with pytest.raises(OedError, match="recording stopped"):
+        with pytest.raises(RecordingError, match="recording stopped"):
             write_until_full(log)
         log.close()
     finally:
         resource.setrlimit(resource.RLIMIT_FSIZE, before)
     read = read_log(path, 2, torque=False)
     assert 15_000 < path.stat().st_size <= 20_000
+    assert len(read) == log.rows
     np.testing.assert_array_equal(read.q[:, 0], np.arange(len(read)) / 3)
+
+
+def test_disk_that_is_full_at_an_end(tmp_path: Path) -> None:
+    """Rows that are lost when the log is closed are an error; without room for the header there is no file."""
+    path = tmp_path / "log.csv"
+    log = FeedbackLog(path, COLUMNS, UNITS, {"complete": False})
+    before = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (path.stat().st_size + 100, before[1]))
+    try:
+        for k in range(50):
+            log.append(0.5 * k, [k, -k])
+        with pytest.raises(RecordingError, match="recording stopped"):
+            log.close()
+        resource.setrlimit(resource.RLIMIT_FSIZE, (100, before[1]))
+        with pytest.raises(RecordingError):
+            FeedbackLog(tmp_path / "other.csv", COLUMNS, UNITS, {})
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, before)
+    assert 5 < len(read_log(path, 2, torque=False)) == log.rows < 50
+    assert not (tmp_path / "other.csv").exists()
+
+
+def test_one_program_a_file(tmp_path: Path) -> None:
+    """A file that is being recorded is not replaced with force either, until it is closed."""
+    path = tmp_path / "log.csv"
+    first = FeedbackLog(path, COLUMNS, UNITS, {})
+    first.append(0.0, [1.0, 2.0])
+    with pytest.raises(InputError, match="another program is recording into this file"):
+        FeedbackLog(path, COLUMNS, UNITS, {}, force=True)
+    first.append(0.1, [3.0, 4.0])
+    first.close()
+    assert len(read_log(path, 2, torque=False)) == 2
+    FeedbackLog(path, COLUMNS, UNITS, {}, force=True).close()
 
 
 def test_loss_and_jitter() -> None:

@@ -11,6 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from estimation import read_log
 from oed.controllers import (
     ControllerError,
     ControllerOptions,
@@ -167,7 +168,10 @@ def test_wrong_byte_order_is_named(robot, controllers, log: Path) -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize("transport", ["udp", "tcp"])
 def test_two_clients(transport, robot, controllers, tmp_path: Path) -> None:
-    """A second client is refused with one message, and the first goes on undisturbed."""
+    """A second client is refused with one message, and the first goes on undisturbed.
+
+    That the robot moves is seen first. Who ignores the controller's state does not get its motion port.
+    """
     motion = swing(robot, 500)
     controller, endpoint = controllers(transport=transport, speed=1.0)
     results = []
@@ -180,10 +184,15 @@ def test_two_clients(transport, robot, controllers, tmp_path: Path) -> None:
     while controller.points < 50:
         assert first.is_alive()
     still = replace(endpoint, connect_time=0.3)
-    with pytest.raises((LinkError, InputError), match=r"another client|closed the connection"):
-        stream(swing(robot, 500), robot, still, log=tmp_path / "second.csv", options=StreamOptions(start_tolerance=1.0))
+    second = tmp_path / "second.csv"
+    with pytest.raises(ControllerError, match=r"the robot is moving; .*another client"):
+        stream(motion, robot, still, log=second)
+    with pytest.raises(LinkError, match="another client"):
+        stream(motion, robot, still, log=second, options=StreamOptions(start_tolerance=1.0, ignore_status=True))
     first.join()
+    assert not second.exists()
     assert results[0].sent == controller.points == 500
+    assert len(read_log(tmp_path / "first.csv", robot.n)) == results[0].rows > 400
 
 
 def test_taken_port(robot) -> None:
