@@ -15,6 +15,9 @@ from typing import BinaryIO
 
 from robots.common.errors import InputError
 
+PARTIAL = ".partial"
+"""How the names of files end that are not whole yet; they begin with a dot."""
+
 _OVERWRITE = "use force (--force) to overwrite, or choose another name"
 
 
@@ -94,7 +97,7 @@ def open_atomic(path: str | PathLike[str], *, force: bool = False) -> Iterator[B
     target = Path(os.path.realpath(path))
     if not target.parent.is_dir():
         raise InputError(f"there is no folder {path.parent} to write to", file=path, remedy="create the folder first")
-    partial = target.with_name(f".{target.name[:100]}.{secrets.token_hex(4)}.partial")
+    partial = target.with_name(f".{target.name[:100]}.{secrets.token_hex(4)}{PARTIAL}")
     try:
         with _as_input_error(path):
             stream = partial.open("xb")
@@ -111,11 +114,24 @@ def open_atomic(path: str | PathLike[str], *, force: bool = False) -> Iterator[B
             partial.unlink()
 
 
+def remove_partial_files(folder: str | PathLike[str]) -> None:
+    """Removes what killed programs left unfinished in a folder and below.
+
+    Args:
+        folder: one to which no other program writes now.
+    """
+    for path in Path(folder).rglob(f".*{PARTIAL}"):
+        if path.is_file() and not path.is_symlink():
+            with suppress(OSError):
+                path.unlink()
+
+
 class ResultFolder:
     """A folder of results that receives all files of a run together, or none.
 
     Files are written in a hidden folder and moved on a clean exit. On any exception, and on an interrupt even
-    while files are being moved, the folder is left as it was. Its other files stay untouched.
+    while files are being moved, the folder is left as it was. Its other files stay untouched. A new folder appears with
+    all its files at once, so a killed program leaves it whole or not at all.
 
     Example:
         ``with ResultFolder(folder, names=("model.json",)) as out: write(out.path("model.json"))``
@@ -144,7 +160,7 @@ class ResultFolder:
         base = self.folder if self.folder.is_dir() else self.folder.parent
         try:
             self._make(base)
-            staging = base / f".{self.folder.name[:100]}.{token}.partial"
+            staging = base / f".{self.folder.name[:100]}.{token}{PARTIAL}"
             # Noted first, so that an interrupt right after the call leaves nothing either.
             self._staging = staging
             with _as_input_error(self.folder):
@@ -188,6 +204,11 @@ class ResultFolder:
         files = sorted(path.relative_to(new) for path in new.rglob("*") if not path.is_dir())
         for name in files:
             _check_target(self.folder / name, self.force)
+        if files and not os.path.lexists(self.folder):
+            with _as_input_error(self.folder):
+                self._make(self.folder.parent)
+                os.replace(new, self.folder)
+            return
         undo: list[tuple[Path, Path]] = []
         try:
             with _as_input_error(self.folder):

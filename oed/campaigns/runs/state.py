@@ -12,6 +12,7 @@ from pathlib import Path
 from oed.campaigns.state_files import read_state, write_state
 from oed.controllers.recording.clock import ClockAnchor
 from robots.common.errors import InputError
+from robots.common.files import remove_partial_files
 
 RUN, LOCK = "run.json", ".run.lock"
 LOGS = "logs"
@@ -91,6 +92,8 @@ class RunState:
 def run_lock(folder: Path, what: str) -> Iterator[None]:
     """Keeps a second program out of a folder; the system lifts the lock of a killed program.
 
+    What a killed program left unfinished is removed.
+
     Args:
         folder: the folder, which exists.
         what: is done in it, for the message.
@@ -111,6 +114,7 @@ def run_lock(folder: Path, what: str) -> Iterator[None]:
             raise InputError(
                 f"another program {what} in this folder", file=folder, remedy="wait for its end, or end it"
             ) from error
+        remove_partial_files(folder)
         yield
     finally:
         os.close(number)

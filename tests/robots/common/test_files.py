@@ -1,12 +1,15 @@
 # ruff: noqa: PT012 - what a context manager does on an error inside needs more than one statement inside
 import hashlib
 import os
+import signal
+import subprocess
+import sys
 
 import pytest
 
 from robots.common import files
 from robots.common.errors import InputError
-from robots.common.files import ResultFolder, existing_file, open_atomic, sha256, write_atomic
+from robots.common.files import ResultFolder, existing_file, open_atomic, remove_partial_files, sha256, write_atomic
 
 
 def contents(folder):
@@ -263,3 +266,30 @@ def test_run_without_files_makes_the_folder(tmp_path):
     with ResultFolder(tmp_path / "out"):
         pass
     assert os.listdir(tmp_path / "out") == []
+
+
+KILLED = """
+import os, signal, sys
+from robots.common.files import ResultFolder
+sys.addaudithook(lambda event, _: event == "os.rename" and os.kill(os.getpid(), signal.SIGKILL))
+with ResultFolder(sys.argv[1]) as out:
+    for name in ("a.json", "b.csv", "sub/c.csv"):
+        out.path(name).write_text(name)
+"""
+
+
+def test_a_killed_program_leaves_no_part_of_a_new_folder(tmp_path):
+    """A new folder is moved to its place in one step; what is left unfinished can be removed."""
+    target = tmp_path / "results"
+    done = subprocess.run([sys.executable, "-c", KILLED, target], check=False, timeout=60)
+    assert done.returncode == -signal.SIGKILL
+    assert not target.exists()
+    with ResultFolder(target) as out:
+        for name in ("a.json", "sub/c.csv"):
+            out.path(name).write_text(name)
+    assert sorted(path.name for path in target.rglob("*.*")) == ["a.json", "c.csv"]
+    unfinished = target / "sub" / ".c.csv.0123abcd.partial"
+    unfinished.write_text("")
+    remove_partial_files(target)
+    assert not unfinished.exists()
+    assert (target / "sub" / "c.csv").exists()
