@@ -2,135 +2,23 @@
 
 from __future__ import annotations
 
-import json
-import shutil
-import subprocess
 import sys
 from collections import namedtuple
-from collections.abc import Iterator
 from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
-import oed
 from estimation import read_log
-from oed.campaigns import Campaign, Programme
+from oed.campaigns import Campaign
 from oed.campaigns.runs import run_campaign, running
 from oed.campaigns.runs.state import run_lock
 from oed.controllers import ControllerError, ControllerOptions, Endpoint, LinkError, StreamOptions, VirtualController
-from oed.controllers.clients import ending
-from oed.controllers.recording import recorder
 from oed.exports import read_trajectory
 from robots.common.errors import InputError
-from robots.loading import load_robot
 from robots.robot import Robot
-from tests.oed.cli.conftest import ROBOT
-
-SPEED = 10.0
-FAST = StreamOptions(download=True, patience=10.0)
-NOWHERE = Endpoint(host="127.0.0.1", motion_port=9, state_port=9, connect_time=0.2, handshake_interval=0.1)
-
-
-@pytest.fixture(autouse=True)
-def _impatient(monkeypatch: pytest.MonkeyPatch) -> None:
-    """The controller of the tests runs faster than real time."""
-    monkeypatch.setattr(recorder, "LOOK", 0.1)
-    monkeypatch.setattr(ending, "STANDS", 0.1)
-
-
-@pytest.fixture(scope="session")
-def planned(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A robot file, and the campaign of a cold robot: it holds still, then three friction stages with rests between."""
-    folder = tmp_path_factory.mktemp("planned")
-    (folder / "two.yaml").write_text(ROBOT.replace("VELOCITY", "2"))
-    programme = Programme(cycles=0, cooling=3, cycle_time=12.0, power_on=1.0, levels=(0.5, 1.0), plateau=0.2)
-    oed.campaign(load_robot(folder / "two.yaml"), programme=programme, collision=False).save(folder)
-    return folder
-
-
-@pytest.fixture
-def campaign(planned: Path, tmp_path: Path) -> Path:
-    """A copy of the campaign's folder."""
-    return Path(shutil.copytree(planned, tmp_path / "campaign"))
-
-
-@pytest.fixture
-def two(planned: Path) -> Robot:
-    """Load the robot."""
-    return load_robot(planned / "two.yaml")
-
-
-@pytest.fixture
-def endpoint(two: Robot, campaign: Path) -> Iterator[Endpoint]:
-    """Start a controller whose robot stands at the campaign's home."""
-    home = read_trajectory(campaign / "friction.csv")[0].q[0]
-    options = ControllerOptions(transport="tcp", motion_port=0, state_port=0, speed=SPEED, wait_for_points=True)
-    with VirtualController(two, options=options, pose=home) as controller:
-        yield Endpoint(
-            host="127.0.0.1",
-            transport="tcp",
-            motion_port=controller.motion_port,
-            state_port=controller.state_port,
-        )
-
-
-KILLED = """
-import os, signal, sys, time, warnings
-from pathlib import Path
-warnings.simplefilter("ignore")
-from oed.campaigns.runs import run_campaign
-from oed.controllers import Endpoint, StreamOptions
-folder, motion, state, speed = Path(sys.argv[1]), *map(int, sys.argv[2:4]), float(sys.argv[4])
-place = Endpoint(host="127.0.0.1", transport="tcp", motion_port=motion, state_port=state)
-
-def begun():
-    return [f for f in (folder / "interrupted").glob("*.csv") if f.stat().st_size > 20_000]
-
-for kill in (1, 2, 3, 0):
-    before = begun()
-    child = os.fork()
-    if not child:
-        run_campaign(folder, place, options=StreamOptions(download=True, patience=10.0), speed=speed)
-        os._exit(0)
-    # The second and third kill come in a later stage than the one before.
-    while kill and (len(list((folder / "logs").glob("*.csv"))) < kill - 1 or len(begun()) <= len(before)):
-        time.sleep(0.01)
-    if kill:
-        os.kill(child, signal.SIGKILL)
-    print(os.waitpid(child, 0)[1])
-"""
-
-
-@pytest.mark.slow
-def test_three_kills(campaign: Path, endpoint: Endpoint) -> None:
-    """Killed three times in the middle of a stage, the run ends with every stage recorded once, on one clock."""
-    words = [sys.executable, "-c", KILLED, campaign, endpoint.motion_port, endpoint.state_port, SPEED]
-    done = subprocess.run(list(map(str, words)), capture_output=True, text=True, check=False, timeout=120)
-    assert done.stderr == ""
-    assert done.stdout.split() == ["9", "9", "9", "0"]
-    state = json.loads((campaign / "run.json").read_text())
-    planned = [slot for slot in Campaign.load(campaign).slots if slot.stage is not None]
-    assert [(row["number"], row["stage"], row["cycle"]) for row in state["recorded"]] == [
-        (number, slot.stage, slot.cycle) for number, slot in enumerate(planned, start=1)
-    ]
-    files = sorted((campaign / "logs").iterdir())
-    assert [file.name for file in files] == [Path(row["file"]).name for row in state["recorded"]]
-    assert state["starts"] == 4
-    # What was cut short is kept.
-    assert len(list((campaign / "interrupted").glob("*.csv"))) >= 3
-    end = -np.inf
-    for file, slot in zip(files, planned, strict=True):
-        log = read_log(file, 2)
-        motion, _ = read_trajectory(campaign / f"{slot.stage}.csv")
-        assert log.t[0] > end
-        end = log.t[-1]
-        assert log.metadata["complete"] is True
-        assert (log.metadata["stage"], log.metadata["cycle"]) == (slot.stage, slot.cycle)
-        # The whole stage is in its log: 4-byte reals and encoders round by less.
-        np.testing.assert_allclose(log.q.max(axis=0), motion.q.max(axis=0), atol=1e-4)
-        np.testing.assert_allclose(log.q[[0, -1]], motion.q[[0, -1]], atol=1e-4)
+from tests.oed.campaigns.runs.conftest import FAST, NOWHERE, SPEED
 
 
 @pytest.mark.slow
