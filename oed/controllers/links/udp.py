@@ -32,7 +32,9 @@ class UdpLink(Link):
             self._socket.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, BUFFER)
             self._socket.setblocking(False)
             try:
-                self._socket.connect((endpoint.host, port))
+                # `connect` alone has no clear error for a name that cannot be encoded.
+                found = socket.getaddrinfo(endpoint.host, port, socket.AF_INET, socket.SOCK_DGRAM)
+                self._socket.connect(found[0][4])
             except (socket.gaierror, UnicodeError) as error:
                 raise unknown_host(endpoint.host) from error
             except OSError as error:

@@ -116,6 +116,11 @@ class VirtualController:
         """What it is playing."""
         return self._player
 
+    @property
+    def time(self) -> float:
+        """Its clock, which feedback carries [s]."""
+        return self._clock_ticks * self.options.feedback_period
+
     def run(self) -> None:
         """Runs until `stop`."""
         while not self._stopping.is_set():
@@ -262,7 +267,7 @@ class VirtualController:
             self._due_from = now - step
         due = int((now - self._due_from) / step + 1e-9)
         for _ in range(due):
-            clock = self._clock_ticks * self.options.feedback_period
+            clock = self.time
             sample = self._player.tick(clock, now, bool(self._state.clients))
             if sample is None:
                 self._due_from = now

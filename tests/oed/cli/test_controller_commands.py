@@ -9,12 +9,16 @@ import subprocess
 import sys
 import threading
 import time
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
+from typing import Any
 
+import numpy as np
 import pytest
 
 from estimation import read_log
-from oed.controllers import ControllerOptions, VirtualController
+from oed.controllers import ControllerOptions, Faults, VirtualController
 from oed.exports import write_trajectory
 from robots.loading import load_robot
 from tests.oed.controllers.conftest import swing
@@ -54,6 +58,66 @@ def test_interrupted_stream(robot: Path, run, tmp_path: Path) -> None:
         assert done.data["rows"] == len(read_log(tmp_path / "second.csv", 2)) > 20
 
 
+@contextmanager
+def serving(robot: Path, transport: str) -> Iterator[tuple[subprocess.Popen[str], list[object]]]:
+    """Start ``oed controller``, and give the options of its clients."""
+    process = start("controller", "--robot", robot, "--transport", transport, "--motion-port", 0, "--state-port", 0)
+    assert process.stderr is not None
+    try:
+        ports = None
+        while ports is None:
+            line = process.stderr.readline()
+            assert line, "the controller has ended"
+            ports = re.search(r"motion port (\d+), state port (\d+)", line)
+        place = ["--host", "127.0.0.1", "--transport", transport, "--patience", 20]
+        yield process, [*place, "--motion-port", ports[1], "--state-port", ports[2]]
+    finally:
+        process.kill()
+
+
+@pytest.mark.parametrize("transport", ["udp", "tcp"])
+def test_two_clients_at_once(transport: str, robot: Path, tmp_path: Path) -> None:
+    """Of two programs that play at once, one plays to its end, and the other is refused with one message."""
+    write_trajectory(tmp_path / "trajectory.csv", swing(load_robot(robot), 1000))
+    with serving(robot, transport) as (controller, place):
+        line = ["stream", tmp_path / "trajectory.csv", "--robot", robot, *place]
+        clients = [start(*line, "--log", tmp_path / f"log_{number}.csv") for number in (1, 2)]
+        errors = [client.communicate(timeout=120)[1] for client in clients]
+        controller.terminate()
+        out, _ = controller.communicate(timeout=60)
+    codes = [client.returncode for client in clients]
+    assert sorted(codes) == [0, 1], errors
+    first = codes.index(0)
+    refused = [text for text in errors[1 - first].splitlines() if not text.startswith(("note", "progress"))]
+    assert len(refused) == 1
+    assert re.fullmatch("oed: .*another client.*", refused[0])
+    assert not (tmp_path / f"log_{2 - first}.csv").exists()
+    log = read_log(tmp_path / f"log_{first + 1}.csv", 2)
+    assert log.metadata["complete"] is True
+    assert log.metadata["sent_points"] == 1000
+    assert log.q[:, 0].max() == pytest.approx(0.4, abs=1e-3)
+    assert out.startswith("1000 points received, 1 trajectories played")
+
+
+def test_killed_recording(robot: Path, tmp_path: Path) -> None:
+    """A recording that is killed is whole but for the last second."""
+    options = ControllerOptions(motion_port=0, state_port=0, transport="tcp")
+    path = tmp_path / "log.csv"
+    with VirtualController(load_robot(robot), options=options) as controller:
+        place = ["--host", "127.0.0.1", "--transport", "tcp", "--state-port", controller.state_port]
+        process = start("record", "--robot", robot, *place, "--log", path)
+        while not path.exists() or path.stat().st_size < 40_000:
+            assert process.poll() is None
+            time.sleep(0.05)
+        process.kill()
+        now = controller.time
+        process.communicate(timeout=60)
+    log = read_log(path, 2)
+    assert log.metadata["complete"] is False
+    np.testing.assert_allclose(np.diff(log.t), 0.004, atol=1e-6)
+    assert now - 1.0 < log.t[-1] <= now + 0.1
+
+
 def test_controller_ends_on_demand(robot: Path, run) -> None:
     """An order to terminate ends the controller with its summary and exit code 0; its ports are printed first."""
 
@@ -77,6 +141,8 @@ def test_controller_ends_on_demand(robot: Path, run) -> None:
         (["stream", "T", "--host", "127.0.0.1", "--handshake", "x"], "--handshake x"),
         (["stream", "T", "--host", "127.0.0.1", "--byte-order", "middle"], "byte order"),
         (["stream", "T", "--host", "127.0.0.1", "--robot", "er3a"], "has 2 joints, er3a has 6"),
+        (["stream", "T", "--host", "no.such.host.invalid", "--robot", "ROBOT"], "has no address"),
+        (["stream", "T", "--host", "", "--robot", "ROBOT"], "the host is empty"),
         (["record", "--robot", "ROBOT", "--host", "127.0.0.1", "--duration", "-1"], "duration"),
         (["controller", "--robot", "ROBOT", "--speed", "0"], "speed"),
         (["controller", "--robot", "ROBOT", "--pose", "1"], "pose of 1"),
@@ -91,3 +157,31 @@ def test_wrong_options(arguments: list[str], problem: str, run, robot: Path, tmp
     assert done.code == 2
     assert problem in done.err
     assert "Traceback" not in done.err
+
+
+@pytest.mark.parametrize(
+    ("settings", "code", "problem"),
+    [
+        ({"pose": np.array([0.3, 0.0])}, 2, "joint 1: the robot is at 0.3, the trajectory begins at 0"),
+        ({"stuck": True}, 1, "takes no points: no reply to point 100 .* its buffer does not empty"),
+    ],
+)
+def test_controllers_that_do_not_play(settings: Any, code: int, problem: str, run, robot: Path, tmp_path: Path) -> None:
+    """A robot that stands elsewhere, and a buffer that never empties: one message each, and no motion."""
+    described = load_robot(robot)
+    write_trajectory(tmp_path / "t.csv", swing(described))
+    faults = Faults(stuck=settings.pop("stuck", False))
+    options = ControllerOptions(motion_port=0, state_port=0, transport="tcp", faults=faults)
+    with VirtualController(described, options=options, **settings) as controller:
+        pose = controller.player.pose
+        place = ["--host", "127.0.0.1", "--transport", "tcp", "--patience", 0.5]
+        ports = ["--motion-port", controller.motion_port, "--state-port", controller.state_port]
+        log = tmp_path / "log.csv"
+        done = run("stream", tmp_path / "t.csv", "--robot", robot, *place, *ports, "--log", log, "--quiet")
+        assert done.code == code
+        assert re.fullmatch(f"oed: .*{problem}.*\n", done.err)
+        np.testing.assert_array_equal(controller.player.pose, pose)
+        assert not controller.player.moving
+    assert log.exists() == (code == 1)
+    if code == 1:
+        assert f"{len(read_log(log, 2))} rows are in" in done.err

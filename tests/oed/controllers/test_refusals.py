@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import socket
+import socketserver
 import threading
 from contextlib import suppress
 from dataclasses import replace
+from http.server import SimpleHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import Path
 
 import numpy as np
@@ -23,6 +25,7 @@ from oed.controllers import (
     record,
     stream,
 )
+from oed.controllers.errors import ProtocolError
 from oed.exports.simple_message import WireFormat
 from robots.common.errors import InputError
 from robots.signals import Motion
@@ -122,12 +125,18 @@ def test_unknown_host(robot, log: Path) -> None:
     """A host without an address is bad input."""
     with pytest.raises(InputError, match="has no address"):
         record(robot, replace(NOWHERE, host="no.such.host.invalid"), log)
+    for transport in ("udp", "tcp"):
+        # A name that no domain may have is not even looked up.
+        with pytest.raises(InputError, match="has no address"):
+            record(robot, replace(NOWHERE, host="\u00fc" * 64, transport=transport), log)
+    with pytest.raises(InputError, match="the host is empty"):
+        replace(NOWHERE, host=" ")
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("transport", ["udp", "tcp"])
 def test_another_protocol(transport, robot, log: Path) -> None:
-    """A server of another protocol is recognised as such."""
+    """A server of another protocol is recognised as such; the address is wrong input."""
     kind = socket.SOCK_STREAM if transport == "tcp" else socket.SOCK_DGRAM
     server = socket.socket(socket.AF_INET, kind)
     server.bind(("127.0.0.1", 0))
@@ -150,10 +159,46 @@ def test_another_protocol(transport, robot, log: Path) -> None:
     thread = threading.Thread(target=serve)
     thread.start()
     endpoint = replace(NOWHERE, transport=transport, state_port=server.getsockname()[1], connect_time=1.0)
-    with pytest.raises(LinkError, match=r"another protocol|no message"):
+    with pytest.raises(ProtocolError, match=r"another protocol|no message") as caught:
         stream(swing(robot), robot, endpoint, log=log, options=SHORT)
+    assert caught.value.exit_code == 2
     thread.join()
     server.close()
+
+
+@pytest.mark.slow
+def test_servers_that_wait_or_echo(robot, controllers, log: Path) -> None:
+    """A server that waits for a request, as of HTTP, is named at either port, and so is one that sends all back."""
+
+    class Echo(socketserver.BaseRequestHandler):
+        def handle(self) -> None:
+            while data := self.request.recv(4096):
+                self.request.sendall(data)
+
+    motion = swing(robot)
+    with (
+        ThreadingHTTPServer(("127.0.0.1", 0), SimpleHTTPRequestHandler) as http,
+        socketserver.ThreadingTCPServer(("127.0.0.1", 0), Echo) as echo,
+    ):
+        for server in (http, echo):
+            server.daemon_threads = True
+            threading.Thread(target=server.serve_forever, daemon=True).start()
+        controller, endpoint = controllers(transport="tcp")
+        place = replace(endpoint, connect_time=0.4)
+        for ports, problem in (
+            ({"state_port": http.server_port}, "no feedback .* may be no simple_message controller"),
+            ({"motion_port": http.server_port}, "does not answer a ping; check host and motion port"),
+            ({"motion_port": echo.server_address[1]}, "sends back what it is sent"),
+            ({"motion_port": place.state_port}, "takes no points.*and the motion port"),
+        ):
+            wrong = replace(place, **ports)
+            options = replace(SHORT, ping=problem[:5] != "sends")
+            with pytest.raises((ProtocolError, ControllerError), match=problem) as caught:
+                stream(motion, robot, wrong, log=log, options=options, force=True)
+            assert caught.value.exit_code == (1 if problem.startswith("takes") else 2)
+        for server in (http, echo):
+            server.shutdown()
+    assert controller.points == 0
 
 
 @pytest.mark.slow
