@@ -9,12 +9,16 @@ from numpy.typing import NDArray
 
 from oed.exports.trajectory_csv import JOINT_COLUMN, read_lengths
 from robots.common.errors import InputError
-from robots.common.tables.table_files import read_table
+from robots.common.tables.table_files import Table, read_table
+from robots.robot import Robot
 
 Array = NDArray[np.float64]
 
+ROUNDING = 1e-6
+"""What a file rounds [rad or m]."""
 
-def read_waypoints(path: str | PathLike[str], n: int | None = None) -> Array | None:
+
+def read_waypoints(path: str | PathLike[str], n: int | None = None, *, robot: Robot | None = None) -> Array | None:
     """Reads waypoints from a CSV with the columns q1..qn and no time.
 
     Columns in degrees or millimetres, as an ECSV block states them, become radians or metres.
@@ -22,22 +26,54 @@ def read_waypoints(path: str | PathLike[str], n: int | None = None) -> Array | N
     Args:
         path: the file.
         n: number of joints, if known.
+        robot: whose joints they are, if known: units and limits are checked.
 
     Returns:
         The waypoints (W, n) [rad or m]; None where the file has a column of times, so that it is a trajectory.
 
     Raises:
-        InputError: another number of joints, an unknown unit, text or NaN in a cell, or fewer than two waypoints.
+        InputError: another number of joints, an unknown unit or one of another kind of joint, text or NaN in a cell,
+            a waypoint outside the limits, or fewer than two waypoints.
     """
     table = read_table(path, wanted=lambda name: name == "t" or JOINT_COLUMN.fullmatch(name) is not None)
     if "t" in table.columns:
         return None
     found = sorted(int(match[2]) for match in map(JOINT_COLUMN.fullmatch, table.names) if match and match[1] == "q")
-    n = n or max(found, default=1)
+    n = n or (max(found, default=1) if robot is None else robot.n)
     if found != list(range(1, n + 1)):
         names = ", ".join(f"q{joint}" for joint in found) or "no columns q1, q2, ..."
         raise InputError(f"found {names}", file=path, allowed=f"q1 to q{n}, one waypoint a row")
     q = np.column_stack([read_lengths(table, "q", joint) for joint in range(1, n + 1)])
     if len(q) < 2:
-        raise InputError(f"{len(q)} waypoints", file=path, allowed="two or more")
+        raise InputError(f"{len(q)} waypoint{'s' * (len(q) != 1)}", file=path, allowed="two or more")
+    if robot is not None:
+        _check_units(table, robot)
+        _check_limits(q, table, robot)
     return q
+
+
+def _check_units(table: Table, robot: Robot) -> None:
+    for joint, kind in enumerate(robot.chain.kinds, start=1):
+        unit, allowed = table.units.get(f"q{joint}"), ("m", "mm") if kind == "prismatic" else ("rad", "deg")
+        if unit is not None and unit not in allowed:
+            raise InputError(
+                f"unit {unit!r} of a {kind} joint of {robot.name}",
+                file=table.path,
+                column=f"q{joint}",
+                allowed=" or ".join(allowed),
+            )
+
+
+def _check_limits(q: Array, table: Table, robot: Robot) -> None:
+    limits = robot.limits
+    outside = np.argwhere((q < limits.lower - ROUNDING) | (q > limits.upper + ROUNDING))
+    if outside.size:
+        row, joint = (int(index) for index in outside[0])
+        raise InputError(
+            f"{q[row, joint]:.6g} {limits.unit(joint)} is outside the limits of {robot.name}",
+            file=table.path,
+            column=f"q{joint + 1}",
+            row=table.line(row),
+            allowed=f"{limits.lower[joint]:.6g} to {limits.upper[joint]:.6g} {limits.unit(joint)}",
+            remedy="positions are in rad and m, unless the file states deg or mm in an ECSV block",
+        )

@@ -77,13 +77,14 @@ def limit_usage(motion: Motion, limits: Limits, torque: Array | None = None) -> 
     }
 
 
-def require_inside(q: Array, limits: Limits, tolerance: float = 1e-9) -> None:
+def require_inside(q: Array, limits: Limits, tolerance: float = 1e-9, remedy: str | None = None) -> None:
     """Rejects positions outside the limits.
 
     Args:
         q: positions, (N, n) [rad].
         limits: bounds of all joints.
         tolerance: what counts as rounding [rad].
+        remedy: for the message.
 
     Raises:
         InfeasibleError: naming the joint, its value and its range.
@@ -92,9 +93,10 @@ def require_inside(q: Array, limits: Limits, tolerance: float = 1e-9) -> None:
     if np.any(outside):
         row, column = np.argwhere(outside)[0]
         raise InfeasibleError(
-            f"the position {q[row, column]:.4g} {limits.unit(int(column))} is outside its limits",
+            f"the position {q[row, column]:.6g} {limits.unit(int(column))} is outside its limits",
             joint=int(column) + 1,
             allowed=f"{limits.lower[column]:.4g} to {limits.upper[column]:.4g} {limits.unit(int(column))}",
+            remedy=remedy,
         )
 
 

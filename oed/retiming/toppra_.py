@@ -20,6 +20,10 @@ from robots.signals import Motion
 
 Array = NDArray[np.float64]
 
+OVERSHOOT = (
+    "the smooth path swings out between its points: add points near the limit, or stop at each (--method ruckig)"
+)
+
 EXACT = 1e-4
 """Deviation from the given path above which a timing that keeps the path exactly is preferred, however slow [rad]."""
 
@@ -183,9 +187,10 @@ def _by_toppra(path: Motion | ArrayLike, task: _Task) -> _Timing:
     pieces = split_path(path, limits.velocity)
     if not pieces:
         raise InfeasibleError("the path contains no motion to retime")
+    require_inside(path.q if isinstance(path, Motion) else np.asarray(path), limits, tolerance=1e-6)
     timed = []
     for piece in pieces:
-        require_inside(piece.spline(np.linspace(0.0, piece.length, 2001)), limits, tolerance=1e-6)
+        require_inside(piece.spline(np.linspace(0.0, piece.length, 2001)), limits, 1e-6, OVERSHOOT)
         constraint = None
         if task.inverse_dynamics is not None:
             constraint = TorqueConstraint(task.inverse_dynamics, task.friction, limits.torque)

@@ -69,7 +69,7 @@ def retime(
 
         with ResultFolder(out, force, names=["trajectory.csv", "design.json", "report.html"]) as folder:
             described = robot_from(robot) if robot else None
-            points = read_waypoints(trajectory, None if described is None else described.n)
+            points = read_waypoints(trajectory, robot=described)
             if points is None:
                 motion, metadata = read_trajectory(trajectory)
                 if described is None and metadata.get("robot"):

@@ -46,7 +46,7 @@ def test_a_trajectory_is_no_list_of_waypoints(tmp_path: Path) -> None:
         ("q1\n0\n1\n", "found q1; allowed: q1 to q2"),
         ("q1,q3\n0,0\n1,1\n", "found q1, q3"),
         ("a,b\n0,0\n1,1\n", "no columns q1"),
-        ("q1,q2\n0,0\n", "1 waypoints; allowed: two or more"),
+        ("q1,q2\n0,0\n", "1 waypoint; allowed: two or more"),
         ("q1,q2\n0,0\n1,nan\n", "column q2, row 3"),
         ("q1,q2\n0,0\n1,x\n", "q2"),
         (UNITS.replace("mm", "inch") + "q1,q2\n0,0\n1,1\n", "unit 'inch'"),
