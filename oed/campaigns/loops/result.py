@@ -62,10 +62,15 @@ class LoopResult:
             causes = ", ".join(seen.causes) or "no cause"
             lines += [
                 f"  experiment {number}, {experiment.kind.replace('_', ' ')}: {experiment.why}",
-                f"    {len(experiment.runs)} runs, {rows} rows; then {seen.verdict}: {causes}",
+                f"    {several(len(experiment.runs), 'run')}, {rows} rows; then {seen.verdict}: {causes}",
                 f"    held-out error per joint [% of torque RMS]: {percent(seen.before)} -> {percent(seen.after)}",
             ]
         return "\n".join(lines)
+
+
+def several(count: int, noun: str) -> str:
+    """Writes how many there are of something."""
+    return f"{count} {noun}" if count == 1 else f"{count} {noun}s"
 
 
 def percent(shares: list[float | None]) -> str:

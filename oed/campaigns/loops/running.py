@@ -18,7 +18,7 @@ from oed.campaigns.excitation import excitation_stage
 from oed.campaigns.loops.diagnosing import diagnose_logs
 from oed.campaigns.loops.options import LoopOptions
 from oed.campaigns.loops.proposals import PlannedExperiment, PlannedRun, plan_experiment
-from oed.campaigns.loops.result import LoopResult
+from oed.campaigns.loops.result import LoopResult, several
 from oed.campaigns.loops.state import Experiment, LoopRun, LoopState, Recorded, identity, remove_loop
 from oed.campaigns.runs.player import Player
 from oed.campaigns.runs.stage_progress import TitledProgress, rest
@@ -265,12 +265,12 @@ class _Loop:
             if seen.verdict == "none":
                 state.ended = "no model error found, nothing is ambiguous"
             elif state.success:
-                state.ended = f"named without ambiguity after {number} experiments: {causes}"
+                state.ended = f"named without ambiguity after {several(number, 'experiment')}: {causes}"
             else:
                 state.ended = f"{seen.verdict}, and no experiment is proposed: {causes}"
         elif number >= options.experiments:
             state.ended = (
-                f"the {options.experiments} experiments are used up; still ambiguous: {causes}. "
+                f"none is left of {several(options.experiments, 'experiment')}; still ambiguous: {causes}. "
                 f"Next would be: {following.why}"
             )
         else:

@@ -137,9 +137,10 @@ def test_budget_and_probability(two, designed, controllers, tmp_path: Path, monk
     one = run(replace(FREE, experiments=1))
     assert not one.success
     assert one.ended == (
-        "the 1 experiments are used up; still ambiguous: spring of joint 2. Next would be: two causes fit"
+        "none is left of 1 experiment; still ambiguous: spring of joint 2. Next would be: two causes fit"
     )
     assert "experiment 1, excitation" in one.summary()
+    assert "    1 run, " in one.summary()
     two_ = run(replace(FREE, experiments=2))
     assert (len(two_.experiments), two_.success) == (2, False)
     assert two_.ended == "unexplained, and no experiment is proposed: spring of joint 2"
