@@ -14,6 +14,7 @@ from multiprocessing.synchronize import Event
 from typing import TypeVar
 
 from robots.common.errors import InputError, OedError
+from robots.common.orphans import end_with_parent
 from robots.common.progress import SILENT, Progress
 
 Item = TypeVar("Item")
@@ -265,9 +266,10 @@ def _begin_worker(begun: Event) -> None:
 
 
 def start_worker() -> None:
-    """Prepares a worker process for interrupts."""
+    """Prepares a worker process for interrupts, and for the end of its parent."""
     # A terminal interrupts the whole process group: workers then end at once, without a traceback each.
     signal.signal(signal.SIGINT, signal.SIG_DFL)
+    end_with_parent()
 
 
 def _by_executor(

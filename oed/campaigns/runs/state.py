@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import importlib
 import os
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -13,6 +12,7 @@ from oed.campaigns.state_files import read_state, write_state
 from oed.controllers.recording.clock import ClockAnchor
 from robots.common.errors import InputError
 from robots.common.files import remove_partial_files
+from robots.common.locks import close_locked, lock
 
 RUN, LOCK = "run.json", ".run.lock"
 LOGS = "logs"
@@ -109,7 +109,7 @@ def run_lock(folder: Path, what: str) -> Iterator[None]:
         raise InputError(f"cannot be written to ({reason})", file=folder, remedy="choose another folder") from error
     try:
         try:
-            _lock(number)
+            lock(number)
         except OSError as error:
             raise InputError(
                 f"another program {what} in this folder", file=folder, remedy="wait for its end, or end it"
@@ -117,14 +117,4 @@ def run_lock(folder: Path, what: str) -> Iterator[None]:
         remove_partial_files(folder)
         yield
     finally:
-        os.close(number)
-
-
-def _lock(number: int) -> None:
-    try:
-        import fcntl
-    except ImportError:  # Windows
-        msvcrt = importlib.import_module("msvcrt")
-        msvcrt.locking(number, msvcrt.LK_NBLCK, 1)
-    else:
-        fcntl.flock(number, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        close_locked(number)

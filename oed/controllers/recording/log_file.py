@@ -16,6 +16,7 @@ import numpy as np
 from oed.controllers.errors import RecordingError
 from robots.common.errors import InputError
 from robots.common.files import open_atomic
+from robots.common.locks import close_locked, lock
 from robots.common.tables.ecsv import format_header
 
 EVERY = 0.2
@@ -120,8 +121,7 @@ class FeedbackLog:
         try:
             self.flush()
         finally:
-            os.close(self._file)
-            self._file = None
+            self._shut()
 
     def complete(self, metadata: Mapping[str, Any]) -> None:
         """Replaces the closed file by one that states more in its block; where that fails, it stays as it is.
@@ -143,23 +143,29 @@ class FeedbackLog:
 
     def discard(self) -> None:
         """Removes a file without rows."""
-        if self._file is not None:
-            os.close(self._file)
-            self._file = None
+        self._shut()
         with suppress(OSError):
             self.path.unlink()
+
+    def _shut(self) -> None:
+        if self._file is not None:
+            close_locked(self._file)
+            self._file = None
 
     def _claim(self) -> None:
         """Empties the file, unless another program is recording into it: its lock ends with it, also by a kill."""
         assert self._file is not None
         try:
-            _lock(self._file)
+            # Nobody could read a file that is locked on Windows.
+            if os.name != "nt":
+                lock(self._file)
         except BlockingIOError as error:
-            os.close(self._file)
-            self._file = None
+            self._shut()
             raise InputError(
                 "another program is recording into this file", file=self.path, remedy="choose another name"
             ) from error
+        except OSError:
+            pass  # Some network drives have no locks.
         with suppress(OSError):  # A device cannot be emptied.
             os.ftruncate(self._file, 0)
 
@@ -187,23 +193,6 @@ class FeedbackLog:
             file=self.path,
             remedy="make room on the disk" if error.errno in FULL else "check the disk",
         )
-
-
-def _lock(number: int) -> None:
-    """Locks a file for this program; Windows and some network drives have no such lock.
-
-    Raises:
-        BlockingIOError: another program has locked it.
-    """
-    try:
-        import fcntl
-    except ImportError:
-        return
-    try:
-        fcntl.flock(number, fcntl.LOCK_EX | fcntl.LOCK_NB)
-    except OSError as error:
-        if isinstance(error, BlockingIOError):
-            raise
 
 
 def check_log_path(path: str | PathLike[str], force: bool) -> Path:
