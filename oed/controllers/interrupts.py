@@ -1,13 +1,15 @@
-"""Ctrl-C and the order to terminate: both end a motion in the same way, and neither cuts the stop short."""
+"""Ctrl-C, the order to terminate and a lost terminal: all end a motion in one way, and none cuts the stop short."""
 
 from __future__ import annotations
 
 import signal
 import threading
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 
-SIGNALS = (signal.SIGINT, signal.SIGTERM)
+# Windows has no lost terminals.
+ORDERS = tuple(getattr(signal, name) for name in ("SIGTERM", "SIGHUP") if hasattr(signal, name))
+SIGNALS = (signal.SIGINT, *ORDERS)
 
 
 @contextmanager
@@ -26,19 +28,15 @@ def signals_held() -> Iterator[None]:
         nonlocal came
         came = True
 
-    before = [signal.signal(number, note) for number in SIGNALS]
-    try:
+    with _handled(SIGNALS, note):
         yield
-    finally:
-        for number, handler in zip(SIGNALS, before, strict=True):
-            signal.signal(number, handler)
     if came:
         raise KeyboardInterrupt
 
 
 @contextmanager
 def terminate_as_interrupt() -> Iterator[None]:
-    """Lets an order to terminate raise KeyboardInterrupt, as Ctrl-C does."""
+    """Lets an order to terminate, or a lost terminal, raise KeyboardInterrupt, as Ctrl-C does."""
     if threading.current_thread() is not threading.main_thread():
         yield
         return
@@ -46,8 +44,19 @@ def terminate_as_interrupt() -> Iterator[None]:
     def interrupt(*_: object) -> None:
         raise KeyboardInterrupt
 
-    before = signal.signal(signal.SIGTERM, interrupt)
+    with _handled(ORDERS, interrupt):
+        yield
+
+
+@contextmanager
+def _handled(numbers: Sequence[int], handler: Callable[..., None]) -> Iterator[None]:
+    """Handles signals meanwhile, without those that the program was started to ignore, as by ``nohup``."""
+    before = {number: signal.getsignal(number) for number in numbers}
+    heard = {number: usual for number, usual in before.items() if usual not in (signal.SIG_IGN, None)}
+    for number in heard:
+        signal.signal(number, handler)
     try:
         yield
     finally:
-        signal.signal(signal.SIGTERM, before)
+        for number, usual in heard.items():
+            signal.signal(number, usual)

@@ -133,7 +133,6 @@ def stream(
         failure, ended = error, error.problem
     finally:
         duration = time.monotonic() - begin
-        progress.finish()
         delay = requests.traffic.delay if requests else None
         traffic = requests.traffic if requests else None
         final = {
@@ -148,6 +147,8 @@ def stream(
                 recorder.finish(final)
             except OedError as error:
                 failure = failure or error
+        # The terminal may be lost: the log comes first.
+        progress.finish()
     if failure is not None:
         stop = "" if requests and requests.traffic.stopped else "the controller did not confirm the stop"
         raise with_rows(failure, recorder.rows, log, stop)

@@ -113,12 +113,12 @@ def record(
         failure, ended = error, error.problem
     finally:
         length = time.monotonic() - begin
-        progress.finish()
         with signals_held():
             try:
                 recorder.finish({"complete": ended in ("done", "interrupted"), "ended": ended})
             except OedError as error:
                 failure = failure or error
+        progress.finish()
     if failure is not None:
         raise with_rows(failure, recorder.rows, log)
     if recorder.lowest is not None and recorder.highest is not None:

@@ -32,8 +32,9 @@ def start(*arguments: object) -> subprocess.Popen[str]:
     return subprocess.Popen(words, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
 
 
-def test_interrupted_stream(robot: Path, run, tmp_path: Path) -> None:
-    """Ctrl-C stops the robot and keeps what was recorded; the controller is free for the next client at once."""
+@pytest.mark.parametrize("order", [signal.SIGINT, signal.SIGHUP])
+def test_interrupted_stream(order: signal.Signals, robot: Path, run, tmp_path: Path) -> None:
+    """Ctrl-C or a lost terminal stops the robot and keeps what was recorded; the next client is served at once."""
     described = load_robot(robot)
     write_trajectory(tmp_path / "trajectory.csv", swing(described, 1500))
     options = ControllerOptions(motion_port=0, state_port=0)
@@ -44,15 +45,18 @@ def test_interrupted_stream(robot: Path, run, tmp_path: Path) -> None:
         while not (tmp_path / "log.csv").exists() or (tmp_path / "log.csv").stat().st_size < 20_000:
             assert process.poll() is None
             time.sleep(0.01)
-        process.send_signal(signal.SIGINT)
+        process.send_signal(order)
         _, err = process.communicate(timeout=120)
         assert process.returncode == 130
         assert [line[:4] for line in err.splitlines() if not line.startswith("note")] == ["oed:"]
         assert "the robot was ordered to stop" in err
-        assert not controller.player.moving
-        assert len(read_log(tmp_path / "log.csv", 2)) > 50
+        # Without a stop the controller would have run out of points, which is an error.
+        assert (controller.player.moving, controller.player.error) == (False, 0)
+        recorded = read_log(tmp_path / "log.csv", 2)
+        assert len(recorded) > 50
+        assert recorded.metadata["ended"] == "interrupted"
 
-        second = ["--log", tmp_path / "second.csv", "--duration", 0.3, "--json"]
+        second = ["--log", tmp_path / "second.csv", "--duration", 1.0, "--json"]
         done = run("record", "--robot", robot, *place, *second)
         assert done.code == 0, done.err
         assert done.data["rows"] == len(read_log(tmp_path / "second.csv", 2)) > 20
