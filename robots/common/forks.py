@@ -12,7 +12,8 @@ from itertools import count, repeat
 from typing import Any, TypeVar
 
 from robots.common.memory import give_back
-from robots.common.parallel import available_cores, is_worker, start_worker, threaded
+from robots.common.parallel import available_cores, is_worker, threaded
+from robots.common.workers import start_worker
 
 Item = TypeVar("Item")
 Result = TypeVar("Result")

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import multiprocessing
 import os
-import signal
 from collections.abc import Callable, Generator, Iterable, Iterator, Sequence
 from concurrent.futures import Executor, Future, ProcessPoolExecutor, ThreadPoolExecutor, as_completed
 from concurrent.futures.process import BrokenProcessPool
@@ -14,8 +13,8 @@ from multiprocessing.synchronize import Event
 from typing import TypeVar
 
 from robots.common.errors import InputError, OedError
-from robots.common.orphans import end_with_parent
 from robots.common.progress import SILENT, Progress
+from robots.common.workers import start_worker
 
 Item = TypeVar("Item")
 Result = TypeVar("Result")
@@ -263,13 +262,6 @@ def _require_accident(begun: Event, losses: int) -> None:
 def _begin_worker(begun: Event) -> None:
     start_worker()
     begun.set()
-
-
-def start_worker() -> None:
-    """Prepares a worker process for interrupts, and for the end of its parent."""
-    # A terminal interrupts the whole process group: workers then end at once, without a traceback each.
-    signal.signal(signal.SIGINT, signal.SIG_DFL)
-    end_with_parent()
 
 
 def _by_executor(

@@ -98,3 +98,23 @@ def test_workers_of_a_cluster_do_not_fork(monkeypatch: pytest.MonkeyPatch) -> No
     parallel.mark_as_worker()
     places = set(forked(lambda _: (os.getpid(), threading.get_ident()), range(8)))
     assert places == {(os.getpid(), threading.get_ident())}
+
+
+@linux
+def test_a_worker_ends_by_a_signal_that_this_process_handles() -> None:
+    """An order to terminate ends a worker whose parent would go on; threads do its work."""
+    here = os.getpid()
+
+    def ordered(k: int) -> int:
+        if os.getpid() != here:
+            os.kill(os.getpid(), signal.SIGTERM)
+        return 10 * k
+
+    heard: list[int] = []
+    before = signal.signal(signal.SIGTERM, lambda number, _: heard.append(number))
+    try:
+        assert forked(ordered, range(4)) == [0, 10, 20, 30]
+        assert forked(lambda _: signal.getsignal(signal.SIGTERM) == signal.SIG_DFL, range(4)) == [True] * 4
+    finally:
+        signal.signal(signal.SIGTERM, before)
+    assert heard == []
