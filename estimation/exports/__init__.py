@@ -1,7 +1,7 @@
 """Exports of an identified model: an updated URDF or MJCF, and C code for a controller."""
 
 from estimation.exports.c_code import c_code, export_c
-from estimation.exports.mjcf import build_mjcf, export_mjcf, recorded_ranges
+from estimation.exports.mjcf import build_mjcf, export_mjcf
 from estimation.exports.standard import standard_parameters
 from estimation.exports.urdf import build_urdf, export_urdf, urdf_text
 
@@ -12,7 +12,6 @@ __all__ = [
     "export_c",
     "export_mjcf",
     "export_urdf",
-    "recorded_ranges",
     "standard_parameters",
     "urdf_text",
 ]

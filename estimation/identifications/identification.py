@@ -118,7 +118,10 @@ def identify(
     colour = colour_of(np.sqrt(np.maximum(np.diag(found.covariance), 0.0)), found.white, determined)
     base, rows = found.base, found.rows
     provenance = {**describe_fit(data, chosen, found.choice, joints, seed), "colour": colour}
-    provenance["recorded"] = _recorded(found)
+    motions = [part.motion for part in found.rows]
+    provenance["recorded"] = recorded_ranges(
+        *(np.concatenate([getattr(motion, name) for motion in motions]) for name in ("q", "dq", "ddq"))
+    )
     provenance |= {} if found.prior_share is None else {"prior_share": found.prior_share.tolist()}
     provenance["gravities"] = [list(gravity) for gravity in base.gravities]
     if "standard" in found.solution.extras:
@@ -157,10 +160,8 @@ def usual_speeds(logs: Sequence[Prepared]) -> Array:
     return np.asarray(np.max(found, axis=0))
 
 
-def _recorded(found: Fit) -> dict[str, list[list[float]]]:
-    """Each joint's lowest and highest position, and largest speed and acceleration."""
-    motions = [part.motion for part in found.rows]
-    q, dq, ddq = (np.concatenate([getattr(motion, name) for motion in motions]) for name in ("q", "dq", "ddq"))
+def recorded_ranges(q: Array, dq: Array, ddq: Array) -> dict[str, list[list[float]]]:
+    """Gives each joint's lowest and highest position, and largest speed and acceleration, of rows (N, n)."""
     return {
         "position": [q.min(axis=0).tolist(), q.max(axis=0).tolist()],
         "velocity": [np.abs(dq).max(axis=0).tolist()],

@@ -35,20 +35,21 @@ def band_of_motion(
     if known.get("band95") is None:
         return None
     level = np.broadcast_to(np.asarray(known["band95"], dtype=float), motion.q.shape)
-    if "band_covariance" not in known:
-        return level.copy(), np.zeros(motion.q.shape, dtype=bool)
-    growth, covariance = (np.asarray(known[key], dtype=float) for key in ("band_growth", "band_covariance"))
+    # A diagnosis states no covariance: then only the friction beyond the fitted speeds grows.
+    covariance, growth, reach = (
+        np.asarray(known.get(key, 0.0), dtype=float) for key in ("band_covariance", "band_growth", "band_reach")
+    )
     torque_model, (open_, shape, held) = model.torque_model.under(gravity), np.zeros((3, *motion.q.shape))
     friction = np.array([column.friction for column in model.parameters])
     holding = _slow_friction(model) if rest is not None and rest.any() else None
     for rows in chunks(len(motion)):
         Y = torque_model.regressor(motion.q[rows], motion.dq[rows], motion.ddq[rows], columns=model.columns)
-        open_[rows] = np.sqrt(np.maximum(np.einsum("tjp,tjp->tj", Y @ covariance, Y), 0.0))
+        if covariance.ndim:
+            open_[rows] = np.sqrt(np.maximum(np.einsum("tjp,tjp->tj", Y @ covariance, Y), 0.0))
         torque = Y[:, :, friction] @ model.values[friction]
         shape[rows] = _friction_beyond(model, torque, motion.dq[rows])
         if rest is not None and holding is not None:
             held[rows] = np.where(rest[rows], holding + np.abs(torque), 0.0)
-    reach = np.asarray(known["band_reach"], dtype=float)
     return np.hypot(level, NORMAL_95 * np.hypot(growth * open_, shape)) + held, open_ > reach
 
 

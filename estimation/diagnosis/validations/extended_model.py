@@ -15,6 +15,7 @@ from estimation.diagnosis.validations.decision import Decision, Reason
 from estimation.diagnosis.validations.gear_compliance import EFFECT as ELASTICITY
 from estimation.diagnosis.validations.held_out_validation import ValidatedFindings
 from estimation.diagnosis.validations.prediction_settings import with_band, with_best_cutoff, with_best_sign_sharpness
+from estimation.identifications.identification import recorded_ranges
 from estimation.logs.provenance import describe_logs
 from estimation.models.model import Model
 from robots.version import VERSION
@@ -73,12 +74,14 @@ def fit_extended_model(
 
 
 def _provenance(problem: Problem, prepared: PreparedLogs, false_alarm: float, seed: int) -> dict[str, object]:
-    torque = np.sqrt(np.mean(problem.recording.tau**2, axis=0))
+    recording = problem.recording
+    torque = np.sqrt(np.mean(recording.tau**2, axis=0))
     return {
         "logs": describe_logs(prepared.logs),
         "method": "diagnosis",
         "tool_version": VERSION,
-        "cutoff_hz": float(max(problem.recording.cutoff, *(band.cutoff for band in problem.whitening.bands))),
+        "recorded": recorded_ranges(recording.q, recording.dq, recording.ddq),
+        "cutoff_hz": float(max(recording.cutoff, *(band.cutoff for band in problem.whitening.bands))),
         "velocity_scales": [float(v) for v in problem.situation.velocity_scale],
         "seed": seed,
         "false_alarm": false_alarm,

@@ -1,5 +1,5 @@
 """Identified models as MuJoCo model files (MJCF)."""
 
-from estimation.exports.mjcf.mjcf import Mjcf, build_mjcf, export_mjcf, recorded_ranges
+from estimation.exports.mjcf.mjcf import Mjcf, build_mjcf, export_mjcf
 
-__all__ = ["Mjcf", "build_mjcf", "export_mjcf", "recorded_ranges"]
+__all__ = ["Mjcf", "build_mjcf", "export_mjcf"]

@@ -3,10 +3,8 @@
 from __future__ import annotations
 
 import tempfile
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 from xml.etree import ElementTree
 
 import numpy as np
@@ -20,10 +18,8 @@ from robots.common.files import write_atomic
 from robots.mujoco_models.elements import MujocoNames
 from robots.mujoco_models.files import compile_mjcf, is_mjcf, mujoco_library
 from robots.robot import Robot
-from robots.signals import Log
 from robots.version import VERSION
 
-USUAL = 0.999  # share of the speeds; differences of noisy positions make larger ones
 ROUNDING = 1e-9  # relative; MuJoCo keeps what it reads in double precision
 
 
@@ -46,14 +42,7 @@ class Mjcf:
         return [f"the MJCF states {', '.join(self.stated)}", *(f"  {remark}" for remark in self.remarks)]
 
 
-def export_mjcf(
-    model: Model,
-    path: str | Path,
-    *,
-    robot: Robot | None = None,
-    recorded: Mapping[str, Any] | None = None,
-    force: bool = False,
-) -> Mjcf:
+def export_mjcf(model: Model, path: str | Path, *, robot: Robot | None = None, force: bool = False) -> Mjcf:
     """Writes an MJCF with identified inertials, armature, damping, frictionloss, springs, couplings and payload.
 
     Args:
@@ -61,7 +50,6 @@ def export_mjcf(
         path: the file to write.
         robot: the robot as it was loaded, for its description and limits; the model's own by default, which knows its
             geometry only.
-        recorded: see `build_mjcf`.
         force: whether an existing file may be replaced.
 
     Returns:
@@ -72,48 +60,28 @@ def export_mjcf(
         InfeasibleError: no body that can exist has the identified base parameters.
     """
     path = Path(path)
-    result = build_mjcf(model, robot, folder=path.parent, recorded=recorded)
+    result = build_mjcf(model, robot, folder=path.parent)
     write_atomic(path, result.text, force=force)
     return result
 
 
-def recorded_ranges(logs: Sequence[Log]) -> dict[str, list[list[float]]]:
-    """Gives each joint's lowest and highest position and its usual largest speed, for `build_mjcf`.
-
-    Args:
-        logs: of one robot.
-    """
-    q = np.concatenate([log.q for log in logs])
-    dq = [np.gradient(log.q, log.t, axis=0) if log.dq is None else log.dq for log in logs]
-    fastest = np.nanquantile(np.abs(np.concatenate(dq)), USUAL, axis=0)
-    return {
-        "position": [np.nanmin(q, axis=0).tolist(), np.nanmax(q, axis=0).tolist()],
-        "velocity": [fastest.tolist()],
-    }
-
-
-def build_mjcf(
-    model: Model, robot: Robot | None = None, *, folder: Path | None = None, recorded: Mapping[str, Any] | None = None
-) -> Mjcf:
+def build_mjcf(model: Model, robot: Robot | None = None, *, folder: Path | None = None) -> Mjcf:
     """Gives the MJCF of `export_mjcf` as text.
 
     If the robot came from an MJCF, its file is kept, with its defaults, shapes, actuators and comments; included files
     are put in their place. Only the moving joints and the bodies on them change. Any other robot gets a plain chain.
+    Straight lines approximate friction and springs over the speeds and positions of the model's logs.
 
     Args:
         model: an identified or diagnosed model.
         robot: the robot as it was loaded.
         folder: in which the text will be a file, for paths of meshes; by default that of the robot's file.
-        recorded: lowest and highest ``position`` and largest ``velocity`` of the logs, as an identified model has them
-            in its provenance; over these, straight lines approximate friction and springs.
 
     Raises:
         InputError: no description to complete the base parameters with.
         InfeasibleError: no body that can exist has the identified base parameters.
     """
     known = robot or model.robot
-    if recorded is not None:
-        model = replace(model, provenance={**model.provenance, "recorded": recorded})
     contents = contents_of(model, known)
     source = Path(known.mjcf)
     from_file = bool(known.links) and source.is_file() and is_mjcf(source)

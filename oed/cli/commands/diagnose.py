@@ -250,7 +250,7 @@ def _diagnosis(
     from estimation import on_one_clock, read_logs
     from estimation.diagnosis.experiment_plans.experiment_motions import at_rate
     from estimation.diagnosis.pipeline import diagnose as run
-    from estimation.exports import build_mjcf, build_urdf, recorded_ranges
+    from estimation.exports import build_mjcf, build_urdf
     from oed.exports import write_trajectory
     from oed.reports import save_diagnosis_report
     from robots.common.files import ResultFolder, open_atomic
@@ -291,7 +291,7 @@ def _diagnosis(
             streams[urdf].write(updated.text.encode())
             lines += updated.lines()
         if mjcf is not None:
-            made_of = build_mjcf(result.model, robot, folder=mjcf.parent, recorded=recorded_ranges(both))
+            made_of = build_mjcf(result.model, robot, folder=mjcf.parent)
             streams[mjcf].write(made_of.text.encode())
             lines += made_of.lines()
             data["mjcf"] = {"stated": list(made_of.stated), "remarks": list(made_of.remarks)}

@@ -69,6 +69,19 @@ def test_friction_beyond_the_fitted_speeds_widens_the_band(model: Model) -> None
     assert (half[:, 0] > 0.25).all()
 
 
+@pytest.mark.parametrize("stated", [True, False])
+def test_a_joint_at_rest_has_a_band_of_its_slow_friction(model: Model, stated: bool) -> None:
+    """With or without a covariance: a model of a diagnosis has none."""
+    known = {key: value for key, value in model.provenance.items() if stated or not key.endswith("_covariance")}
+    speeds = np.array([0.0, 0.0, FITTED])
+    rest = np.array([[True, True], [False, False], [False, False]])
+    half, beyond = band_of_motion(replace(model, provenance=known), sweep(speeds), None, rest)
+    slow = np.max([friction(model, share * FITTED) for share in (0.05, 0.1, 0.2)], axis=0)
+    np.testing.assert_allclose(half[0], [0.2, 0.1] + slow, rtol=1e-6)
+    np.testing.assert_allclose(half[1:], np.broadcast_to([0.2, 0.1], (2, 2)))
+    assert not beyond.any()
+
+
 def test_large_ratios_are_written_as_people_do(model: Model) -> None:
     """A hundred times the recorded speed is 100 and not 1e+02."""
     first, *_ = beyond_the_recorded(model, sweep(np.array([0.0, 99.8 * FITTED])))

@@ -127,7 +127,7 @@ def test_a_curved_spring_is_stated_nearly(tmp_path):
     robot = file_of(tmp_path, GANTRY)
     model = made(robot, extensions=[effect("spring", 2, (0.0, 0.0, 3.0), [25.0, 0.0, 6.0, 0.0])])
     recorded = {"position": [[-0.5, -1.0], [0.5, 1.0]], "velocity": [[1.0, 2.0]]}
-    written = build_mjcf(model, robot, recorded=recorded)
+    written = build_mjcf(replace(model, provenance={**model.provenance, "recorded": recorded}), robot)
     swing = next(j for j in ElementTree.fromstring(written.text).iter("joint") if j.get("name") == "swing")
     q = np.linspace(-1.0, 1.0, 50)
     slope = np.polyfit(q, 25 * q + 6 * q**3, 1)[0]
