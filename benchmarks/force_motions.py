@@ -26,6 +26,7 @@ sys.path.insert(0, str(Path(__file__).parent))
 from forces import flange_jacobians, motion_of, plant_of
 from scipy.stats import chi2
 
+from benchmarks.monitoring_parts.stops import held_torque, moves_with_stops
 from estimation import identify
 from estimation.external_forces import ForceEstimate, estimate_forces
 from robots import Log, Motion, Robot, load_robot, simulate
@@ -59,45 +60,16 @@ def periodic(robot: Robot, seed: int, duration: float, *, base: float = 0.05, sp
 
 
 def with_stops(robot: Robot, seed: int, duration: float) -> Motion:
-    """Draws moves with smooth ramps of 0.15 to 0.4 s, a quarter of them of one joint, and stops of 0.2 to 5 s."""
-    rng, t = np.random.default_rng(seed), robot.period * np.arange(round(duration / robot.period))
+    """Draws moves from point to point."""
+    t = robot.period * np.arange(round(duration / robot.period))
     lower, upper = np.maximum(robot.limits.lower, -np.pi), np.minimum(robot.limits.upper, np.pi)
-    here, begin = (lower + upper) / 2, 1.0
-    q, dq, ddq = np.tile(here, (len(t), 1)), np.zeros((len(t), robot.n)), np.zeros((len(t), robot.n))
-    while begin < duration:
-        there = lower + rng.uniform(0.15, 0.85, robot.n) * (upper - lower)
-        if rng.random() < 0.25:
-            there = np.where(np.arange(robot.n) == rng.integers(robot.n), here + 0.3 * (there - here), here)
-        ramp, change = rng.uniform(0.15, 0.4), there - here
-        length = max(2 * ramp, float(np.max(np.abs(change) / robot.limits.velocity)) / rng.uniform(0.3, 0.7) + ramp)
-        after = t >= begin
-        up, down = (_ramp(t[after] - start, ramp) for start in (begin, begin + length - ramp))
-        share, speed, rate = ((a - b) / (length - ramp) for a, b in zip(up, down, strict=True))
-        q[after] = here + share[:, None] * change
-        dq[after], ddq[after] = speed[:, None] * change, rate[:, None] * change
-        begin += length + rng.choice([rng.uniform(0.2, 1.0), rng.uniform(1.0, 5.0)])
-        here = there
-    dq[np.abs(dq) < 1e-9] = 0.0
-    return Motion(t, q, dq, ddq)
-
-
-def _ramp(t: np.ndarray, length: float) -> tuple[np.ndarray, ...]:
-    """Integral, value and derivative of a smooth step from 0 to 1 of that length [s]."""
-    u = np.clip(t / length, 0.0, 1.0)
-    inside = (t > 0.0) & (t < length)
-    area = length * (u**2 / 2 + (np.cos(2 * np.pi * u) - 1) / (4 * np.pi**2)) + np.maximum(t - length, 0.0)
-    return area, u - np.sin(2 * np.pi * u) / (2 * np.pi), np.where(inside, (1 - np.cos(2 * np.pi * u)) / length, 0.0)
+    return Motion(t, *moves_with_stops(t, lower, upper, robot.limits.velocity, np.random.default_rng(seed)))
 
 
 def held(robot: Robot, log: Log, motion: Motion, seed: int) -> Log:
-    """Adds the torque that friction holds while a joint stands: another one at each stop."""
-    rng, tau = np.random.default_rng([seed, 3]), np.array(log.tau)
-    for j, coulomb in enumerate(np.asarray(robot.friction)[:, 0]):
-        still = motion.dq[:, j] == 0.0
-        stops = np.cumsum(np.diff(still.astype(int), prepend=0) == 1)
-        share = rng.uniform(-1.0, 1.0, stops[-1] + 1)
-        tau[:, j] += np.where(still, coulomb * share[stops], 0.0)
-    return replace(log, tau=tau)
+    """Adds the torque that friction holds while a joint stands."""
+    coulomb = np.asarray(robot.friction)[:, 0]
+    return replace(log, tau=log.tau + held_torque(motion.dq, coulomb, np.random.default_rng([seed, 3])))
 
 
 def robot_of(arm: str) -> Robot:

@@ -9,6 +9,7 @@ go to files in FOLDER; a second run goes on where the first one ended. ``table``
   friction of one joint before its first log.
 - healthy: 100 h of heating and cooling without any change.
 - weeks: five days of six 5 min cycles, with mixed causes.
+- stops: the same of other robots, whose logs hold moves from point to point with stops; they were not used for tuning.
 - speed: a stream of 6 joints at 250 Hz, how many times faster than real time it is followed.
 """
 
@@ -52,7 +53,10 @@ STUDIED = {
     "start": ("thermal model", "assumed heat"),
     "healthy": ("thermal model",),
     "weeks": ("thermal model",),
+    "stops": ("thermal model", "assumed heat"),
 }
+# Robots of the study with stops.
+OTHER_ROBOTS = (11, 12, 13)
 
 
 def robot_of(seed: int) -> VirtualRobot:
@@ -84,9 +88,9 @@ def trained(folder: Path, seed: int) -> dict[str, Baseline]:
     return {name: baseline_of(model_from_dict(content), content) for name, content in data.items()}
 
 
-def cycle(robot: VirtualRobot, number: int) -> Log:
-    """A cycle of 5 min. Its first minute is logged."""
-    log = robot.log(LOGGED, number % 2, f"cycle {number}")
+def cycle(robot: VirtualRobot, number: int, motions: Sequence[int] = (0, 1)) -> Log:
+    """A cycle of 5 min with one of the motions. Its first minute is logged."""
+    log = robot.log(LOGGED, motions[number % len(motions)], f"cycle {number}")
     robot.warm_up(CYCLE - LOGGED - REST)
     robot.rest(REST)
     return log
@@ -195,12 +199,13 @@ def healthy(folder: Path, seed: int, hours: float = 100.0) -> dict[str, Any]:
     }
 
 
-def week(folder: Path, number: int) -> dict[str, Any]:
-    """Five days of six cycles with a random cause, or two, or none."""
+def week(folder: Path, number: int, *, stops: bool = False) -> dict[str, Any]:
+    """Five days of six cycles with a random cause, or two, or none. `stops`: logs of moves from point to point."""
     rng = np.random.default_rng([number, 7])
-    seed = ROBOTS[number // 20 % len(ROBOTS)]
+    seed = OTHER_ROBOTS[number % len(OTHER_ROBOTS)] if stops else ROBOTS[number // 20 % len(ROBOTS)]
     models, robot = trained(folder, seed), robot_of(seed)
     robot.rng = np.random.default_rng([seed, number])
+    motions = [robot.add_moves(LOGGED) for _ in range(3)] if stops else [0, 1]
     robot.swing = float(rng.uniform(0.0, 6.0))
     robot.rest(float(rng.uniform(0.2, 1.0)) * DAY)
     begin = robot.clock
@@ -240,11 +245,11 @@ def week(folder: Path, number: int) -> dict[str, Any]:
                 )
             )
     robot.causes = causes
-    monitors = monitors_of(models, "weeks")
+    monitors = monitors_of(models, "stops" if stops else "weeks")
     for _ in range(5):
         start = robot.clock
         for k in range(6):
-            send(list(monitors.values()), cycle(robot, k))
+            send(list(monitors.values()), cycle(robot, k, motions))
         robot.rest(DAY - (robot.clock - start))
     truth = sorted((cause.kind, cause.joint) for cause in causes)
     row: dict[str, Any] = {
@@ -306,8 +311,8 @@ def run(folder: Path, study: str, count: int) -> None:
             row = start(folder, number)
         elif study == "healthy":
             row = healthy(folder, ROBOTS[number % len(ROBOTS)])
-        elif study == "weeks":
-            row = week(folder, number)
+        elif study in ("weeks", "stops"):
+            row = week(folder, number, stops=study == "stops")
         else:
             row = speed(folder)
         row = {"key": str(number), "seconds": time.perf_counter() - began, **row}
@@ -323,7 +328,7 @@ def main() -> int:
         return 2
     folder, study = Path(sys.argv[1]), sys.argv[2] if len(sys.argv) > 2 else "table"
     folder.mkdir(parents=True, exist_ok=True)
-    counts = {"thesis": 6, "night": 6, "start": 100, "healthy": 1, "weeks": 200, "speed": 1}
+    counts = {"thesis": 6, "night": 6, "start": 100, "healthy": 1, "weeks": 200, "stops": 60, "speed": 1}
     if study == "table":
         print_table(folder, list(VARIANTS), cycle=CYCLE, damage=DAMAGE)
         return 0

@@ -19,7 +19,7 @@ def print_table(folder: Path, variants: Iterable[str], *, cycle: float, damage: 
         cycle: within which a damage is to be named [s].
         damage: its size, as a share.
     """
-    for study in ("thesis", "night", "start", "healthy", "weeks", "speed"):
+    for study in ("thesis", "night", "start", "healthy", "weeks", "stops", "speed"):
         file = folder / f"{study}.jsonl"
         rows = [json.loads(line) for line in file.read_text().splitlines()] if file.exists() else []
         if not rows:
@@ -59,7 +59,7 @@ def print_table(folder: Path, variants: Iterable[str], *, cycle: float, damage: 
             elif study == "healthy":
                 hours, motion = sum(row["hours"] for row in rows), sum(row["motion"] for row in rows)
                 print(f"  {name:14} {sum(map(len, found))} false alarms in {hours:.0f} h, {motion:.1f} h of it logged")
-            elif study == "weeks":
+            elif study in ("weeks", "stops"):
                 right = sum(f["right"] for f in found)
                 low, high = beta.ppf([0.025, 0.975], [right, right + 1], [len(found) - right + 1, len(found) - right])
                 by = {row["kind"]: [0, 0] for row in rows}

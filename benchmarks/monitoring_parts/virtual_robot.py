@@ -12,6 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 import pinocchio as pin
 
+from benchmarks.monitoring_parts.stops import held_torque, moves_with_stops
 from oed.benchmarks.truth.dynamics import massless, point_force_torque, rigid_torque, with_tool
 from oed.benchmarks.truth.machines import Machine, draw_machine
 from oed.benchmarks.truth.noise import Noise, draw_noise
@@ -49,7 +50,7 @@ class Cause:
 
 
 class VirtualRobot:
-    """One robot that repeats motions of 10 s.
+    """One robot that repeats motions of 10 s, or moves with stops.
 
     Args:
         seed: of robot, motion, noise and heat.
@@ -80,8 +81,14 @@ class VirtualRobot:
     def add_motion(self, reference: Reference | None = None) -> int:
         """Draws another motion, and returns its number."""
         reference = reference or draw_periodic(self.machine, self.rng, period=PERIOD, cycles=1)
-        t = np.arange(round(PERIOD / STEP)) * STEP
-        q, v, a = reference.at(t)
+        return self._added(*reference.at(np.arange(round(PERIOD / STEP)) * STEP))
+
+    def add_moves(self, seconds: float) -> int:
+        """Draws moves from point to point with stops, and returns the number of this motion."""
+        m, t = self.machine, np.arange(round(seconds / STEP)) * STEP
+        return self._added(*moves_with_stops(t, m.lower, m.upper, m.speed, self.rng))
+
+    def _added(self, q: np.ndarray, v: np.ndarray, a: np.ndarray) -> int:
         m = self.machine
         rigid = rigid_torque(m.model, q, v, a) + m.rotor * a + m.offset
         self.motions.append((q, v, a, rigid, np.tanh(v / m.sign_width)))
@@ -154,6 +161,8 @@ class VirtualRobot:
         if not record:
             return None
         t, index, clean = np.concatenate(times), np.concatenate(places), np.concatenate(torques)
+        if (v == 0.0).any():
+            clean = clean + held_torque(v[index], self.machine.friction[:, 0] * self.factors(start)[0], self.rng)
         size = np.sqrt((rigid**2).mean(axis=0) + (c**2).mean(axis=0))
         clean = clean + self._extra(t, index, motion)
         return t, self.noise.position(q[index]), clean + self.noise.torque(len(t), size, self.rng)

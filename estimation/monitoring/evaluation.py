@@ -34,6 +34,8 @@ UNSURE = 0.25
 STEP_TESTS = 30
 # Windows in a row with a short force that are no short force any more.
 LASTING = 3
+# Longest time [s] that a short force goes on after its middle.
+LONGEST = 1.0
 # A short force with more than this share of its chi-square in one of the next three windows is none.
 AGAIN = 0.25
 
@@ -115,7 +117,9 @@ class Evaluation:
         burst = self.bursts.update(window.burst)
         self.bursts_in_row = self.bursts_in_row + 1 if burst else 0
         short = burst and self.bursts_in_row < LASTING
-        self._observe(window, len(logs) - 1, skip=short)
+        # What a force at the end of the last window leaves in this one belongs to that force.
+        ends = any(start - force[1] < LONGEST for force in self.forces)
+        self._observe(window, len(logs) - 1, skip=short or ends)
         # What comes again in the next cycles is an error of the model on this motion.
         self.forces = [force for force in self.forces if window.burst < AGAIN * force[4]]
         # A motion on which the model errs more fills the window with error. A short force stands above it.
@@ -215,15 +219,11 @@ class Evaluation:
     def _settle(self, logs: Sequence[str]) -> None:
         if self.event is not None and self.event.windows >= self.settings.confirm:
             self.conclude(logs)
-        if self.event is None and self.forces:
-            kept = []
-            for force in self.forces:
-                # Two windows without an alarm after it: what acted is over.
-                if self.end is not None and self.end - force[0] > 3.5 * self.settings.window:
-                    self.findings.append(contact_finding(force, logs))
-                else:
-                    kept.append(force)
-            self.forces = kept
+        if self.event is None and self.end is not None:
+            # Two windows without an alarm after it: what acted is over.
+            over = [force for force in self.forces if self.end - force[0] > 3.5 * self.settings.window]
+            self.findings += [contact_finding(force, logs) for force in over]
+            self.forces = [force for force in self.forces if force not in over]
 
     def unsettled(self, logs: Sequence[str]) -> tuple[Finding, ...]:
         """Short forces in the newest windows: later ones show whether a lasting change began with them."""

@@ -58,16 +58,17 @@ def test_payload_is_not_damage(arm, monitor):
     assert "x 0.0" in found.text or "x -0.0" in found.text
 
 
-def test_contact_is_short(arm, monitor):
-    """A force of half a second is a contact, and nothing lasting."""
+@pytest.mark.parametrize(("begin", "length", "size"), [(335.2, 0.5, 1.0), (339.45, 1.0, 20.0)])
+def test_contact_is_short(arm, monitor, begin, length, size):
+    """A short force is a contact, and nothing lasting; also one that ends in the next window of 10 s."""
 
     def push(t, index):
-        s = np.clip((t - 335.2) / 0.5, 0.0, 1.0)
-        return np.sin(np.pi * s)[:, None] * np.array([0, 15.0, 10.0, 0, 3.0, 0])
+        s = np.clip((t - begin) / length, 0.0, 1.0)
+        return size * np.sin(np.pi * s)[:, None] * np.array([0, 15.0, 10.0, 0, 3.0, 0])
 
     (found,) = send(monitor, [arm.log(300.0 * k, extra=push) for k in range(3)])
     assert found.kind == "contact"
-    assert found.earliest <= 335.45 <= found.latest
+    assert found.earliest <= begin + length / 2 <= found.latest
     assert found.severity == "watch"
 
 
