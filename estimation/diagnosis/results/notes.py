@@ -21,8 +21,8 @@ from estimation.diagnosis.findings import Finding
 from estimation.diagnosis.hypothesis_tests.fitted_effects import FittedEffect
 from estimation.diagnosis.hypothesis_tests.problem import Problem
 from estimation.diagnosis.recordings.recording import cut_recording
-from estimation.diagnosis.validations.changes import Change, ChangedFinding
 from estimation.diagnosis.validations.held_out_errors import HeldOutResult
+from estimation.diagnosis.validations.validated_findings import Change, ChangedFinding
 from robots.terms.base import force_unit
 from robots.terms.discrepancies.patterns import PREFIX
 from robots.terms.effects import EFFECTS

@@ -31,10 +31,10 @@ from estimation.diagnosis.validations.decision import Decision, Reason
 from estimation.diagnosis.validations.extended_model import ExtendedModel
 from estimation.diagnosis.validations.gain_intervals import HeldOutErrors
 from estimation.diagnosis.validations.gear_compliance import MeasuredCompliance
-from estimation.diagnosis.validations.held_out_validation import ValidatedFindings
 from estimation.diagnosis.validations.name_comparison import ComparedNames
 from estimation.diagnosis.validations.prediction_settings import all_row_errors
 from estimation.diagnosis.validations.residual_shares import residual_shares
+from estimation.diagnosis.validations.validated_findings import ValidatedFindings
 from robots.robot import Robot
 
 Array = NDArray[np.float64]

@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from enum import Enum
 
-from estimation.diagnosis.validations.held_out_validation import ValidatedFindings
 from estimation.diagnosis.validations.name_comparison import has_close_rivals
+from estimation.diagnosis.validations.validated_findings import ValidatedFindings
 
 
 class Reason(Enum):

@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
-
-import numpy as np
+from dataclasses import replace
 
 from estimation.diagnosis.calibration import (
     CLOSE_RIVAL_BIC,
@@ -26,39 +24,12 @@ from estimation.diagnosis.findings import Gain
 from estimation.diagnosis.hypothesis_tests.fitted_effects import FittedEffect
 from estimation.diagnosis.hypothesis_tests.hypotheses import Hypothesis
 from estimation.diagnosis.searches.selection import SelectedEffect
-from estimation.diagnosis.validations.changes import Change, ChangedFinding
-from estimation.diagnosis.validations.gear_compliance import MeasuredCompliance
 from estimation.diagnosis.validations.held_out_errors import HeldOutResult
 from estimation.diagnosis.validations.name_comparison import ComparedNames
+from estimation.diagnosis.validations.validated_findings import Change, ChangedFinding, ValidatedFindings
 from robots.terms.discrepancies.patterns import PREFIX, is_of_time, is_oscillation
 from robots.terms.effect_bases.capabilities import Persistence
 from robots.terms.effects import Effect
-
-
-@dataclass(frozen=True, eq=False)
-class ValidatedFindings:
-    """Findings after validation.
-
-    Attributes:
-        findings: accepted named effects.
-        effects: fits of the named effects, followed by free functions.
-        p_values: p-values of `effects`.
-        measured: held-out results of `effects`.
-        rejected_discrepancies: free functions rejected by held-out data, with p-value and gain.
-        changes: rejected and replaced effects.
-        refuted: significant named effects that held-out data contradict, with p-value and gain. The residual they
-            explained is still significant.
-        compliances: measured compliances of gears with link encoders.
-    """
-
-    findings: tuple[SelectedEffect, ...]
-    effects: tuple[FittedEffect, ...]
-    p_values: tuple[float, ...]
-    measured: HeldOutResult
-    rejected_discrepancies: tuple[tuple[FittedEffect, float, Gain], ...]
-    changes: tuple[ChangedFinding, ...]
-    refuted: tuple[tuple[FittedEffect, float, Gain], ...]
-    compliances: tuple[MeasuredCompliance, ...] = ()
 
 
 def validate_on_held_out(
@@ -66,6 +37,7 @@ def validate_on_held_out(
     measure: Callable[[Sequence[FittedEffect], frozenset[int]], HeldOutResult],
     beyond: Callable[[FittedEffect], bool],
     forms: Callable[[Sequence[FittedEffect], int], Sequence[FittedEffect]],
+    again: Callable[[Sequence[FittedEffect], int], FittedEffect],
     unnamed: Callable[[FittedEffect, Sequence[FittedEffect]], tuple[FittedEffect, float] | None],
 ) -> ValidatedFindings:
     """Rejects effects that increase the held-out error, one after the other, the most certain first.
@@ -78,6 +50,7 @@ def validate_on_held_out(
         measure: measures members on held-out data; the second argument contains indices of members absent there.
         beyond: whether held-out data cannot test an effect.
         forms: lists equivalent shapes of one of the members, the most likely first.
+        again: refines one of the members beside the others.
         unnamed: finds a free function for the residual of a rejected effect beside other members, and its p-value;
             None if none is significant.
 
@@ -105,7 +78,7 @@ def validate_on_held_out(
         seen = measure_members(members)
     while harmful := (
         [i for i, m in enumerate(members) if m.hypothesis not in cooling_explains and _is_harmful(seen, i, m, beyond)]
-        or _harmful_free_functions(seen, members, len(selected))
+        or _harmful_together(seen, members, len(selected), beyond)
     ):
         worst = min(harmful, key=lambda i: seen.gains[i].ci95[1])
         own = members[worst].hypothesis
@@ -121,7 +94,7 @@ def validate_on_held_out(
             seen = undone
             changes.append(ChangedFinding(Change.ABSENT, own))
             continue
-        elif instead := _alternative(selected[worst], worst, members, measure_members, beyond, forms):
+        elif instead := _alternative(selected, worst, members, measure_members, beyond, forms):
             selected[worst], seen = instead
             members[worst] = selected[worst].effect
             if members[worst].hypothesis != own:
@@ -135,6 +108,14 @@ def validate_on_held_out(
             rejected = members.pop(worst)
             refuted.append((rejected, p_values.pop(worst), seen.gains[worst]))
             changes.append(ChangedFinding(Change.REJECTED, own))
+            # Effects of the same joint may have been significant only because they compensated the rejected one.
+            for i in [i for i, found in enumerate(selected) if found.effect.hypothesis.joint == own.joint][::-1]:
+                members[i] = again(members, i)
+                selected[i] = replace(selected[i], effect=members[i])
+                if members[i].local_bic_gain <= MIN_BIC_GAIN:
+                    changes.append(ChangedFinding(Change.INSIGNIFICANT, members[i].hypothesis))
+                    for items in (selected, members, p_values):
+                        items.pop(i)
             if (free := unnamed(rejected, members)) is not None:
                 members.append(free[0])
                 p_values.append(free[1])
@@ -177,7 +158,7 @@ def _without_change(
 
 
 def _alternative(
-    found: SelectedEffect,
+    selected: Sequence[SelectedEffect],
     place: int,
     members: Sequence[FittedEffect],
     measure: Callable[[Sequence[FittedEffect]], HeldOutResult],
@@ -188,31 +169,46 @@ def _alternative(
 
     If there is none, an equivalent shape that does not increase the held-out error is returned.
     """
+
+    def measured(one: FittedEffect) -> HeldOutResult | None:
+        """Measures with another member in place of the rejected one; None if that is harmful, too."""
+        instead = [*members[:place], one, *members[place + 1 :]]
+        seen = measure(instead)
+        together = _harmful_together(seen, instead, len(selected), beyond)
+        return None if place in together or _is_harmful(seen, place, one, beyond) else seen
+
+    found = selected[place]
     harmless: list[tuple[SelectedEffect, HeldOutResult]] = []
     for form in forms(members, place):
-        seen = measure([*members[:place], form, *members[place + 1 :]])
-        if not _is_harmful(seen, place, form, beyond):
+        if (seen := measured(form)) is not None:
             harmless.append((SelectedEffect(form, found.p_value, found.rivals), seen))
             if seen.gains[place].ci95[0] > 0:
                 return harmless[-1]
     close = [(rival, worse) for rival, worse in found.rivals if worse < CLOSE_RIVAL_BIC]
     for k, (rival, worse) in enumerate(close):
-        seen = measure([*members[:place], rival, *members[place + 1 :]])
-        if not _is_harmful(seen, place, rival, beyond) and seen.gains[place].ci95[0] > 0:
+        if (seen := measured(rival)) is not None and seen.gains[place].ci95[0] > 0:
             rest = tuple((other, more - worse) for other, more in close[k + 1 :])
             return SelectedEffect(rival, found.p_value, rest), seen
     return harmless[0] if harmless else None
 
 
-def _harmful_free_functions(seen: HeldOutResult, members: Sequence[FittedEffect], named: int) -> list[int]:
-    """Lists free functions without significant gain on joints whose error the free functions increase together.
+def _harmful_together(
+    seen: HeldOutResult, members: Sequence[FittedEffect], named: int, beyond: Callable[[FittedEffect], bool]
+) -> list[int]:
+    """Lists members without significant gain on joints whose error the members increase together.
 
     Each may reduce the error beside the others, because it compensates their errors.
     """
     before, after = seen.errors.nrmse(0), seen.errors.nrmse(-1)
-    worse = set((np.flatnonzero(after > MAX_FREE_RMSE_RATIO * before) + 1).tolist())
-    free = range(named, len(members)) if len(members) > 1 else ()
-    return [i for i in free if seen.gains[i].ci95[0] <= 0 and (members[i].hypothesis.joint or 0) in worse]
+    listed = []
+    for i, member in enumerate(members if len(members) > 1 else ()):
+        joint = member.hypothesis.joint
+        if joint is None or seen.gains[i].ci95[0] > 0 or (i < named and beyond(member)):
+            continue
+        limit = MAX_RMSE_RATIO if i < named else MAX_FREE_RMSE_RATIO
+        if after[joint - 1] > limit * before[joint - 1]:
+            listed.append(i)
+    return listed
 
 
 def _is_weak(free: Effect, p_value: float) -> bool:

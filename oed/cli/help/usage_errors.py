@@ -15,6 +15,7 @@ UsageError: type[Exception] = typer.BadParameter.__mro__[1]
 CommandLineError: type[Exception] = typer.BadParameter.__mro__[2]
 
 _COMMAND = re.compile(r"No such command '([^']*)'")
+_EXTRA = re.compile(r"Got unexpected extra argument\S* \((.*)\)")
 _NAME = re.compile(r"[A-Za-z][\w-]*")
 _LAST_NAME = re.compile(r"(?:'|^--[\w-]+ )([A-Za-z][\w-]*)'?$")
 _OPTION = re.compile(r"'(--?[\w-]+(?: / -\w)?)'")
@@ -44,6 +45,10 @@ def _problem(error: Any, context: Any) -> str:
     if command is not None:
         known = [] if context is None else list(context.command.commands)
         return f"no command {command[1]}" + (_nearest(command[1], known) or f"; allowed: {', '.join(known)}")
+    extra = _EXTRA.match(str(error.message))
+    if extra is not None and context is not None:
+        logs = any("--log" in p.opts for p in context.command.get_params(context))
+        return f"unexpected {extra[1]}" + ("; logs are given by --log" if logs else "")
     return str(error.format_message())
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import partial
 from types import SimpleNamespace
 
@@ -14,8 +14,9 @@ from estimation.diagnosis.hypothesis_tests.evidence import Evidence
 from estimation.diagnosis.hypothesis_tests.fitted_effects import FittedEffect
 from estimation.diagnosis.hypothesis_tests.hypotheses import Hypothesis
 from estimation.diagnosis.searches.selection import SelectedEffect
-from estimation.diagnosis.validations.held_out_validation import ValidatedFindings, validate_on_held_out
+from estimation.diagnosis.validations.held_out_validation import validate_on_held_out
 from estimation.diagnosis.validations.name_comparison import ComparedNames
+from estimation.diagnosis.validations.validated_findings import ValidatedFindings
 from robots.terms.discrepancies.patterns import build_pattern
 from robots.terms.effect_bases.capabilities import Persistence
 from robots.terms.effects import EFFECTS
@@ -123,14 +124,25 @@ def validated(
     faint: Sequence[FittedEffect] = (),
     worths: Mapping[FittedEffect, float] | None = None,
     unnamed: tuple[FittedEffect, float] | None = None,
+    alone: Mapping[FittedEffect, float] | None = None,
 ) -> ValidatedFindings:
-    """Validates named effects and free functions on the held-out results of a bench."""
+    """Validates named effects and free functions on the held-out results of a bench.
+
+    `alone`: BIC gains of effects after an effect of the same joint was rejected.
+    """
     compared = ComparedNames(founds, tuple(free), tuple(p_values), 1.0)
     for found in founds:
         for member in (found.effect, *(rival for rival, _ in found.rivals)):
             worth = (worths or {}).get(member, 1.0 if member in faint else 100.0)
             # Nothing was fitted, so the cached evidence is set directly.
             vars(member)["local_evidence"] = Evidence(worth, 0, 1.0)
+
+    def again(members: Sequence[FittedEffect], i: int) -> FittedEffect:
+        if members[i] not in (alone or {}):
+            return members[i]
+        refined = replace(members[i])
+        vars(refined)["local_evidence"] = Evidence((alone or {})[members[i]], 0, 1.0)
+        return refined
 
     def beyond(member: FittedEffect) -> bool:
         return held_out and member.hypothesis.effect.persistence is Persistence.TRANSIENT
@@ -140,5 +152,6 @@ def validated(
         bench,  # type: ignore[arg-type]
         beyond,
         lambda members, i: forms if members[i] is SPRING else (),
+        again,
         lambda member, beside: None if member in beside else unnamed,
     )

@@ -123,6 +123,7 @@ def test_usage(arguments: tuple, run, tmp_path: Path, monkeypatch: pytest.Monkey
         (("identify", "--robbot", "er3a"), "no option --robbot; did you mean --robot?; see `oed identify --help`"),
         (("identify", "--lgo", "x"), "no option --lgo; did you mean --log?"),
         (("predict", "--model", "x", "--xyz"), "no option --xyz; see `oed predict --help`"),
+        (("diagnose", "--robot", "er3a", "a.csv"), "unexpected a.csv; logs are given by --log; see"),
         (("design",), "missing option --robot; see `oed design --help`"),
         (("design", "--seed", "x", "--robot", "er3a"), "invalid value for --seed: "),
         (("simulate",), "give either --trajectory or --campaign; see `oed simulate --help`"),

@@ -265,6 +265,19 @@ def test_free_functions_that_harm_together_are_left_out_until_they_do_not(extra:
     assert [member for member, *_ in result.rejected_discrepancies] == ([] if kept == 2 else [FREE])
 
 
+@pytest.mark.parametrize(("extra", "worth", "kept"), [(0.0, 100.0, 2), (0.005, 100.0, 1), (0.005, 1.0, 0)])
+def test_effects_of_a_joint_that_harm_together_do_not_stay(extra: float, worth: float, kept: int) -> None:
+    """If effects of a joint increase its error together, one without gain goes. What it only compensated goes, too."""
+    bench = bench_with(presliding_hysteresis=Shown(-0.002, 0.003, 0.96), stribeck=Shown(0.0001, 0.002, 0.92))
+    bench.extra[2] = extra
+    founds = SelectedEffect(PRESLIDING, 1e-5, ()), SelectedEffect(STRIBECK, 1e-4, ())
+    result = validated(bench, *founds, alone={STRIBECK: worth})
+    names = [member.hypothesis.effect.name for member in result.effects]
+    assert names == ["presliding_hysteresis", "stribeck"][2 - kept :]
+    assert [member for member, *_ in result.refuted] == ([] if kept == 2 else [PRESLIDING])
+    assert len(result.changes) == 2 - kept
+
+
 def test_what_errs_on_all_joints_is_reported_of_the_whole_robot() -> None:
     """A rejected function of all joints is reported for the whole robot."""
     result = validated(bench_with(swinging=HARMS), free=[SWING], p_values=[1e-10])
