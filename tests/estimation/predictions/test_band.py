@@ -77,7 +77,7 @@ def test_a_joint_at_rest_has_a_band_of_its_slow_friction(model: Model, stated: b
     rest = np.array([[True, True], [False, False], [False, False]])
     half, beyond = band_of_motion(replace(model, provenance=known), sweep(speeds), None, rest)
     slow = np.max([friction(model, share * FITTED) for share in (0.05, 0.1, 0.2)], axis=0)
-    np.testing.assert_allclose(half[0], [0.2, 0.1] + slow, rtol=1e-6)
+    np.testing.assert_allclose(half[0], np.add([0.2, 0.1], slow), rtol=1e-6)
     np.testing.assert_allclose(half[1:], np.broadcast_to([0.2, 0.1], (2, 2)))
     assert not beyond.any()
 
