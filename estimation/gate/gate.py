@@ -22,6 +22,7 @@ UNITS = ("unit_of_time", "unit_of_position", "motor_side_position")
 CAUSES = (
     "coupled_axes",
     "gravity_direction",
+    "other_robot",
     "static_poses",
     "swapped_columns",
     "torque_meaning",
@@ -29,7 +30,7 @@ CAUSES = (
     "unit_of_time",
     "wrapped_angle",
 )
-FITTED = ("gravity_direction", "swapped_columns")
+FITTED = ("gravity_direction", "other_robot", "swapped_columns")
 CONSEQUENCES = (
     "badly_excited",
     "beyond_limits",

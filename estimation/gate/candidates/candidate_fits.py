@@ -51,6 +51,11 @@ class Meaning:
     coupled_torques: bool = False
 
 
+def mean_log(unexplained: Array) -> float:
+    """Gives the mean log of held-out errors (n,); no joint counts worse than a constant."""
+    return float(np.nanmean(np.log(np.clip(unexplained, 1e-9, 1.0))))
+
+
 class CandidateFits:
     """Held-out errors of the fit of all joints together, under other meanings of the log."""
 
@@ -66,14 +71,12 @@ class CandidateFits:
             meaning: of the log.
             few: on few rows with one ridge, for a first choice.
         """
-        rows = self._meant(meaning, FEW_ROWS if few else CHOICE_ROWS)
-        # Torques of coupled axes count by the spread of the logged ones: the same numbers are compared.
-        spread = self._spread if meaning.tau_from is None else self._spread[meaning.tau_from]
-        spread = spread if meaning.tau_factor is None else spread * np.abs(meaning.tau_factor)
-        joints = np.flatnonzero(spread > 0)
-        moments = rows.moments(joints, raw=True)
-        unexplained = fit_all(moments, spread, (RIDGE,) if few else RIDGES).unexplained[joints]
-        return float(np.mean(np.log(np.clip(unexplained, 1e-9, 1.0))))
+        most, ridges = (FEW_ROWS, (RIDGE,)) if few else (CHOICE_ROWS, RIDGES)
+        return mean_log(self._errors(meaning, most, ridges))
+
+    def unexplained(self, meaning: Meaning) -> Array:
+        """Gives the held-out error of each joint (n,), without rows at rest; NaN without a fit."""
+        return self._errors(meaning, CHOICE_ROWS, RIDGES, moving=True)
 
     def described_gravity(self) -> Array | None:
         """Estimates gravity (3,) [m/s2] from the described links, with free friction, offset and rotor inertia.
@@ -116,6 +119,14 @@ class CandidateFits:
             options=options,
         )
         return direction(found.x)
+
+    def _errors(self, meaning: Meaning, most: int, ridges: tuple[float, ...], *, moving: bool = False) -> Array:
+        rows = self._meant(meaning, most)
+        # Torques of coupled axes count by the spread of the logged ones: the same numbers are compared.
+        spread = self._spread if meaning.tau_from is None else self._spread[meaning.tau_from]
+        spread = spread if meaning.tau_factor is None else spread * np.abs(meaning.tau_factor)
+        moments = rows.moments(np.flatnonzero(spread > 0), raw=True, moving=moving)
+        return fit_all(moments, spread, ridges).unexplained
 
     def _meant(self, meaning: Meaning, most: int) -> Rows:
         rows = self._moved(meaning, most)

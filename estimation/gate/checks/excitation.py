@@ -7,14 +7,12 @@ from typing import ClassVar
 from estimation.gate.check import Check
 from estimation.gate.context import Context, Stage
 from estimation.gate.finding import Finding
-from estimation.gate.quick_fits.whole_fit import HOPELESS
+from estimation.gate.quick_fits.whole_fit import HOPELESS, POOR
 from robots.robot import Robot
 
 # A joint is badly excited if its held-out error over the torque's standard deviation is above the first and none of its
 # parameters differs from zero by so many standard errors.
 WEAK, FAINTLY = 0.7, 10.0
-# Held-out error over the torque's standard deviation from which a joint is poorly explained.
-POOR = 0.3
 
 
 class Excitation(Check):

@@ -8,13 +8,16 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from estimation.gate.candidates.candidate_fits import STANDARD, CandidateFits, Meaning
+from estimation.gate.candidates.any_arm import any_arm
+from estimation.gate.candidates.candidate_fits import STANDARD, CandidateFits, Meaning, mean_log
 from estimation.gate.candidates.causes import Cause, coupled, gravities, signs, units
 from estimation.gate.candidates.torque_evidence import joint_evidence
 from estimation.gate.candidates.torque_hypotheses import hypotheses
 from estimation.gate.check import Check
 from estimation.gate.context import Context, Stage
 from estimation.gate.finding import Finding
+from estimation.gate.quick_fits.whole_fit import POOR
+from robots.common.plain import joints_in_words, percent, two_digits
 from robots.robot import Robot
 
 Array = NDArray[np.float64]
@@ -30,6 +33,9 @@ FOLLOWED, SNAP = 0.01, 0.02
 # Decrease of the held-out error (mean log), for a warning and for a refusal, and that by other columns or units.
 # Right simulated logs, with descriptions that are 20 % off, stay below 0.05, and measured ones below 0.35.
 BETTER, CERTAIN, OTHER_COLUMNS = 0.15, 0.4, 0.4
+# A log is of another robot if so many joints, one of them poorly explained, have less than this share of their error
+# with a model of any arm.
+JOINTS, HALF = 2, 0.5
 # Findings that explain a bad fit already.
 EXPLAINED = ("motor_side_position", "static_poses", "unit_of_position", "unit_of_time", "wrapped_angle")
 
@@ -60,13 +66,47 @@ class LikelyCauses(Check):
             causes += _sizes(context) + coupled(context.robot, bad)
             causes += [_ordered(fits, before, bad), *units(context.robot, bad), *signs(context.robot, bad)]
         found = _best(fits, causes, before)
-        if found is None:
+        if found is not None:
+            found = _refined(fits, *found)
+        best = Meaning() if found is None else found[0].meaning
+        left = np.minimum(fits.unexplained(best), 1.0)
+        if (other := _other_robot(context, best, left)) is not None:
+            return [other]
+        if found is None or found[0].kind in ("sign", "size"):
             return []
         cause, after = found
-        cause, after = _refined(fits, cause, after)
-        if cause.kind in ("sign", "size"):
-            return []
-        return [_finding(context, cause, before - after, float(np.exp(after)))]
+        return [_finding(context, cause, before - after)]
+
+
+def _other_robot(context: Context, best: Meaning, left: Array) -> Finding | None:
+    """Names a log that the best meaning does not explain, but any other arm does.
+
+    A single joint may have an effect of its position, as a spring, that the robot's model lacks and that of any arm
+    has. It is no other robot.
+    """
+    if not (left >= POOR).any():
+        return None
+    other = np.minimum(any_arm(context.fitted), 1.0)
+    other = other if best.tau_from is None else other[best.tau_from]
+    wrong = np.flatnonzero(other < HALF * left)
+    better = mean_log(left) - mean_log(other)
+    if len(wrong) < JOINTS or not (left[wrong] >= POOR).any() or better < BETTER:
+        return None
+    shares = [_range(errors[wrong]) for errors in (left, other)]
+    return Finding(
+        name="other_robot",
+        severity="refuse" if better > CERTAIN else "warning",
+        text="the log does not fit this robot's description, and may be of another robot: it leaves "
+        f"{shares[0]} of the torques of {joints_in_words(wrong + 1)} unexplained, a model of any arm {shares[1]}",
+        action="check --robot, and the axes and zeros of the joints in its description; no other order, sign, unit or "
+        "gravity that was tried explains the log",
+        value=100 * float(1 - np.exp(-better)),
+        unit="%",
+    )
+
+
+def _range(shares: Array) -> str:
+    return f"{two_digits(100 * shares.min())} to {percent(shares.max())}"
 
 
 def _ordered(fits: CandidateFits, before: float, bad: list[int]) -> Cause:
@@ -154,7 +194,7 @@ def _refined(fits: CandidateFits, cause: Cause, after: float) -> tuple[Cause, fl
     return Cause("gravity", Meaning(gravity=refined)), cost
 
 
-def _finding(context: Context, cause: Cause, better: float, error: float) -> Finding:
+def _finding(context: Context, cause: Cause, better: float) -> Finding:
     smaller = 100 * float(1 - np.exp(-better))
     severity = "refuse" if better > CERTAIN else "warning"
     if cause.kind == "gravity":

@@ -30,6 +30,7 @@ EXPLAINED = (
     "delay",
     "gravity_direction",
     "motor_side_position",
+    "other_robot",
     "static_poses",
     "swapped_columns",
     "torque_meaning",

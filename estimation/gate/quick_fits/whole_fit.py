@@ -22,6 +22,8 @@ LOWER = 1e-3
 # A joint is not identified if its held-out error is above this share of the torque's standard deviation: hardly better
 # than a constant.
 HOPELESS = 0.9
+# The same, from which a joint is poorly explained.
+POOR = 0.3
 
 
 @dataclass(frozen=True, eq=False)
