@@ -39,6 +39,7 @@ class Context:
         recorded: the log with all its rows.
         cleaned: the log without the rows that a fit leaves out.
         findings: of the checks so far, in their order.
+        explained: joints, from 1, that fit badly as logged, but not under the likeliest other meaning of the log.
     """
 
     def __init__(self, robot: Robot, log: Log) -> None:
@@ -46,6 +47,7 @@ class Context:
         self.recorded = Recorded(robot, log)
         self.cleaned = Cleaned(self.recorded)
         self.findings: list[Finding] = []
+        self.explained: frozenset[int] = frozenset()
 
     @cached_property
     def smoothed(self) -> Smoothed:

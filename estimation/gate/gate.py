@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -39,9 +40,12 @@ CONSEQUENCES = (
     "negative_friction",
     "poorly_explained",
     "position_sign",
+    "too_fast",
     "torque_sign",
     "unit_of_torque",
 )
+# Causes at single joints, with which the torques fit.
+JOINT_CAUSES = ("position_sign", "torque_meaning", "torque_sign")
 
 
 # Values of 1e300 overflow when they are squared. They are reported, and never fitted.
@@ -85,7 +89,7 @@ def _report(context: Context, file: str) -> GateReport:
         samples=len(recorded.log),
         duration=recorded.original.duration,
         period=recorded.timing.period,
-        findings=worst_first(_without_consequences(_without_repetitions(context.findings))),
+        findings=worst_first(_without_consequences(context, _without_repetitions(context.findings))),
         parts=recorded.parts,
         motion_parts=recorded.motion_parts,
         spikes=recorded.spikes,
@@ -113,11 +117,27 @@ def _without_repetitions(findings: Sequence[Finding]) -> list[Finding]:
     return kept
 
 
-def _without_consequences(findings: Sequence[Finding]) -> list[Finding]:
-    """Leaves out what a refused cause explains: its advice would mislead."""
+def _without_consequences(context: Context, findings: Sequence[Finding]) -> list[Finding]:
+    """Leaves out what a cause explains: its advice would mislead."""
     sure = (finding.severity == "refuse" or finding.name in FITTED for finding in findings if finding.name in CAUSES)
-    if not any(sure):
+    if any(sure):
+        if any(finding.name == "static_poses" for finding in findings):
+            return [finding for finding in findings if finding.name == "static_poses"]
+        return [finding for finding in findings if finding.name not in CONSEQUENCES]
+    if not context.explained or not any(finding.name in JOINT_CAUSES for finding in findings):
         return list(findings)
-    if any(finding.name == "static_poses" for finding in findings):
-        return [finding for finding in findings if finding.name == "static_poses"]
-    return [finding for finding in findings if finding.name not in CONSEQUENCES]
+    follows = [_only_fits_badly(finding, context.explained) for finding in findings]
+    # The log is refused for the cause if it was refused for what follows from it.
+    refused = any(bad and finding.severity == "refuse" for bad, finding in zip(follows, findings, strict=True))
+    return [
+        replace(finding, severity="refuse") if refused and finding.name in JOINT_CAUSES else finding
+        for bad, finding in zip(follows, findings, strict=True)
+        if not bad
+    ]
+
+
+def _only_fits_badly(finding: Finding, explained: frozenset[int]) -> bool:
+    """Whether a finding says no more than that explained joints, or all joints together, fit badly."""
+    if finding.name == "unit_of_torque":
+        return finding.joint is None
+    return finding.name in ("badly_excited", "poorly_explained") and finding.joint in explained

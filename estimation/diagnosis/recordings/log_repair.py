@@ -28,6 +28,7 @@ TOLERATED = frozenset(
         "moved_by_others",
         "negative_friction",
         "no_motion",
+        "poorly_explained",
         "position_sign",
         "short",
         "torque_sign",

@@ -8,11 +8,14 @@ from estimation.gate.check import Check
 from estimation.gate.context import Context, Stage
 from estimation.gate.finding import Finding
 from estimation.gate.quick_fits.whole_fit import HOPELESS, POOR
+from robots.common.plain import two_digits
 from robots.robot import Robot
 
-# A joint is badly excited if its held-out error over the torque's standard deviation is above the first and none of its
-# parameters differs from zero by so many standard errors.
+# A joint is badly excited if its held-out error over the torque's standard deviation is above the first, and neither
+# inertia nor friction differs from zero by so many standard errors.
 WEAK, FAINTLY = 0.7, 10.0
+# What to do if no joint is explained better than by a constant.
+NOTHING_FITS = "check units, signs and order of the joints, and that the log belongs to this robot"
 
 
 class Excitation(Check):
@@ -28,12 +31,15 @@ class Excitation(Check):
         others = bool((fitted.unexplained < HOPELESS).any())
         findings = []
         for joint, (found, error) in enumerate(zip(fitted.physics, fitted.unexplained, strict=True)):
-            if found is None:
+            if found is None or error < POOR:
                 continue
-            if not error < HOPELESS or (error > WEAK and found.information < FAINTLY):
-                findings.append(_bad(context.robot, float(error), found.information, prefix, joint, others))
-            elif error >= POOR:
-                findings.append(_poor(context.robot, float(error), prefix, joint))
+            # Inertia or friction that differ from zero are excited: the torque holds something else, too.
+            weak = not error <= WEAK and found.information < FAINTLY
+            findings.append(
+                _bad(context.robot, float(error), found.information, prefix, joint, others)
+                if weak
+                else _poor(context.robot, float(error), prefix, joint, others)
+            )
         return findings
 
 
@@ -42,11 +48,11 @@ def _bad(robot: Robot, error: float, information: float, prefix: str, joint: int
         name="badly_excited",
         severity="warning" if others else "refuse",
         text=f"{robot.joint_names[joint]} is badly excited: on held-out data the error is {100 * error:.3g} % of the "
-        f"torque's standard deviation, and its inertia and friction differ from zero by at most {information:.2g} "
-        "standard errors",
+        "torque's standard deviation, and its inertia and friction differ from zero by at most "
+        f"{two_digits(information)} standard errors",
         action="its parameters are not determined; record faster motions of this joint with larger torques"
         if others
-        else "check units, signs and order of the joints, and that the log belongs to this robot",
+        else NOTHING_FITS,
         value=100 * error,
         unit="%",
         column=f"{prefix}{joint + 1}",
@@ -54,14 +60,16 @@ def _bad(robot: Robot, error: float, information: float, prefix: str, joint: int
     )
 
 
-def _poor(robot: Robot, error: float, prefix: str, joint: int) -> Finding:
+def _poor(robot: Robot, error: float, prefix: str, joint: int, others: bool) -> Finding:
     return Finding(
         name="poorly_explained",
-        severity="warning",
+        severity="warning" if others else "refuse",
         text=f"{robot.joint_names[joint]}: rigid body and friction leave {100 * error:.3g} % of the torque's standard "
         "deviation unexplained on held-out data",
         action="possible causes: noise, an effect missing in the model, or a wrong order, sign or zero of a joint; run "
-        "oed diagnose",
+        "oed diagnose"
+        if others
+        else NOTHING_FITS,
         value=100 * error,
         unit="%",
         column=f"{prefix}{joint + 1}",

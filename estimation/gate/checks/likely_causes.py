@@ -72,6 +72,8 @@ class LikelyCauses(Check):
         left = np.minimum(fits.unexplained(best), 1.0)
         if (other := _other_robot(context, best, left)) is not None:
             return [other]
+        mended = (context.fitted.unexplained >= POOR) & (left < POOR)
+        context.explained = frozenset((np.flatnonzero(mended) + 1).tolist())
         if found is None or found[0].kind in ("sign", "size"):
             return []
         cause, after = found

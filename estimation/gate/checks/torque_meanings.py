@@ -15,7 +15,7 @@ from estimation.gate.checks.likely_causes import without_gravity
 from estimation.gate.context import Context, Stage
 from estimation.gate.finding import Finding
 from estimation.gate.quick_fits.whole_fit import HOPELESS
-from robots.common.plain import percent
+from robots.common.plain import joints_in_words, percent, two_digits
 from robots.robot import Robot
 
 # Log of the odds against joint torques, from which another meaning is a warning, and from which it is refused.
@@ -88,11 +88,12 @@ class TorqueMeanings(Check):
 
 
 def _finding(robot: Robot, best: Hypothesis) -> Finding:
-    factors = [f"{factor:.2g}" for factor in best.factors]
+    factors = [two_digits(factor) for factor in best.factors]
     # Another unit has one factor for all joints.
     listed = factors[0] if len(set(factors)) == 1 else ", ".join(factors)
     named = ",".join(str(joint + 1) for joint in best.joints)
-    why = f"they are about {listed} times the described torques of joints {named.replace(',', ', ')}"
+    why = f"they are about {listed} times the described torques of "
+    why += joints_in_words(joint + 1 for joint in best.joints)
     some = "" if len(best.joints) == robot.n else f":{named}"
     gears = np.abs(np.asarray(robot.gear_ratio, dtype=float))[list(best.joints)]
     if best.kind == "weightless":
@@ -115,7 +116,7 @@ def _finding(robot: Robot, best: Hypothesis) -> Finding:
             return _meaning(
                 best, f"the torque of the motor {where}: {why} (gears {stated})", f"--torque-is motor{some}"
             )
-        about = ", ".join(f"{1 / factor:.3g}" for factor in best.factors)
+        about = ", ".join(two_digits(1 / factor) for factor in best.factors)
         option = f"gear_ratio in the robot's description, and --torque-is motor{some}"
         return _meaning(best, f"the torque of the motor {where}: {why} (gears of about {about})", option)
     if best.kind == "percent":
@@ -159,13 +160,13 @@ def _nominal(context: Context, evidence: Sequence[JointEvidence]) -> list[Findin
     large = [t for t in evidence if 1 / max(t.size, 1e-12) > NOMINAL and fitted.unexplained[t.joint] < WELL]
     if not large:
         return []
-    joints = ", ".join(str(one.joint + 1) for one in large)
+    joints = joints_in_words(one.joint + 1 for one in large)
     ratio = max(1 / max(one.size, 1e-12) for one in large)
     return [
         Finding(
             name="nominal_error",
             severity="warning",
-            text=f"the described torques of joints {joints} are up to {ratio:.2g} times the measured ones, although "
+            text=f"the described torques of {joints} are up to {two_digits(ratio)} times the measured ones, although "
             "the fit is good",
             action="check the meaning and the unit of the torque columns, and the robot's description",
             value=100 * ratio,

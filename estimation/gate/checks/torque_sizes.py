@@ -13,6 +13,7 @@ from estimation.gate.finding import Finding
 from estimation.gate.quick_fits.joint_columns import OWN
 from estimation.gate.quick_fits.joint_fit import JointFit
 from estimation.gate.quick_fits.rigid_body import rigid_body
+from robots.common.plain import two_digits
 from robots.robot import Robot
 
 Array = NDArray[np.float64]
@@ -87,7 +88,7 @@ def _finding(robot: Robot, joint: int, slope: float, correlation: float) -> Find
     return Finding(
         name="torque_sign" if slope < 0 else "unit_of_torque",
         severity="warning",
-        text=f"is {slope:.3g} times the torque computed from the robot's description (correlation "
+        text=f"is {two_digits(slope)} times the torque computed from the robot's description (correlation "
         f"{correlation:.2f}): {guess}",
         action="set unit, gear ratio or sign in a mapping (--mapping); ignore this if the robot's description is "
         "inaccurate",
