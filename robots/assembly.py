@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 from robots.common.config import read_config
 from robots.common.errors import InputError
 from robots.description import MOTOR_UNITS, Bounds, Geometry, Pose, Range, RobotDescription, Values
-from robots.description_notes import assumed_in_urdf, require_stops, urdf_notes
+from robots.description_notes import assumed_in_urdf, assumed_limits, require_stops, urdf_notes
 from robots.geometry.chain import Chain, LinkPlace, homogeneous, rotation_from_rpy
 from robots.geometry.dh import DhRow, chain_from_dh, dh_frames
 from robots.geometry.inertia import SIZE, check_body, inertial_parameters, symmetric
@@ -133,11 +133,14 @@ def robot_from_yaml(
         require_stops(taken.unlimited, unlimited, tree.file)
         notes, links, urdf = urdf_notes(taken, tree.unused), taken.links, tree.file
     ratio, rotor, constant, speed = _drives(text, entries, rotor)
+    bounds = _limits(text, entries, limits)
+    if assumed := assumed_limits(bounds, chain.kinds):
+        notes = (*notes, f"assumed, because the robot file does not state it: {', '.join(assumed)}")
     return Robot(
         name=text.name,
         title=text.title,
         chain=chain,
-        limits=_limits(text, entries, limits),
+        limits=bounds,
         inertia=inertia,
         rotor_inertia=rotor,
         friction=_friction(text, entries, friction),

@@ -1,4 +1,4 @@
-"""What a URDF leaves open, or states in vain: the notes of its robot."""
+"""What a robot's description leaves open, or states in vain: the notes of its robot."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from robots.common.errors import InputError
 from robots.geometry.chain import Kind
 from robots.geometry.urdf import UrdfChain
-from robots.limits import ACCELERATION_PER_VELOCITY, JERK_PER_ACCELERATION
+from robots.limits import ACCELERATION_PER_VELOCITY, JERK_PER_ACCELERATION, Limits
 
 Array = NDArray[np.float64]
 
@@ -69,17 +69,7 @@ def assumed_in_urdf(taken: UrdfChain, friction: Array, root: str) -> tuple[str, 
     Returns:
         The sentence, alone in a tuple.
     """
-    limits, kinds = taken.limits, taken.chain.kinds
-    acceleration = np.where(
-        np.isfinite(limits.acceleration), limits.acceleration, ACCELERATION_PER_VELOCITY * limits.velocity
-    )
-    parts = []
-    if not np.isfinite(limits.acceleration).all():
-        values = _values(acceleration, ~np.isfinite(limits.acceleration), kinds, "s2")
-        parts.append(f"acceleration limits {values} (full speed in {1 / ACCELERATION_PER_VELOCITY:g} s)")
-    if not np.isfinite(limits.jerk).all():
-        values = _values(JERK_PER_ACCELERATION * acceleration, ~np.isfinite(limits.jerk), kinds, "s3")
-        parts.append(f"jerk limits {values} (full acceleration in {1 / JERK_PER_ACCELERATION:g} s)")
+    parts = assumed_limits(taken.limits, taken.chain.kinds)
     still = [name for name, row in zip(taken.names, friction, strict=True) if not row.any()]
     if still:
         parts.append("no friction" if len(still) == len(taken.names) else f"no friction at {', '.join(still)}")
@@ -87,10 +77,34 @@ def assumed_in_urdf(taken: UrdfChain, friction: Array, root: str) -> tuple[str, 
     return (f"assumed, because the URDF does not state it: {', '.join(parts)}",)
 
 
+def assumed_limits(limits: Limits, kinds: Sequence[Kind]) -> list[str]:
+    """Lists the limits that planned motions keep where none are stated: they follow from the speed limits.
+
+    Args:
+        limits: as stated.
+        kinds: of the joints (n).
+
+    Returns:
+        A few words for accelerations, and for jerks; nothing of joints without a speed limit.
+    """
+    acceleration = np.where(
+        np.isfinite(limits.acceleration), limits.acceleration, ACCELERATION_PER_VELOCITY * limits.velocity
+    )
+    jerk = JERK_PER_ACCELERATION * acceleration
+    parts = []
+    if (wanted := ~np.isfinite(limits.acceleration) & np.isfinite(acceleration)).any():
+        values = _values(acceleration, wanted, kinds, "s2")
+        parts.append(f"acceleration limits {values} (full speed in {1 / ACCELERATION_PER_VELOCITY:g} s)")
+    if (wanted := ~np.isfinite(limits.jerk) & np.isfinite(jerk)).any():
+        values = _values(jerk, wanted, kinds, "s3")
+        parts.append(f"jerk limits {values} (full acceleration in {1 / JERK_PER_ACCELERATION:g} s)")
+    return parts
+
+
 def _values(values: Array, wanted: NDArray[np.bool_], kinds: Sequence[Kind], rate: str) -> str:
     """Values of the wanted joints with their units; one for all where they are equal."""
     texts = [
-        f"{value:.3g} {'m' if kind == 'prismatic' else 'rad'}/{rate}" if np.isfinite(value) else "none"
+        f"{value:.3g} {'m' if kind == 'prismatic' else 'rad'}/{rate}"
         for value, kind, asked in zip(values, kinds, wanted, strict=True)
         if asked
     ]

@@ -18,6 +18,7 @@ from oed.campaigns.heat import Temperatures, expected_temperatures, stage_heat
 from oed.campaigns.programme import Programme
 from oed.campaigns.stages import Stage
 from oed.campaigns.timetable import Slot
+from oed.experiments.safety_checks.margins import assumed_values
 from oed.exports import read_trajectory, write_trajectory
 from robots.common.errors import InputError
 from robots.common.files import existing_file, sha256, write_atomic
@@ -180,7 +181,7 @@ class Campaign:
             "format_version": 1,
             "tool_version": VERSION,
             "robot": {"name": self.robot.name, "origin": self.robot.origin, "sha256": self.robot.digest},
-            "assumed": list(self.robot.assumed),
+            "assumed": assumed_values(self.robot),
             "period": self.robot.period,
             "duration": self.duration,
             "cycles": self.cycles,
@@ -219,13 +220,9 @@ class Campaign:
             InputError: a file is there, and force is not given.
         """
         folder = Path(folder)
-        digests = {}
+        digests, name = {}, self.robot.origin or self.robot.name
         for stage in self.stages:
-            metadata = {
-                "robot": self.robot.origin or self.robot.name,
-                "stage": stage.name,
-                "tool": f"robot-oed {VERSION}",
-            }
+            metadata = {"robot": name, "stage": stage.name, "tool": f"robot-oed {VERSION}"}
             write_trajectory(folder / stage.file, stage.motion, metadata, kinds=self.robot.chain.kinds, force=force)
             digests[stage.name] = sha256(folder / stage.file)
         text = json.dumps(self.to_dict(digests), indent=2, allow_nan=False) + "\n"

@@ -144,11 +144,25 @@ def test_assumed_values_are_reported_once(write, monkeypatch):
     path = write(TABLE.replace("cubic: {values: [3, 4]}", "cubic: {values: [3, 4], source: assumed}"))
     with pytest.warns(AssumedValueWarning, match=r"^pair: .*assumptions.*: dynamics\.friction\.cubic$") as caught:
         load_robot(path)
-    assert len(caught) == 1
+    assert sum("assumptions" in str(one.message) for one in caught) == 1
     assert caught[0].filename == __file__
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         load_robot(path)
+
+
+@pytest.mark.parametrize("kind", ["table", "urdf"])
+def test_limits_that_a_yaml_lacks_are_said_to_be_assumed(urdf, write, monkeypatch, kind):
+    """Accelerations and jerks that neither the YAML nor its file states are listed, and stated ones are not."""
+    monkeypatch.setattr(loading, "_warned", set())
+    text = TABLE if kind == "table" else "name: pair\nurdf: two.urdf\n"
+    # 180 deg/s and 2 rad/s of the first joints in 0.25 s; the table's second joint has no speed limit.
+    values = {"table": "12.6 rad/s2", "urdf": "8 rad/s2, 0.8 m/s2"}[kind]
+    with pytest.warns(AssumedValueWarning, match=f"^pair: assumed, .* acceleration limits {values} .*jerk limits"):
+        load_robot(write(text))
+    stated = "acceleration: {values: 5, unit: [rad/s2, m/s2]}\n  jerk: {values: 50, unit: [rad/s3, m/s3]}"
+    text = text.replace("limits:\n", f"limits:\n  {stated}\n") if kind == "table" else f"{text}limits:\n  {stated}\n"
+    assert not [note for note in load_robot(write(text)).notes if "assumed" in note]
 
 
 def test_motor_speed_and_rms_torque(tmp_path):

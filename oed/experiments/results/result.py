@@ -16,7 +16,7 @@ from oed.experiments.quality import Quality
 from oed.experiments.results.design_file import DESIGN, TRAJECTORY, read_design
 from oed.experiments.results.outcome import Outcome
 from oed.experiments.results.views import motion_frame, plot_velocities
-from oed.experiments.safety_checks.margins import margin_data, measured_margins, missing_limits
+from oed.experiments.safety_checks.margins import assumed_values, margin_data, measured_margins
 from oed.experiments.safety_checks.spatial_check import SpatialMargin
 from oed.experiments.searches.search import INTERRUPTED
 from oed.exports import write_trajectory
@@ -212,7 +212,7 @@ class Design:
             "format_version": 1,
             "tool_version": VERSION,
             "robot": {"name": self.robot.name, "origin": self.robot.origin, "sha256": self.robot.digest},
-            "assumed": [*self.robot.assumed, *(f"limits.{name}" for name in missing_limits(self.robot.limits))],
+            "assumed": assumed_values(self.robot),
             "model": {
                 "columns": list(self.base.names),
                 "units": [column.unit for column in self.base.columns],

@@ -15,7 +15,7 @@ from oed.criteria import CRITERIA
 from oed.experiments.quality import Quality, design_model
 from oed.experiments.results.design_file import DESIGN, TRAJECTORY
 from oed.experiments.results.views import motion_frame, plot_velocities
-from oed.experiments.safety_checks.margins import margin_data, margin_from, measured_margins
+from oed.experiments.safety_checks.margins import assumed_values, margin_data, margin_from, measured_margins
 from oed.exports import read_trajectory, write_trajectory
 from oed.retiming import Retimed
 from robots.base_parameters import BaseParameters, find_base_parameters
@@ -136,7 +136,7 @@ class RetimedExperiment:
             "format_version": 1,
             "tool_version": VERSION,
             "robot": {"name": self.robot.name, "origin": self.robot.origin, "sha256": self.robot.digest},
-            "assumed": list(self.robot.assumed),
+            "assumed": assumed_values(self.robot),
             "model": {
                 "columns": list(self.base.names),
                 "units": [column.unit for column in self.base.columns],

@@ -25,6 +25,11 @@ def missing_limits(limits: Limits) -> dict[str, tuple[int, ...]]:
     return {name: tuple(map(int, joints)) for name, joints in lacking.items() if joints.size}
 
 
+def assumed_values(robot: Robot) -> list[str]:
+    """Names what is assumed of a robot, such as ``limits.jerk``: values without a source, and limits not stated."""
+    return list(dict.fromkeys([*robot.assumed, *(f"limits.{name}" for name in missing_limits(robot.limits))]))
+
+
 def measured_margins(
     robot: Robot, motion: Motion, base: BaseParameters, effects: Sequence[PlantEffect] = ()
 ) -> tuple[Margin, ...]:

@@ -9,6 +9,7 @@ import numpy as np
 
 from oed.campaigns import Campaign, Slot, Stage
 from oed.campaigns.checking import closest_bodies
+from oed.reports.pages.motions.assumption_findings import assumption_findings
 from oed.reports.pictures.campaign_pictures import temperature_picture, velocity_picture
 from oed.reports.rendering.page import Cell, Fact, Finding, Page, Section, Table, findings_of
 from oed.reports.rendering.provenance import footer
@@ -116,9 +117,7 @@ def _findings(campaign: Campaign) -> tuple[Finding, ...]:
     # The notes say the same of collisions.
     own = tuple(f"COLLISION in the {name} stage" for name in colliding)
     notes = [note for note in campaign.notes if not (own and note.startswith(own))]
-    assumed = campaign.robot.assumed
-    texts = [f"Assumed values without a source: {', '.join(assumed)}."] if assumed else []
-    return (*found, *findings_of("experiment.note", notes), *findings_of("value.assumed", texts))
+    return (*found, *findings_of("experiment.note", notes), *assumption_findings(campaign.robot))
 
 
 def _phases(campaign: Campaign) -> Table:

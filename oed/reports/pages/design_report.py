@@ -9,8 +9,9 @@ from numpy.typing import NDArray
 
 from oed.experiments import Design
 from oed.experiments.quality import Quality
-from oed.experiments.safety_checks.margins import missing_limits, nominal_torque
+from oed.experiments.safety_checks.margins import nominal_torque
 from oed.reports.animations.building import animate
+from oed.reports.pages.motions.assumption_findings import assumption_findings
 from oed.reports.pages.motions.motion_report import animation_section, approach_text, tightest_fact
 from oed.reports.pictures.trajectory_pictures import margins_picture, spectrum_picture, trajectory_picture
 from oed.reports.rendering.page import Cell, Fact, Finding, Page, Section, Table, findings_of
@@ -192,17 +193,7 @@ def _findings(design: Design) -> tuple[Finding, ...]:
         for margin in design.violated
     ]
     found += excitation_findings(design.whole)
-    if robot.assumed:
-        found += findings_of("value.assumed", [f"Assumed values without a source: {', '.join(robot.assumed)}."])
-    substitutes = {"acceleration": "4/s times the velocity limit", "jerk": "20/s times the acceleration limit"}
-    found += findings_of(
-        "limit.assumed",
-        [
-            f"The robot's description states no {name} limit for joint {', '.join(map(str, joints))}; assumed: "
-            f"{substitutes[name]}."
-            for name, joints in missing_limits(robot.limits).items()
-        ],
-    )
+    found += assumption_findings(robot)
     if not any(margin.quantity == "torque" for margin in design.margins):
         text = "Torque limits were not checked: the robot's description lacks nominal dynamics or torque limits."
         found += findings_of("torque.unchecked", [text])

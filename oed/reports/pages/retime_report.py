@@ -9,6 +9,7 @@ from oed.experiments import RetimedExperiment
 from oed.experiments.safety_checks.margins import nominal_torque
 from oed.reports.animations.building import animate
 from oed.reports.pages.design_report import excitation_findings, margins_section, parameters_section, quality_section
+from oed.reports.pages.motions.assumption_findings import assumption_findings
 from oed.reports.pages.motions.motion_report import animation_section
 from oed.reports.pictures.trajectory_pictures import trajectory_picture
 from oed.reports.rendering.page import Cell, Fact, Finding, Page, Section, Table, findings_of
@@ -49,8 +50,7 @@ def retime_page(result: RetimedExperiment, given: Motion) -> Page:
         )
     if retimed.slower:
         findings += findings_of("timing.slower", [retimed.verdict()])
-    if robot.assumed:
-        findings += findings_of("value.assumed", [f"Assumed values without a source: {', '.join(robot.assumed)}."])
+    findings += assumption_findings(robot)
     return Page(
         title="Retimed path",
         robot=robot.title or robot.name,

@@ -43,6 +43,10 @@ def test_bodies_and_drives_are_those_of_the_model(file):
     np.testing.assert_allclose(np.rad2deg(robot.limits.upper), [170, 120, 180])
     assert robot.period == 0.002
     assert not any("velocity" in note for note in robot.notes)
+    # A quarter of a second to full speed, and a twentieth to full acceleration.
+    (assumed,) = (note for note in robot.notes if "assumed" in note)
+    assert "acceleration limits 8, 10, 12 rad/s2" in assumed
+    assert "jerk limits 160, 200, 240 rad/s3" in assumed
 
 
 def test_drives_of_the_yaml_replace_those_of_the_model(file):

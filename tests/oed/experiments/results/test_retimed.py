@@ -1,10 +1,12 @@
 import json
+from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
 import pytest
 
 from oed.experiments import RetimedExperiment, retime
+from oed.reports.pages.retime_report import retime_page
 from oed.retiming import plan_move
 from robots import load_robot
 from robots.common.errors import InputError
@@ -35,6 +37,18 @@ def given(robot):
 @pytest.fixture(scope="module")
 def result(robot, given):
     return retime(robot, given)
+
+
+def test_assumed_limits_are_named(robot, result, given):
+    """Limits that the description does not state are in the file, and on the page."""
+    free = np.full(robot.n, np.inf)
+    stated = replace(robot, assumed=())
+    assert replace(result, robot=stated).to_dict()["assumed"] == []
+    bare = replace(stated, limits=replace(robot.limits, acceleration=free, jerk=free))
+    again = retime(bare, given)
+    assert {"limits.acceleration", "limits.jerk"} <= set(again.to_dict()["assumed"])
+    codes = [finding.code for finding in retime_page(again, given).findings]
+    assert codes.count("limit.assumed") == 2
 
 
 def test_it_is_faster_within_all_limits(result, robot, given):
