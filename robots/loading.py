@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 import warnings
 from collections.abc import Mapping, Sequence
 from difflib import get_close_matches
@@ -77,11 +78,20 @@ def load_robot(
         notes = () if robot.origin in catalogue() else robot.notes
         if robot.assumed:
             notes = (f"these values are assumptions without a source: {', '.join(robot.assumed)}", *notes)
-        # As a command line takes it.
-        chosen = f" --tip {tip}" if tip is not None else f" --joints {','.join(joints)}" if joints is not None else ""
+        shown = _as_words(robot.origin, tip, joints, locked)
         for note in notes:
-            warnings.warn(DescriptionWarning(f"{robot.name}: {note}", robot.origin + chosen), stacklevel=2)
+            warnings.warn(DescriptionWarning(f"{robot.name}: {note}", shown), stacklevel=2)
     return robot
+
+
+def _as_words(origin: str, tip: str | None, joints: Sequence[str] | None, locked: Mapping[str, float] | None) -> str:
+    """A robot and the choice of its joints, as a command line takes them."""
+    words = [origin]
+    words += [] if tip is None else ["--tip", tip]
+    words += [] if joints is None else ["--joints", ",".join(joints)]
+    for name, value in (locked or {}).items():
+        words += ["--lock", f"{name}={value:g}"]
+    return shlex.join(words)
 
 
 def _robot_file(spec: str | Path) -> Path:

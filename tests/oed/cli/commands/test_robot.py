@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
+import shlex
+
 import pytest
 
-from robots.loading import catalogue
+from robots import loading
+from robots.common.errors import DescriptionWarning
+from robots.loading import catalogue, load_robot
 from tests.robots.robot_files import URDF
 
 
@@ -28,6 +32,21 @@ def test_joints_without_stops_are_shown(run, tmp_path):
     done = run("robot", "show", path)
     assert done.code == 0
     assert "joint j1: no position limits stated" in done.out
+
+
+@pytest.mark.parametrize(
+    "choice", [{"tip": "l1"}, {"joints": ["j2"], "locked": {"j1": 0.25}}, {"tip": "l2", "locked": {"j1": 0.25}}]
+)
+def test_the_advice_of_a_note_shows_the_same_robot(run, tmp_path, monkeypatch, choice):
+    """The command of a note can be typed as it stands, with a blank in the path, and shows the same joints."""
+    monkeypatch.setattr(loading, "_warned", set())
+    path = tmp_path / "my robot.urdf"
+    path.write_text(URDF)
+    with pytest.warns(DescriptionWarning) as caught:
+        robot = load_robot(path, **choice)
+    data = run("robot", "show", *shlex.split(caught[0].message.origin), "--json").data
+    assert [joint["name"] for joint in data["joints"]] == list(robot.joint_names)
+    assert data["sha256"] == robot.digest
 
 
 def test_a_choice_of_joints(run, tmp_path):
