@@ -52,8 +52,8 @@ class Body:
 
     @property
     def centre(self) -> Array:
-        """Centre of mass (3,) [m]."""
-        return np.asarray(self.parameters[1:4] / self.parameters[0])
+        """Centre of mass (3,) [m]; zero without a mass."""
+        return np.asarray(self.parameters[1:4] / (self.parameters[0] or 1.0))
 
     @cached_property
     def inertia(self) -> Array:
@@ -95,14 +95,16 @@ def central_inertia(parameters: ArrayLike) -> Array:
     ``I_c = I - (h'h 1 - h h') / m`` with h = m c (parallel axes).
 
     Args:
-        parameters: (10,) about a frame's origin.
+        parameters: (10,) about a frame's origin; zeros without a mass.
 
     Returns:
         (3, 3) in the frame's axes [kg m2].
     """
     values = np.asarray(parameters, dtype=float)
     moment = values[1:4]
-    return np.asarray(symmetric(values[4:]) - (moment @ moment * np.eye(3) - np.outer(moment, moment)) / values[0])
+    return np.asarray(
+        symmetric(values[4:]) - (moment @ moment * np.eye(3) - np.outer(moment, moment)) / (values[0] or 1.0)
+    )
 
 
 def read_body(text: str) -> Body:
@@ -165,6 +167,9 @@ def body_from_dict(data: dict[str, Any], file: str | Path) -> Body:
         raise InputError(f"is damaged ({type(error).__name__}: {error})", file=file) from error
     if parameters.shape != (SIZE,) or not np.isfinite(parameters).all():
         raise InputError(f"parameters of shape {parameters.shape}", file=file, allowed=f"{SIZE} finite numbers")
+    if not parameters.any():
+        # No payload was found.
+        return Body(parameters)
     if parameters[0] <= 0:
         raise InputError(f"a mass of {parameters[0]:g} kg", file=file, allowed="a positive number")
     body = Body(parameters)

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from estimation.payloads.intervals import AXES, Quantity
+from estimation.uncertainty.normal import NORMAL_95
 from robots.common.errors import InputError, NotIdentifiableError
 from robots.geometry.chain import Chain
 from robots.regressor import TorqueModel
@@ -24,6 +25,8 @@ MASS_SHARE = 0.5
 CENTRE = 0.1
 # ... and a moment or product of inertia if its interval reaches no farther than this share of the mean moment.
 INERTIA_SHARE = 0.5
+# Standard errors below zero from which a mass is negative beyond doubt.
+SURE = 5.0
 # A wrist joint that moves less than this [rad] is named, of so many last joints.
 LITTLE, WRIST = 0.8, 3
 # A component of gravity's direction in the flange frame that varies by less than this (standard deviation) is named.
@@ -44,8 +47,28 @@ def determined(found: Sequence[Quantity]) -> tuple[bool, ...]:
     """Finds which quantities of a payload a log determines by itself."""
     values = {item.name: item.value for item in found}
     moment = (values["Ixx"] + values["Iyy"] + values["Izz"]) / 3
-    limits = {"kg": MASS_SHARE * abs(values["mass"]), "m": CENTRE, "kg m2": INERTIA_SHARE * moment}
+    # That there is no payload is known to the interval of the mass.
+    share = MASS_SHARE * abs(values["mass"]) if values["mass"] else np.inf
+    limits = {"kg": share, "m": CENTRE, "kg m2": INERTIA_SHARE * moment}
     return tuple(bool(item.half_width <= limits[item.unit]) for item in found)
+
+
+def is_nothing(free: float, error: float, robot: Robot, q: ArrayLike, gravity: Array | None) -> bool:
+    """Whether a log shows that there is no payload, within the error of the mass.
+
+    A mass below zero may be what the arm's model misses. Only one beyond doubt is that of swapped logs.
+
+    Args:
+        free: mass by least squares without constraints [kg].
+        error: its standard error [kg].
+        robot: the robot.
+        q: positions (N, n) of the log with the payload [rad or m].
+        gravity: in the base frame (3,) [m/s2]; None as described.
+    """
+    if not -SURE * error <= free <= NORMAL_95 * error:
+        return False
+    # Without the motion that shows it, a mass is open and not absent.
+    return "mass" not in never_shown(robot, gravity) and not missing_motion(robot, q, gravity)
 
 
 def require_determined(found: Sequence[Quantity], robot: Robot, q: ArrayLike, gravity: Array | None) -> None:

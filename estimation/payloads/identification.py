@@ -15,7 +15,7 @@ from estimation.logs.known_setup import require_known
 from estimation.logs.provenance import describe_logs
 from estimation.models.model import Model
 from estimation.payloads.body import Body
-from estimation.payloads.determination import require_determined
+from estimation.payloads.determination import is_nothing, require_determined
 from estimation.payloads.equations import Arm, Equations, PairedEquations, Source
 from estimation.payloads.fit import PayloadFit, fit_payload
 from estimation.payloads.intervals import quantities
@@ -40,6 +40,7 @@ FRICTION_DRIFT = 0.3
 DOUBTFUL, FOREIGN = 2.0, 6.0
 # Stands for a mass [kg] that came out as zero.
 SMALLEST_MASS = 1e-6
+NOTHING = PhysicalBody(parameters=np.zeros(10), nearest=np.zeros(10), distance=0.0)
 
 
 @one_blas_thread()
@@ -198,8 +199,11 @@ def _result(
             f"no payload explains the torque: the errors are {ratio:.2g} times those without payload",
             remedy="check that the logs are of one robot, and that nothing touches the payload",
         )
-    body = _body(found)
-    require_determined(quantities(found.values, found.covariance, body.parameters), robot, q, gravity)
+    error = float(np.sqrt(found.covariance[0, 0]))
+    nothing = is_nothing(float(found.values[0]), error, robot, q, gravity)
+    body = NOTHING if nothing else _body(found)
+    if not nothing:
+        require_determined(quantities(found.values, found.covariance, body.parameters), robot, q, gravity)
     method = "model" if not free else "difference" if match is not None and match.same else "joint fit"
     return PayloadEstimate(
         robot=robot.name,

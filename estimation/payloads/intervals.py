@@ -56,10 +56,15 @@ def quantities(values: Array, covariance: Array, body: Array) -> tuple[Quantity,
     Args:
         values: least squares (10,).
         covariance: of the values (10, 10).
-        body: the physically consistent parameters (10,).
+        body: the physically consistent parameters (10,); zeros if no payload was found.
     """
-    errors = np.sqrt(np.maximum(np.diag(covariance), 0.0))
-    spread = NORMAL_95 * errors[0]
+    spread = NORMAL_95 * float(np.sqrt(max(covariance[0, 0], 0.0)))
+    if not body.any():
+        free = [*values[:4], *central_inertia(values)[_UPPER]]
+        units = [("mass", "kg"), *((f"centre_{axis}", "m") for axis in AXES), *((name, "kg m2") for name in MOMENTS)]
+        none = [_quantity(name, unit, 0.0, own, -np.inf, np.inf) for (name, unit), own in zip(units, free, strict=True)]
+        # An estimate below zero is moved to zero: no body has it.
+        return _quantity("mass", "kg", 0.0, values[0], 0.0, max(values[0], 0.0) + spread), *none[1:]
     found = [_quantity("mass", "kg", body[0], values[0], values[0] - spread, values[0] + spread, 0.0)]
     for k, axis in enumerate(AXES, start=1):
         lower, upper = fieller(values[k], values[0], covariance[np.ix_([k, 0], [k, 0])])

@@ -16,7 +16,7 @@ from estimation.payloads.body import FORMAT, FORMAT_VERSION, Body, body_from_dic
 from estimation.payloads.determination import determined
 from estimation.payloads.intervals import Quantity, quantities
 from robots.common.files import write_atomic
-from robots.common.plain import finite
+from robots.common.plain import finite, two_digits
 from robots.terms.situations.sensitivities import moved_body
 
 if TYPE_CHECKING:
@@ -60,7 +60,7 @@ class PayloadEstimate:
     Attributes:
         robot: the robot's name.
         method: ``difference``, ``joint fit`` or ``model``.
-        body: the most plausible body, in the flange frame.
+        body: the most plausible body, in the flange frame; one without mass if no payload was found.
         nearest: parameters (10,) of the body that fits best.
         values: least squares without constraints (10,).
         covariance: of `values` (10, 10).
@@ -92,6 +92,11 @@ class PayloadEstimate:
         return not self.warnings
 
     @property
+    def found(self) -> bool:
+        """Whether there is a payload: its mass cannot be zero, with 95 %."""
+        return self.body.mass > 0
+
+    @property
     def seen(self) -> Body:
         """The body in `frame`."""
         return self.body.seen_from(self.frame)
@@ -108,6 +113,11 @@ class PayloadEstimate:
         return determined(self.quantities)
 
     @property
+    def limit(self) -> str:
+        """The largest mass that a payload may have where none was found, in words."""
+        return f"at most {two_digits(self.quantities[0].upper)} kg at 95 %"
+
+    @property
     def source(self) -> str:
         """One line for files that carry the body: where it comes from, and which of its numbers no log determines."""
         open_ = [item.name for item, known in zip(self.quantities, self.determined, strict=True) if not known]
@@ -122,7 +132,9 @@ class PayloadEstimate:
         """Lists the quantities with their 95 % intervals, the torque errors, and warnings."""
         where = "flange frame" if np.array_equal(self.frame, np.eye(4)) else "frame of --frame"
         lines = [f"{self.robot}: payload by {METHODS[self.method]} ({self.rows} rows); {where}, 95 % intervals"]
-        for item, known in zip(self.quantities, self.determined, strict=True):
+        if not self.found:
+            lines = [f"{self.robot}: no payload found: {self.limit}, by {METHODS[self.method]} ({self.rows} rows)"]
+        for item, known in zip(self.quantities, self.determined, strict=True) if self.found else ():
             # A centre that another motion would show is refused by the identification.
             never = item.unit == "m"
             open_ = "no motion of this robot shows it" if never else "typical of a body of this mass"
@@ -165,6 +177,7 @@ class PayloadEstimate:
             "format_version": FORMAT_VERSION,
             "robot": self.robot,
             "method": self.method,
+            "found": self.found,
             "mass": seen.mass,
             "centre_of_mass": seen.centre.tolist(),
             "inertia": seen.inertia.tolist(),

@@ -9,6 +9,7 @@ from typing import Any
 
 from oed.reports.pages.design_report import excitation_code
 from oed.reports.rendering.severity import LEVELS
+from robots.common.plain import two_digits
 
 Figure = float | str | None
 Data = Mapping[str, Any]
@@ -197,9 +198,15 @@ def _comparison(data: Data) -> Reading:
 
 def _payload(data: Data) -> Reading:
     open_ = sum(not item["determined"] for item in data["quantities"])
+    if data["mass"] == 0.0:
+        # Older files have a mass.
+        bound = data["quantities"][0]["ci95"][1]
+        verdict, open_ = f"No payload found: at most {two_digits(bound)} kg at 95 %.", 0
+    else:
+        verdict = f"Mass {data['mass']:.3g} kg; {open_ or 'no'} quantities not determined."
     return Reading(
         kind="payload",
-        verdict=f"Mass {data['mass']:.3g} kg; {open_ or 'no'} quantities not determined.",
+        verdict=verdict,
         codes=("payload.uncertain",) if open_ else ("done",),
         figures={"mass [kg]": data["mass"], "rows": data["rows"]},
         robot=_robot(data),

@@ -148,10 +148,12 @@ def payload(
             ).seen_from(pose)
             result.save(folder.path("payload.json").parent)
             save_payload_report(result, folder, png=png)
-            for form in forms:
+            for form in forms if result.found else ():
                 text = form.text(result.seen, result.source)
                 folder.path(form.file).write_text(text, encoding="utf-8")
     written = "".join(f"\n{form.title} written to {(out / form.file).resolve()}" for form in forms)
+    if forms and not result.found:
+        written = "\nno controller file written: there is no payload to state"
     console.result(f"{result.summary()}\nwritten to {out.resolve()}{written}", result.to_dict())
 
 

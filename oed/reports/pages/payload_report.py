@@ -35,7 +35,9 @@ def payload_page(payload: PayloadEstimate) -> Page:
     return Page(
         title="Payload",
         robot=payload.robot,
-        verdict=(
+        verdict=f"No payload was found: {payload.limit}."
+        if not payload.found
+        else (
             f"Set the payload to {_value(mass)} kg ({_interval(mass)}); its centre of mass is known to "
             f"{1000 * widest.half_width:.2g} mm or better."
         ),
@@ -43,7 +45,10 @@ def payload_page(payload: PayloadEstimate) -> Page:
         findings=findings_of("payload.uncertain", payload.warnings),
         facts=(
             Fact(label="Mass", value=f"{_value(mass)} kg"),
-            Fact(label="Centre of mass", value=f"{', '.join(_value(item) for item in centre)} m"),
+            Fact(
+                label="Centre of mass",
+                value=f"{', '.join(_value(item) for item in centre)} m" if payload.found else "–",
+            ),
             Fact(label="Rows", value=payload.rows, note=f"by {METHODS[payload.method]}"),
         ),
         sections=(

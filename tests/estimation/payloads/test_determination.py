@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from estimation.payloads.body import Body
-from estimation.payloads.determination import determined, missing_motion, require_determined
+from estimation.payloads.determination import determined, is_nothing, missing_motion, require_determined
 from estimation.payloads.intervals import quantities
 from robots import load_robot
 from robots.common.errors import InputError, NotIdentifiableError
@@ -75,6 +75,17 @@ def test_a_mass_that_is_surely_negative_is_bad_input(ur10: Robot, moving: np.nda
     with pytest.raises(InputError, match="swap --log and --without") as caught:
         require_determined(quantities(values, np.diag(SPREAD**2), TRUTH), ur10, moving, None)
     assert caught.value.exit_code == 2
+
+
+@pytest.mark.parametrize(
+    ("mass", "nothing"), [(0.0, True), (1.9, True), (2.1, False), (-2.1, True), (-4.9, True), (-5.1, False)]
+)
+def test_a_mass_within_its_error_is_nothing(ur10: Robot, moving: np.ndarray, mass: float, nothing: bool) -> None:
+    """Up to 1.96 standard errors above zero, and to five below; but never where the motion does not show a mass."""
+    assert is_nothing(0.1 * mass, 0.1, ur10, moving, None) == nothing
+    still = np.zeros_like(moving)
+    still[:, 0] = moving[:, 0]
+    assert not is_nothing(0.1 * mass, 0.1, ur10, still, None)
 
 
 def test_small_moments_are_marked_as_open_not_refused(ur10: Robot, moving: np.ndarray) -> None:

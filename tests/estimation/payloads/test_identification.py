@@ -11,6 +11,7 @@ import pytest
 from estimation.payloads import PayloadEstimate, identify_payload, load_payload
 from estimation.preprocessing import LowPass, resample, smooth
 from estimation.regressions.preparation import Prepared
+from oed.reports.pages.payload_report import payload_page
 from robots.common.errors import InputError, NotIdentifiableError
 from robots.signals import Log
 from robots.terms.situations.flange_body import point_mass
@@ -108,6 +109,33 @@ def test_a_log_without_wrist_motion_is_refused_with_the_motion_that_it_lacks(exp
         identify_payload(log, model=model)
     assert "--payload-only" in str(caught.value)
     assert "joint 6" in str(caught.value)
+
+
+@pytest.mark.parametrize("reference", ["log", "model"])
+def test_a_bare_arm_has_no_payload_and_the_most_that_it_may_have(
+    experiment: Experiment, reference: str, tmp_path: Path
+) -> None:
+    """Without a payload in either log the mass is zero, up to a bound below 100 g; the file says the same."""
+    half = len(experiment.free) // 2
+    first, second = experiment.free.rows(slice(0, half)), experiment.free.rows(slice(half, None))
+    given = (
+        {"robot": experiment.robot, "without": first} if reference == "log" else {"model": experiment.estimate.model}
+    )
+    found = identify_payload(second, **given)
+    assert not found.found
+    mass = found.quantities[0]
+    assert (mass.value, mass.lower) == (0.0, 0.0)
+    assert max(mass.unconstrained, 0.0) <= mass.upper < 0.1
+    assert found.determined == (True, *(9 * [False]))
+    assert f"no payload found: at most {mass.upper:.2g} kg at 95 %" in found.summary()
+    assert "centre of mass" not in found.summary()
+    data = found.seen_from(np.diag([1.0, -1.0, -1.0, 1.0])).to_dict()
+    assert (data["found"], data["mass"], data["centre_of_mass"]) == (False, 0.0, [0.0, 0.0, 0.0])
+    assert data["quantities"][0]["ci95"] == [0.0, pytest.approx(mass.upper)]
+    assert all(row["value"] == 0.0 and row["ci95"] == [None, None] for row in data["quantities"][1:])
+    found.save(tmp_path)
+    assert not load_payload(tmp_path).found
+    assert payload_page(found).verdict == f"No payload was found: {found.limit}."
 
 
 @pytest.mark.parametrize("options", [{}, {"model": None, "without": ()}])

@@ -139,6 +139,15 @@ def test_foreign_files_have_none(tmp_path: Path, content: str) -> None:
     assert find_results(tmp_path) == ()
 
 
+def test_a_payload_that_is_not_there_is_good_news(tmp_path: Path) -> None:
+    """A file without a payload has its bound as the verdict, and open quantities are no doubt."""
+    quantities = [{"determined": True, "ci95": [0.0, 0.0123]}, {"determined": False, "ci95": [None, None]}]
+    content = {"format": "robot-oed payload", "format_version": 1, "robot": "ur10", "mass": 0.0, "rows": 9}
+    write(tmp_path, "payload.json", content | {"quantities": quantities})
+    (entry,) = find_results(tmp_path)
+    assert (entry.verdict, entry.level) == ("No payload found: at most 0.012 kg at 95 %.", "good")
+
+
 def test_robots_are_listed(tmp_path: Path) -> None:
     """Robot files in YAML and URDF are rows with the robot's name; other YAML files are not."""
     write(tmp_path, "arm.yaml", "name: my arm  # of the cell\nurdf: arm.urdf\n")
