@@ -28,6 +28,7 @@ TOLERATED = frozenset(
         "moved_by_others",
         "negative_friction",
         "no_motion",
+        "other_robot",
         "poorly_explained",
         "position_sign",
         "short",

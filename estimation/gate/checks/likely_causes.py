@@ -101,7 +101,7 @@ def _other_robot(context: Context, best: Meaning, left: Array) -> Finding | None
         text="the log does not fit this robot's description, and may be of another robot: it leaves "
         f"{shares[0]} of the torques of {joints_in_words(wrong + 1)} unexplained, a model of any arm {shares[1]}",
         action="check --robot, and the axes and zeros of the joints in its description; no other order, sign, unit or "
-        "gravity that was tried explains the log",
+        "gravity that was tried explains the log; if the robot is right, look for missing effects with oed diagnose",
         value=100 * float(1 - np.exp(-better)),
         unit="%",
     )

@@ -9,7 +9,9 @@ import numpy as np
 import pytest
 
 from estimation import diagnose
+from estimation.diagnosis.recordings import log_repair
 from estimation.diagnosis.recordings.log_repair import repair_log
+from estimation.gate import Finding, check_log
 from robots.common.errors import InputError
 from robots.robot import Robot
 from robots.signals import Log
@@ -42,6 +44,17 @@ def test_a_sound_log_is_left_alone(arm: Robot, log: Log) -> None:
     result = repair_log(arm, log, "Log 1")
     assert result.logs == (log,)
     assert result.notes == ()
+
+
+def test_a_log_that_does_not_fit_is_examined_and_said_to(arm: Robot, log: Log, monkeypatch) -> None:
+    """Large effects may look like another robot: the diagnosis takes the log, with the gate's words as a note."""
+    finding = Finding(name="other_robot", severity="refuse", text="the log does not fit", action="look", value=1.0)
+    gate = replace(check_log(arm, log), findings=(finding,))
+    monkeypatch.setattr(log_repair, "check_log", lambda robot, log: gate)
+    result = repair_log(arm, log, "Log 1")
+    assert result.logs == (log,)
+    assert len(result.notes) == 1
+    assert "the log does not fit" in result.notes[0]
 
 
 def test_rows_that_stick_out_lie_between_their_neighbours(arm: Robot, log: Log) -> None:
