@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from scipy.optimize import minimize
 
 from estimation.diagnosis.calibration import ABSENT_CHI2, MAX_REVERSAL_CHI2, REVERSAL_FORMULA_ERROR
-from estimation.diagnosis.hypothesis_tests.fitted_effects import FittedEffect
+from estimation.diagnosis.hypothesis_tests.fitted_effects import FittedEffect, accept_all_but
 from estimation.diagnosis.hypothesis_tests.hypotheses import Hypothesis
 from estimation.diagnosis.hypothesis_tests.joint_agreement import per_joint_evidence
 from estimation.diagnosis.hypothesis_tests.problem import Problem
@@ -123,6 +123,11 @@ def refine(
         if hypothesis.effect.at_reversals is AtReversals.IMPACT
         else found
     )
+
+
+def refine_member(problem: Problem, members: Sequence[FittedEffect], i: int) -> FittedEffect:
+    """Refines one of the members beside the others, starting from its shape."""
+    return refine(problem, members[i].hypothesis, members[i].shape, accept_all_but(problem, members, i))
 
 
 def clip_shape(shape: Sequence[float], bounds: Sequence[tuple[float, float]]) -> tuple[float, ...]:

@@ -8,9 +8,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from estimation.diagnosis.hypothesis_tests.fitted_effects import FittedEffect, accept_all_but
+from estimation.diagnosis.hypothesis_tests.fitted_effects import FittedEffect
 from estimation.diagnosis.hypothesis_tests.problem import Problem
-from estimation.diagnosis.hypothesis_tests.refinement import refine
+from estimation.diagnosis.hypothesis_tests.refinement import refine_member
 from estimation.diagnosis.joint_fits.extended_fit import dense
 from estimation.diagnosis.joint_fits.gear_load import NO_GEAR_LOAD, GearLoadFit, find_gear_load
 from estimation.diagnosis.joint_fits.sensor_nonlinearity import fit_sensor_nonlinearity
@@ -102,7 +102,7 @@ def refit(problem: Problem, members: Sequence[FittedEffect]) -> RefitResult:
     if cut:
         flags = np.logical_or.reduce([flags for flags in useless if flags is not None])
         problem = fit_clipped_torque(total_torque_from_unclipped(problem, members, flags), members)
-        members = [_again(problem, members, k) if k in cut else member for k, member in enumerate(members)]
+        members = [refine_member(problem, members, k) if k in cut else member for k, member in enumerate(members)]
     problem, members = fit_sensor_nonlinearity(problem, members)
     values, left, full = fit_jointly(problem, members)
     known = len(problem.prior.target)
@@ -171,8 +171,3 @@ def _unusable_rows(problem: Problem, member: FittedEffect) -> NDArray[np.bool_] 
         return None
     lost = np.abs(dense(problem, hypothesis, member.shape)).max(axis=2)
     return np.asarray(flags | (lost > CUT * lost.max()))
-
-
-def _again(problem: Problem, members: Sequence[FittedEffect], k: int) -> FittedEffect:
-    """Refines one member beside the others, starting from its shape."""
-    return refine(problem, members[k].hypothesis, members[k].shape, accept_all_but(problem, members, k))

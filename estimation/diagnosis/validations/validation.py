@@ -8,10 +8,10 @@ from functools import partial
 
 from estimation.diagnosis.base_models.payload_and_gravity import build_situation
 from estimation.diagnosis.base_models.prepared_logs import PreparedLogs
-from estimation.diagnosis.hypothesis_tests.fitted_effects import FittedEffect, accept_all_but
+from estimation.diagnosis.hypothesis_tests.fitted_effects import FittedEffect
 from estimation.diagnosis.hypothesis_tests.hypotheses import all_hypotheses
 from estimation.diagnosis.hypothesis_tests.problem import Problem
-from estimation.diagnosis.hypothesis_tests.refinement import refine
+from estimation.diagnosis.hypothesis_tests.refinement import refine_member
 from estimation.diagnosis.hypothesis_tests.scan import measure
 from estimation.diagnosis.recordings.recording import cut_recording
 from estimation.diagnosis.validations.equivalent_shapes import complete_effects, equivalent_shapes
@@ -61,15 +61,10 @@ def validate(
         lambda members, absent: measure_held_out(robot, problem, members, prepared.held_out, seed, absent),
         is_beyond,
         partial(equivalent_shapes, problem),
-        partial(_refined, problem),
+        partial(refine_member, problem),
         partial(_unnamed, robot, problem, false_alarm),
     )
     return replace(validated, compliances=_compliances(problem, prepared, validated.measured, false_alarm))
-
-
-def _refined(problem: Problem, members: Sequence[FittedEffect], i: int) -> FittedEffect:
-    """Refines one of the members beside the others, starting from its shape."""
-    return refine(problem, members[i].hypothesis, members[i].shape, accept_all_but(problem, members, i))
 
 
 def _unnamed(
