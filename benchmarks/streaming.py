@@ -9,6 +9,7 @@ import argparse
 import platform
 import random
 import socket
+import sys
 import tempfile
 import threading
 import time
@@ -16,6 +17,8 @@ import warnings
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
+
+sys.path.insert(0, str(Path(__file__).parents[1]))
 
 import numpy as np
 
