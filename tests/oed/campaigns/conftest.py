@@ -9,6 +9,8 @@ import pytest
 
 import oed
 from oed.campaigns import Campaign, Programme
+from oed.controllers.clients import ending
+from oed.controllers.recording import recorder
 from oed.experiments import Design, Effort, Ipopt
 from robots.geometry.chain import Chain, Joint
 from robots.limits import Limits
@@ -18,6 +20,13 @@ from tests.oed import flat
 
 TINY = Effort(islands=1, starts=1, screened=10, hops=0, finish_samples=100)
 BRIEF = Ipopt(max_iter=15, finish_iter=10)
+
+
+@pytest.fixture(autouse=True)
+def _impatient(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The controller of the tests runs faster than real time."""
+    monkeypatch.setattr(recorder, "LOOK", 0.1)
+    monkeypatch.setattr(ending, "STANDS", 0.1)
 
 
 @pytest.fixture(scope="session")

@@ -6,8 +6,6 @@ from pathlib import Path
 
 import pytest
 
-from oed.controllers.clients import ending
-from oed.controllers.recording import recorder
 from oed.experiments import Effort
 from robots.loading import load_robot
 from robots.robot import Robot
@@ -15,13 +13,6 @@ from tests.oed import flat
 from tests.oed.cli.conftest import ROBOT
 
 TINY = Effort(islands=1, starts=1, screened=10, hops=0, finish_samples=100)
-
-
-@pytest.fixture(autouse=True)
-def _impatient(monkeypatch: pytest.MonkeyPatch) -> None:
-    """The controller of the tests runs faster than real time."""
-    monkeypatch.setattr(recorder, "LOOK", 0.1)
-    monkeypatch.setattr(ending, "STANDS", 0.1)
 
 
 @pytest.fixture(scope="session")

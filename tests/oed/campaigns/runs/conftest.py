@@ -11,8 +11,6 @@ import pytest
 import oed
 from oed.campaigns import Programme
 from oed.controllers import ControllerOptions, Endpoint, StreamOptions, VirtualController
-from oed.controllers.clients import ending
-from oed.controllers.recording import recorder
 from oed.exports import read_trajectory
 from robots.loading import load_robot
 from robots.robot import Robot
@@ -21,13 +19,6 @@ from tests.oed.cli.conftest import ROBOT
 SPEED = 10.0
 FAST = StreamOptions(download=True, patience=10.0)
 NOWHERE = Endpoint(host="127.0.0.1", motion_port=9, state_port=9, connect_time=0.2, handshake_interval=0.1)
-
-
-@pytest.fixture(autouse=True)
-def _impatient(monkeypatch: pytest.MonkeyPatch) -> None:
-    """The controller of the tests runs faster than real time."""
-    monkeypatch.setattr(recorder, "LOOK", 0.1)
-    monkeypatch.setattr(ending, "STANDS", 0.1)
 
 
 @pytest.fixture(scope="session")
