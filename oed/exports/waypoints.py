@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from oed.exports.trajectory_csv import JOINT_COLUMN, read_lengths
 from robots.common.errors import InputError
+from robots.common.plain import several
 from robots.common.tables.table_files import Table, read_table
 from robots.robot import Robot
 
@@ -45,7 +46,7 @@ def read_waypoints(path: str | PathLike[str], n: int | None = None, *, robot: Ro
         raise InputError(f"found {names}", file=path, allowed=f"q1 to q{n}, one waypoint a row")
     q = np.column_stack([read_lengths(table, "q", joint) for joint in range(1, n + 1)])
     if len(q) < 2:
-        raise InputError(f"{len(q)} waypoint{'s' * (len(q) != 1)}", file=path, allowed="two or more")
+        raise InputError(several(len(q), "waypoint"), file=path, allowed="two or more")
     if robot is not None:
         _check_units(table, robot)
         _check_limits(q, table, robot)

@@ -31,6 +31,11 @@ def percent(share: float) -> str:
     return f"{two_digits(100 * share)} %"
 
 
+def several(count: int, noun: str) -> str:
+    """Writes how many there are of something, such as ``1 run`` or ``2 runs``."""
+    return f"{count} {noun}" if count == 1 else f"{count} {noun}s"
+
+
 def joints_in_words(numbers: Iterable[int | str]) -> str:
     """Names joints by their numbers: ``joint 2``, or ``joints 1, 2 and 4``."""
     *first, last = map(str, numbers)

@@ -6,6 +6,7 @@ from dataclasses import asdict, dataclass
 from typing import Any
 
 from oed.campaigns.loops.state import Experiment, Verdict
+from robots.common.plain import several
 from robots.robot import Robot
 
 
@@ -66,11 +67,6 @@ class LoopResult:
                 f"    held-out error per joint [% of torque RMS]: {percent(seen.before)} -> {percent(seen.after)}",
             ]
         return "\n".join(lines)
-
-
-def several(count: int, noun: str) -> str:
-    """Writes how many there are of something."""
-    return f"{count} {noun}" if count == 1 else f"{count} {noun}s"
 
 
 def percent(shares: list[float | None]) -> str:

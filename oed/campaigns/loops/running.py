@@ -18,7 +18,7 @@ from oed.campaigns.excitation import excitation_stage
 from oed.campaigns.loops.diagnosing import diagnose_logs
 from oed.campaigns.loops.options import LoopOptions
 from oed.campaigns.loops.proposals import PlannedExperiment, PlannedRun, plan_experiment
-from oed.campaigns.loops.result import LoopResult, several
+from oed.campaigns.loops.result import LoopResult
 from oed.campaigns.loops.state import Experiment, LoopRun, LoopState, Recorded, identity, remove_loop
 from oed.campaigns.runs.player import Player
 from oed.campaigns.runs.stage_progress import TitledProgress, rest
@@ -30,6 +30,7 @@ from oed.exports import read_trajectory, write_trajectory
 from robots.collision import collision_model
 from robots.common.errors import InputError, OedError
 from robots.common.files import ResultFolder
+from robots.common.plain import several
 from robots.common.progress import SILENT, Progress
 from robots.robot import Robot
 from robots.signals import Motion
