@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import threading
 import time
 from collections.abc import Mapping
@@ -26,8 +27,8 @@ Array = NDArray[np.float64]
 LOOK = 0.3
 """How long kinds of feedback are looked at before the best is chosen [s]."""
 
-BACKWARD = 1.0
-"""A controller whose time goes back by more than this has restarted [s]."""
+BACKWARD = 0.5
+"""If only messages older than the newest come for so long [s], the clock restarted. Late ones come between others."""
 
 RENEWED = 0.3
 """How long a state is waited for that was reported after a given moment [s]: states come ten a second."""
@@ -56,6 +57,7 @@ class Recorder:
         self._layout: Layout | None = None
         self._log: FeedbackLog | None = None
         self._last_stamp: float | None = None
+        self._behind_since = math.inf
         self._offset = 0.0
         self._problem: str | None = None
         self.statistics = Statistics()
@@ -247,13 +249,14 @@ class Recorder:
             return
         stamp = stamp_of(message, self._layout, self._form)
         if stamp is not None and self._last_stamp is not None and stamp <= self._last_stamp:
-            if self._last_stamp - stamp > BACKWARD:
+            self._behind_since = min(self._behind_since, now)
+            if now - self._behind_since > BACKWARD and stamp < self._last_stamp:
                 raise ControllerError(
                     f"the controller's clock went back by {self._last_stamp - stamp:.1f} s: it restarted"
                 )
             self.statistics.late += 1
             return
-        self._last_stamp = stamp
+        self._last_stamp, self._behind_since = stamp, math.inf
         positions = np.array(message.positions)  # type: ignore[union-attr]
         if self.positions is None or np.abs(positions - self.positions).max() > REST:
             self.rest_since = now
