@@ -5,6 +5,7 @@ from __future__ import annotations
 import shlex
 import warnings
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from difflib import get_close_matches
 from pathlib import Path
 
@@ -73,24 +74,31 @@ def load_robot(
             robot = robot_from_mjcf(path, tip, joints, locked, unlimited)
         else:
             robot = robot_from_yaml(path, str(path), tip, joints, locked, unlimited)
+    robot = replace(robot, stated=_as_words(robot.origin, tip, joints, locked, unlimited))
     if robot.origin not in _warned:
         _warned.add(robot.origin)
         notes = () if robot.origin in catalogue() else robot.notes
         if robot.assumed:
             notes = (f"these values are assumptions without a source: {', '.join(robot.assumed)}", *notes)
-        shown = _as_words(robot.origin, tip, joints, locked)
         for note in notes:
-            warnings.warn(DescriptionWarning(f"{robot.name}: {note}", shown), stacklevel=2)
+            warnings.warn(DescriptionWarning(f"{robot.name}: {note}", robot.stated), stacklevel=2)
     return robot
 
 
-def _as_words(origin: str, tip: str | None, joints: Sequence[str] | None, locked: Mapping[str, float] | None) -> str:
+def _as_words(
+    origin: str,
+    tip: str | None,
+    joints: Sequence[str] | None,
+    locked: Mapping[str, float] | None,
+    unlimited: bool,
+) -> str:
     """A robot and the choice of its joints, as a command line takes them."""
     words = [origin]
     words += [] if tip is None else ["--tip", tip]
     words += [] if joints is None else ["--joints", ",".join(joints)]
     for name, value in (locked or {}).items():
         words += ["--lock", f"{name}={value:g}"]
+    words += ["--unlimited"] if unlimited else []
     return shlex.join(words)
 
 

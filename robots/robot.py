@@ -37,6 +37,7 @@ class Robot:
         assumed: the quantities that no source backs, such as "limits.jerk".
         notes: what a reader of its file may not expect: values by default, doubtful ones, parts that are not used.
         origin: the catalogue name, or the file it was read from.
+        stated: the words after ``--robot`` that give it, with the options that choose its joints; empty without.
         digest: SHA-256 of what defines the robot; empty for a robot made in memory.
         urdf: the URDF or xacro file it was read from, with the file's path and arguments; empty without one.
         mjcf: the MJCF file it was read from; empty without one.
@@ -63,6 +64,7 @@ class Robot:
     assumed: tuple[str, ...] = ()
     notes: tuple[str, ...] = ()
     origin: str = ""
+    stated: str = ""
     urdf: str = ""
     mjcf: str = ""
     links: tuple[LinkPlace, ...] = ()

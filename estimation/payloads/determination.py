@@ -160,7 +160,7 @@ def missing_motion(robot: Robot, q: ArrayLike, gravity: Array | None) -> str:
     )
     move = f"move {names} by 90 deg or more" if wrist else "move the wrist joints farther"
     goal = f", so that gravity turns along {', '.join(steady)} of the flange" if steady else ""
-    design = f"`oed design --robot {robot.origin or robot.name} --payload-only`"
+    design = f"`oed design --robot {robot.stated or robot.name} --payload-only`"
     return f"{move}{goal}; {design} designs such a motion"
 
 

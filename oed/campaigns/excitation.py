@@ -45,7 +45,7 @@ def excitation_stage(robot: Robot, design: Design | str | PathLike[str]) -> tupl
         raise InputError(
             f"the design is for {known['name']}, not for {robot.name}",
             file=file,
-            remedy=f"oed design --robot {robot.name}",
+            remedy=f"oed design --robot {robot.stated or robot.name}",
         )
     if motion.period is None or abs(motion.period - robot.period) > 1e-9:
         raise InputError(f"the design's samples are {motion.period} s apart", file=file, allowed=f"{robot.period} s")

@@ -118,6 +118,7 @@ def test_a_choice_overrides_that_of_the_yaml():
     fingered = load_robot("panda", tip="panda_leftfinger", locked={"panda_joint1": 0.0}, joints=["panda_finger_joint1"])
     assert fingered.joint_names == ("panda_finger_joint1",)
     np.testing.assert_array_equal(fingered.limits.jerk, [np.inf])
+    assert fingered.stated == "panda --tip panda_leftfinger --joints panda_finger_joint1 --lock panda_joint1=0"
     wrist = load_robot("panda", tip="panda_link3")
     np.testing.assert_array_equal(wrist.limits.acceleration, whole.limits.acceleration[:3])
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -38,12 +40,12 @@ def test_a_wrist_joint_that_stands_is_named(ur10: Robot, moving: np.ndarray) -> 
     """With its name, its range, and what to do."""
     still = moving.copy()
     still[:, [4, 5]] = 0.3
-    text = missing_motion(ur10, still, None)
+    text = missing_motion(replace(ur10, stated="arm.urdf --tip tool0"), still, None)
     assert "joint 5 (wrist_2_joint, moved 0 deg)" in text
     assert "joint 6 (wrist_3_joint" in text
     assert "joint 4" not in text
     assert "90 deg" in text
-    assert "--payload-only" in text
+    assert "`oed design --robot arm.urdf --tip tool0 --payload-only`" in text
 
 
 def test_an_axis_of_the_flange_along_which_gravity_does_not_turn_is_named(ur10: Robot, moving: np.ndarray) -> None:
