@@ -16,6 +16,7 @@ from estimation.logs.mappings.mapping import LogMapping
 from estimation.logs.recorders import Recorder, recorder_of
 from estimation.logs.torque_source import TorqueSource
 from robots.common.errors import InputError
+from robots.common.plain import several
 from robots.common.tables.table import Table
 from robots.common.tables.times import is_time, seconds_of
 
@@ -145,7 +146,7 @@ def without_broken_derivatives(table: Table) -> tuple[Table, list[dict[str, Any]
         notes.append(
             {
                 "name": f"{what}_gaps",
-                "text": f"{name} has no number in {len(rows)} row{'s' if len(rows) > 1 else ''}, the first of them "
+                "text": f"{name} has no number in {several(len(rows), 'row')}, the first of them "
                 f"row {table.line(int(rows[0]))}",
                 "action": f"the {what} columns are ignored; they are computed from the positions",
                 "value": len(rows),

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 
 from estimation.diagnosis.findings import Finding
 from estimation.diagnosis.hypothesis_tests.evidence import is_close_rival
+from robots.common.plain import several
 from robots.terms.effects import EFFECTS
 
 
@@ -24,7 +25,7 @@ def state_verdict(verdict: str, findings: Sequence[Finding]) -> str:
         if finding.effect != "unexplained":
             joints.setdefault(finding.effect, []).extend([finding.joint] if finding.joint else [])
     known = ", ".join(name + _at_joints(sorted(places)) for name, places in sorted(joints.items()))
-    count = f"{len(joints)} known cause{'s' if len(joints) > 1 else ''} found: {known}" if known else ""
+    count = f"{several(len(joints), 'known cause')} found: {known}" if known else ""
     if verdict == "named" and known:
         return count
     return _VERDICTS[verdict] + (f"; {count}" if known else "")

@@ -14,6 +14,7 @@ from estimation.diagnosis.calibration import MAX_ERROR_RATIO, MIN_FIT_GAIN, MIN_
 from estimation.diagnosis.hypothesis_tests.problem import Problem
 from estimation.diagnosis.recordings.log_reading import Recording
 from estimation.regressions.parameter_priors import GaussianPrior
+from robots.common.plain import several
 
 Array = NDArray[np.float64]
 
@@ -229,7 +230,7 @@ def held_out_errors(
         errors.append(unseen.tau - other[:, :, chosen] @ values)
     # Stretches of a log that was cut at gaps contain its name.
     logs = len({name.rpartition(" from ")[0] or name for name in unseen.names})
-    how = f"{logs} log{'s' if logs > 1 else ''} that the fit has not seen"
+    how = f"{several(logs, 'log')} that the fit has not seen"
     how += f", in {len(unseen.runs)} stretches" if len(unseen.runs) > logs else ""
     weights = ~unseen.sign_unknown / problem.whitening.scale
     target = unseen.tau * weights

@@ -11,6 +11,7 @@ from scipy.ndimage import maximum_filter1d
 from estimation.gate.check import Check
 from estimation.gate.context import Context, Stage
 from estimation.gate.finding import Finding
+from robots.common.plain import several
 from robots.common.stretches import spans
 
 Array = NDArray[np.float64]
@@ -79,7 +80,7 @@ def _finding(joint: int, q: Array, rows: Rows, travel: float) -> Finding:
     return Finding(
         name="jump",
         severity="refuse" if abs(sizes[largest]) > MUCH * travel else "warning",
-        text=f"jumps {len(rows)} time{'s' if len(rows) > 1 else ''}, by up to {sizes[largest]:.4g} in one sample",
+        text=f"jumps {several(len(rows), 'time')}, by up to {sizes[largest]:.4g} in one sample",
         action="cut the log there, and check the encoder and the logger",
         value=float(sizes[largest]),
         unit="rad or m",

@@ -11,6 +11,7 @@ from estimation.gate.context import Context, Stage
 from estimation.gate.finding import Finding
 from estimation.gate.measurements.clock_steps import ClockSteps
 from estimation.gate.measurements.timing import FEWEST, Timing
+from robots.common.plain import several
 from robots.signals import Log
 
 # From this period on [s], the samples do not show the accelerations of a robot arm.
@@ -146,7 +147,7 @@ def _gaps(timing: Timing, rows: int) -> list[Finding]:
         Finding(
             name="gap",
             severity="refuse" if share > LOST else "warning",
-            text=f"{len(gaps)} gap{'s' if len(gaps) > 1 else ''} in time, the longest of {steps[longest]:.4g} s",
+            text=f"{several(len(gaps), 'gap')} in time, the longest of {steps[longest]:.4g} s",
             action="the log is split there"
             + (f"; stretches below {FEWEST} rows are left out ({100 * share:.3g} % of the rows)" if lost else ""),
             value=float(steps[longest]),

@@ -8,6 +8,7 @@ from estimation.gate.check import Check
 from estimation.gate.context import Context, Stage
 from estimation.gate.finding import Finding
 from estimation.gate.measurements.outliers import are_isolated
+from robots.common.plain import several
 
 
 class Spikes(Check):
@@ -31,7 +32,7 @@ class Spikes(Check):
                 Finding(
                     name="spikes",
                     severity="refuse" if many and prefix == "q" else "warning",
-                    text=f"{len(rows)} outlier{'s' if len(rows) > 1 else ''}, the first with {value:.4g} between "
+                    text=f"{several(len(rows), 'outlier')}, the first with {value:.4g} between "
                     f"{before:.4g} and {after:.4g}",
                     action="too many to ignore: repair the logger" if many else "these rows are ignored",
                     value=float(len(rows)),

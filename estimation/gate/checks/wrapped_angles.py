@@ -10,6 +10,7 @@ from estimation.gate.check import Check
 from estimation.gate.context import Context, Stage
 from estimation.gate.finding import Finding
 from estimation.gate.measurements.wraps import Wraps
+from robots.common.plain import several
 from robots.robot import Robot
 
 
@@ -33,7 +34,7 @@ def _finding(robot: Robot, wraps: Wraps) -> Finding:
     low, high = float(robot.limits.lower[joint]), float(robot.limits.upper[joint])
     endless = is_continuous(robot, joint) and wraps.turn < 10.0
     unit = "rad" if wraps.turn < 10.0 else "degrees"
-    text = f"the angle wraps {count} time{'s' if count > 1 else ''}: it jumps by {wraps.turn:.4g} ({unit})"
+    text = f"the angle wraps {several(count, 'time')}: it jumps by {wraps.turn:.4g} ({unit})"
     if endless:
         action = "it was unwrapped, because the joint is continuous"
     elif not np.isfinite(low + high):
