@@ -25,6 +25,8 @@ CLOSE = 8.0
 # Unexplained share of the torques of half of the joints and of all, and share of friction, up to which torques are
 # computed and not measured.
 COMPUTED, AT_MOST, FRICTIONLESS = 0.005, 0.05, 0.12
+# Factor on the described torques below which they may be what a controller has left of them. Drives have friction.
+SUBTRACTED = 0.5
 # Findings that explain the torques already.
 EXPLAINED = (
     "delay",
@@ -82,6 +84,8 @@ class TorqueMeanings(Check):
         close = {
             OTHERWISE[other.kind] for other in others if other.odds > best.odds - CLOSE and other.kind in OTHERWISE
         }
+        if best.kind in ("current", "motor", "unit") and max(best.factors) < SUBTRACTED and _frictionless(evidence):
+            close.add(OTHERWISE["external"])
         close -= {OTHERWISE[best.kind]}
         also = f" (about as likely: {', '.join(sorted(close))})" if close else ""
         return [replace(finding, text=finding.text + also)]
@@ -134,6 +138,10 @@ def _meaning(best: Hypothesis, what: str, option: str) -> Finding:
         action=f"state {option}; ignore this if the robot's description is wrong by these factors",
         value=float(np.exp(np.mean(np.log(best.factors)))),
     )
+
+
+def _frictionless(evidence: Sequence[JointEvidence]) -> bool:
+    return float(np.median([one.friction for one in evidence])) < FRICTIONLESS
 
 
 def _computed(context: Context, evidence: Sequence[JointEvidence]) -> Finding | None:

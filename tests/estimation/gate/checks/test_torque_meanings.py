@@ -97,6 +97,18 @@ def test_unknown_torque_constants_are_estimated(arm, log_of, factors):
     assert converted.metadata["torque_was"] == "current"
 
 
+@pytest.mark.slow
+@pytest.mark.parametrize("friction", [0.0, 1.0])
+def test_small_torques_without_friction_may_be_external_ones(arm, fourier_motion, friction):
+    """A twelfth of the described torque is a current if friction is in it, and else may be what a controller left."""
+    real = replace(arm, friction=friction * arm.friction)
+    plant = nominal_plant(real, friction="coulomb-viscous", sensors=Sensors())
+    log = simulate(plant, fourier_motion(arm, 1), seed=1)
+    (finding,) = found(check_log(arm, replace(log, tau=log.tau / 12)), "torque_meaning")
+    assert "currents" in finding.text
+    assert ("external torques" in finding.text) == (friction == 0)
+
+
 def test_what_cannot_be_converted_is_refused(arm, log_of):
     """An unknown meaning, a joint that is not there, and a description without gears or links."""
     log = log_of(1)
