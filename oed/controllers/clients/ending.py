@@ -31,25 +31,14 @@ class Ending:
         recorder: its feedback.
         tolerance: distance from the last point [rad or m].
         patience: longest standstill before the end [s].
-        download: whether the robot may begin after all points were sent.
     """
 
-    def __init__(self, motion: Motion, recorder: Recorder, tolerance: float, patience: float, download: bool) -> None:
+    def __init__(self, motion: Motion, recorder: Recorder, tolerance: float, patience: float) -> None:
         self._recorder, self._tolerance, self._patience = recorder, tolerance, patience
         self._final = motion.q[-1]
         self._first = motion.q[0]
         self._travels = bool(np.abs(motion.q - motion.q[0]).max() > 2 * tolerance)
         self._longest_rest = patience + _longest_rest(motion)
-        self._download = download
-        self._moved = False
-
-    def watch(self) -> None:
-        """Looks whether the robot has begun to move."""
-        recorder = self._recorder
-        if recorder.status is not None and recorder.status.in_motion == 1:
-            self._moved = True
-        if recorder.positions is not None and self._away(self._first) > self._tolerance:
-            self._moved = True
 
     def wait(self, turn: Callable[[], None]) -> None:
         """Returns when the robot has stopped at the last point.
@@ -63,13 +52,12 @@ class Ending:
         begin = time.monotonic()
         while True:
             turn()
-            self.watch()
             now = time.monotonic()
             rest = now - max(self._recorder.rest_since, begin)
             status = self._recorder.status
             reports = status is not None and status.in_motion >= 0
             there = self._away(self._final) <= self._tolerance
-            begun = self._moved or not self._travels or not self._download
+            begun = self._moved or not self._travels
             stands = rest > (STANDS if reports else STANDS_WITHOUT_STATUS)
             if there and begun and stands and not (status is not None and status.in_motion == 1):
                 return
@@ -84,6 +72,13 @@ class Ending:
                     remedy="check drives, mode and the running program at the controller",
                 )
             time.sleep(TURN)
+
+    @property
+    def _moved(self) -> bool:
+        """Whether any feedback so far was away from the first point."""
+        n, recorder = len(self._first), self._recorder
+        extremes = [pose[:n] for pose in (recorder.lowest, recorder.highest) if pose is not None]
+        return any(float(np.abs(pose - self._first).max()) > self._tolerance for pose in extremes)
 
     def _positions(self) -> Array:
         assert self._recorder.positions is not None

@@ -22,7 +22,7 @@ from oed.controllers.recording.clock import ClockAnchor
 from oed.controllers.recording.log_file import check_log_path
 from oed.controllers.recording.recorder import Recorder
 from oed.controllers.recording.recording import with_rows
-from oed.controllers.recording.reported_joints import require_no_further_joints
+from oed.controllers.recording.reported_joints import require_no_further_joints, warn_of_other_robot
 from oed.exports.simple_message import trajectory_points
 from oed.exports.simple_message.kinds import JOINTS
 from oed.exports.trajectory_checks import check_trajectory
@@ -81,6 +81,9 @@ def stream(
         InputError: a trajectory that this robot must not play, another start pose, or a log that cannot be written.
         LinkError: the controller cannot be reached, or falls silent.
         ControllerError: the controller is not ready, refuses a point, or the robot does not reach the end.
+
+    Warns:
+        OtherRobotWarning: positions that this robot cannot have, or last joints that read zero all the time.
     """
     options = options or StreamOptions()
     metadata = metadata or {}
@@ -127,7 +130,8 @@ def stream(
                     _play(motion, robot, requests, recorder, options, progress)
                 finally:
                     with signals_held():
-                        requests.stop()
+                        if not requests.traffic.stopped:
+                            requests.stop()
         ended = "done"
     except OedError as error:
         failure, ended = error, error.problem
@@ -153,6 +157,8 @@ def stream(
         stop = "" if requests and requests.traffic.stopped else "the controller did not confirm the stop"
         raise with_rows(failure, recorder.rows, log, stop)
     assert requests is not None
+    if recorder.lowest is not None and recorder.highest is not None:
+        warn_of_other_robot(robot, recorder.lowest, recorder.highest)
     return StreamResult(
         robot=robot.name,
         place=endpoint.place(endpoint.motion_port),
@@ -178,11 +184,10 @@ def _play(
 ) -> None:
     """Sends all points and waits for the end of the motion."""
     points = trajectory_points(motion, robot.limits, kind=options.points, robot_id=options.robot_id)
-    ending = Ending(motion, recorder, options.start_tolerance, options.patience, options.download)
+    ending = Ending(motion, recorder, options.start_tolerance, options.patience)
 
     def watch() -> None:
         recorder.check()
-        ending.watch()
         problem = None if options.ignore_status else status_problem(recorder.status)
         if problem is not None:
             raise ControllerError(f"the controller reports {problem} after point {requests.traffic.sent}", remedy=CLEAR)
@@ -199,6 +204,7 @@ def _play(
         try:
             requests.stream(points, watch, lambda count: progress.update(float(count)), longest)
         except PointRefusedError as error:
+            requests.stop()
             # The reply comes before the next report of the state, which says why.
             problem = status_problem(recorder.renewed_status())
             if problem is None:

@@ -6,6 +6,7 @@ from dataclasses import asdict, dataclass
 from typing import Any
 
 from oed.controllers.recording.clock import ClockAnchor
+from oed.controllers.recording.recording import loss
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -60,7 +61,7 @@ class StreamResult:
         lines = [
             f"{self.sent} of {self.points} points played at {self.place} in {self.duration:.1f} s "
             f"({rate:.0f} points/s)",
-            f"{self.rows} rows of feedback in {self.log}" + _loss(self.feedback),
+            f"{self.rows} rows of feedback in {self.log}, {loss(self.feedback)}",
         ]
         if self.resent or self.unexpected:
             lines.append(f"{self.resent} points sent again, {self.unexpected} late or repeated replies")
@@ -69,10 +70,3 @@ class StreamResult:
         if not self.stopped:
             lines.append("the controller did not confirm the stop message after the motion")
         return "\n".join([*lines, *([self.note] if self.note else [])])
-
-
-def _loss(feedback: dict[str, Any]) -> str:
-    lost = feedback.get("lost")
-    if lost is None:
-        return ", loss unknown: the feedback carries no time"
-    return f", {lost} lost" if lost else ", none lost"

@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+import numpy as np
+
 from oed.exports.simple_message import (
     JointFeedback,
     JointPosition,
@@ -15,8 +17,14 @@ from oed.exports.simple_message import (
     shortest,
 )
 
+COARSE = 0.002
+"""Step of a clock [s] above which rows have the times of their arrival. Reals of 4 bytes reach it after 9 hours."""
+
 RANKS = {JointPosition: 1, JointFeedback: 2, TorqueFeedback: 3}
 """A controller may send several kinds; the one that says most is recorded."""
+
+
+EFFORTS = {"tau": {Valid.TORQUE: "torque"}, "i": {Valid.CURRENT: "current"}}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -73,11 +81,11 @@ class Layout:
 
 
 def layout_of(message: Message, n: int, form: WireFormat) -> Layout | None:
-    """Gives the layout of a feedback message; None for another message."""
+    """Gives the layout of a feedback message; None for another message, or one without valid positions."""
     digits = 9 if form.real_bytes == 4 else 17
     if isinstance(message, JointPosition):
         return Layout(kind=JointPosition, n=n, stamped=False, velocity=False, effort="", digits=digits)
-    if isinstance(message, JointFeedback | TorqueFeedback):
+    if isinstance(message, JointFeedback | TorqueFeedback) and Valid.POSITION in message.valid:
         valid = message.valid
         effort = ""
         if isinstance(message, TorqueFeedback):
@@ -85,7 +93,7 @@ def layout_of(message: Message, n: int, form: WireFormat) -> Layout | None:
         return Layout(
             kind=type(message),
             n=n,
-            stamped=Valid.TIME in valid,
+            stamped=Valid.TIME in valid and _step(message.time, form) <= COARSE,
             velocity=Valid.VELOCITY in valid,
             effort=effort,
             digits=digits,
@@ -101,13 +109,33 @@ def stamp_of(message: Message, layout: Layout, form: WireFormat) -> float | None
     return shortest(time) if form.real_bytes == 4 else time
 
 
-def is_valid(message: Message, layout: Layout) -> bool:
-    """Whether a message holds what the layout needs."""
-    if type(message) is not layout.kind:
-        return False
+def missing_in(message: Message, layout: Layout | None) -> str:
+    """Names what a feedback message lacks: its position, or something else that the layout needs; empty for nothing."""
     if isinstance(message, JointPosition):
-        return True
-    needed = Valid.TIME if layout.stamped else Valid.NONE
-    needed |= Valid.VELOCITY if layout.velocity else Valid.NONE
+        return ""
+    needed = {Valid.POSITION: "position"}
+    if layout is not None:
+        needed |= {Valid.TIME: "time"} if layout.stamped else {}
+        needed |= {Valid.VELOCITY: "velocity"} if layout.velocity else {}
+        needed |= EFFORTS.get(layout.effort, {})
     valid: Valid = message.valid  # type: ignore[union-attr]
-    return needed in valid
+    return " and ".join(name for bit, name in needed.items() if bit not in valid)
+
+
+def coarse_clock(message: Message, form: WireFormat) -> str:
+    """Says why rows have no times of the controller though its messages carry them; empty if they have."""
+    if isinstance(message, JointPosition) or Valid.TIME not in message.valid:  # type: ignore[union-attr]
+        return ""
+    time: float = message.time  # type: ignore[union-attr]
+    step = _step(time, form)
+    return (
+        f"the controller's clock is at {time:.0f} s and counts in steps of {1e3 * step:.1f} ms there, as a real of 4 "
+        "bytes does: rows have the times of their arrival. Its own times need a restart of the controller"
+        if step > COARSE
+        else ""
+    )
+
+
+def _step(time: float, form: WireFormat) -> float:
+    """Gives the distance of a time from the next one that a message can carry [s]."""
+    return float(np.spacing(np.float32(abs(time)))) if form.real_bytes == 4 else 0.0

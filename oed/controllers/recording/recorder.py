@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import threading
 import time
 from collections.abc import Mapping
@@ -12,10 +11,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from oed.controllers.errors import ControllerError, LinkError, ProtocolError, RecordingError
+from oed.controllers.errors import LinkError, ProtocolError, RecordingError
 from oed.controllers.links import Link
 from oed.controllers.recording.clock import ClockAnchor
-from oed.controllers.recording.feedback import RANKS, Layout, is_valid, layout_of, stamp_of
+from oed.controllers.recording.feed import Feed
+from oed.controllers.recording.feedback import coarse_clock
 from oed.controllers.recording.log_file import FeedbackLog
 from oed.controllers.recording.statistics import Statistics
 from oed.exports.simple_message import Comm, Frame, Message, MessageError, Ping, Reply, Status, WireFormat
@@ -26,9 +26,6 @@ Array = NDArray[np.float64]
 
 LOOK = 0.3
 """How long kinds of feedback are looked at before the best is chosen [s]."""
-
-BACKWARD = 0.5
-"""If only messages older than the newest come for so long [s], the clock restarted. Late ones come between others."""
 
 RENEWED = 0.3
 """How long a state is waited for that was reported after a given moment [s]: states come ten a second."""
@@ -54,12 +51,9 @@ class Recorder:
         self._lock = threading.Lock()
         self._end = threading.Event()
         self._heard = threading.Event()
-        self._layout: Layout | None = None
         self._log: FeedbackLog | None = None
-        self._last_stamp: float | None = None
-        self._behind_since = math.inf
-        self._offset = 0.0
-        self._problem: str | None = None
+        self._feed = Feed(robot.n, form)
+        self._offset, self._clock = 0.0, "controller"
         self.statistics = Statistics()
         self.status: Status | None = None
         self._status_count = 0
@@ -70,13 +64,13 @@ class Recorder:
         """Extremes of the ten positions so far."""
         self.stamp: float | None = None
         """The controller's time of the last feedback, or ours where it sends none [s]."""
-        self.rest_since = self.last_heard = time.monotonic()
+        self.rest_since = self.last_heard = self._last_row = time.monotonic()
         self.error: OedError | None = None
         self.received = 0
         self.rows = 0
         """Rows of the log, once it has ended."""
         self.note = ""
-        """What the log lacks, though it has all its rows."""
+        """What the log lacks, though it has all its rows; why its times are those of arrival."""
         self._thread = threading.Thread(target=self._run, name="feedback", daemon=True)
         self._thread.start()
 
@@ -94,8 +88,10 @@ class Recorder:
         if self.positions is None:
             raise ProtocolError(
                 f"no feedback from {self._link.place} within {self._connect_time:g} s"
-                + (f"; what came is no message: {self._problem}" if self._problem else ""),
-                remedy="check the state port and the message format; it may be no simple_message controller",
+                + (f": {self._why_no_row()}" if self._feed.problem or self.status is not None else ""),
+                remedy="check the state port and the message format; it may be no simple_message controller"
+                if self.status is None
+                else "check the controller's program, which sends it",
             )
         # Other kinds, and the status, may come less often.
         time.sleep(LOOK)
@@ -110,11 +106,17 @@ class Recorder:
         """
         if self.error is not None:
             raise self.error
-        silence = time.monotonic() - self.last_heard
+        silence = time.monotonic() - self._last_row
         if silence > self._patience and self._heard.is_set():
-            raise LinkError(
-                f"{self._link.place} is silent for {silence:.1f} s", remedy="check the controller and the network"
-            )
+            if self.last_heard <= self._last_row:
+                problem, remedy = f"{self._link.place} is silent for {silence:.1f} s", "the controller and the network"
+            else:
+                problem = f"no feedback from {self._link.place} for {silence:.1f} s: {self._why_no_row()}"
+                remedy = "the controller's program, which sends it"
+            raise LinkError(problem, remedy=f"check {remedy}")
+
+    def _why_no_row(self) -> str:
+        return self._feed.problem or "its state arrives, but no positions"
 
     def is_moving(self, tolerance: float) -> bool:
         """Whether the robot moves: its controller says so, or its positions so far differ by more than a tolerance."""
@@ -127,7 +129,7 @@ class Recorder:
     @property
     def has_torque(self) -> bool:
         """Whether the feedback carries torque or current."""
-        return self._layout is not None and bool(self._layout.effort)
+        return self._feed.layout is not None and bool(self._feed.layout.effort)
 
     def renewed_status(self) -> Status | None:
         """Waits for a state that is reported from now on; gives the last one where none comes in time."""
@@ -158,13 +160,14 @@ class Recorder:
         Raises:
             InputError: a file that cannot be written.
         """
-        assert self._layout is not None
+        layout = self._feed.layout
+        assert layout is not None
         units = ["m" if joint.kind == "prismatic" else "rad" for joint in self._robot.chain.joints]
-        layout = self._layout
         assert self.stamp is not None
+        self._clock = "controller" if layout.stamped else "arrival"
         late = 0.0 if layout.stamped else delay or 0.0
-        offset = -late if anchor is None else anchor.offset_of(self.stamp, time.time())
-        known = {**metadata, "clock": "controller" if layout.stamped else "arrival", "complete": False}
+        offset = -late if anchor is None else anchor.offset_of(self.stamp, time.time(), self._clock)
+        known = {**metadata, "clock": self._clock, "complete": False}
         if late:
             known["delay_removed"] = late
         if offset != -late:
@@ -173,14 +176,14 @@ class Recorder:
         with self._lock:
             self.statistics = Statistics()
             self.statistics.stamped = layout.stamped
-            self._last_stamp = None
+            self._feed.forget()
             self._offset = offset
             self._log = log
 
     def anchor(self) -> ClockAnchor | None:
         """Gives the end of the log, for one that continues its clock; None without rows."""
         end = self.statistics.end
-        return None if end is None else ClockAnchor(t=end, unix=time.time(), offset=self._offset)
+        return None if end is None else ClockAnchor(t=end, unix=time.time(), offset=self._offset, clock=self._clock)
 
     def finish(self, metadata: Mapping[str, Any]) -> None:
         """Ends the log and the thread, and closes the link.
@@ -209,7 +212,9 @@ class Recorder:
         try:
             log.complete({"complete": True, **metadata, "feedback": self.statistics.summary()})
         except OedError as error:
-            self.note = f"the log does not state the measured delay and loss: {error}"
+            self.note = "\n".join(
+                filter(None, [self.note, f"the log does not state the measured delay and loss: {error}"])
+            )
 
     def _run(self) -> None:
         try:
@@ -224,7 +229,7 @@ class Recorder:
                     frame = self._form.decode(data)
                 except MessageError as error:
                     self.statistics.malformed += 1
-                    self._problem = str(error)
+                    self._feed.problem, self.last_heard = f"what comes is no message ({error})", time.monotonic()
                     continue
                 self._take(frame, time.monotonic())
         except MessageError as error:
@@ -241,34 +246,27 @@ class Recorder:
             self.status = message
             self._status_count += 1
             return
-        if type(message) not in RANKS:
+        stamp = self._feed.time_of(message, now, self._log is None)
+        self.statistics.late = self._feed.late
+        if stamp is None:
             return
-        if self._layout is None or (self._log is None and RANKS[type(message)] > RANKS[self._layout.kind]):
-            self._layout = layout_of(message, self._robot.n, self._form)
-        if self._layout is None or not is_valid(message, self._layout):
-            return
-        stamp = stamp_of(message, self._layout, self._form)
-        if stamp is not None and self._last_stamp is not None and stamp <= self._last_stamp:
-            self._behind_since = min(self._behind_since, now)
-            if now - self._behind_since > BACKWARD and stamp < self._last_stamp:
-                raise ControllerError(
-                    f"the controller's clock went back by {self._last_stamp - stamp:.1f} s: it restarted"
-                )
-            self.statistics.late += 1
-            return
-        self._last_stamp, self._behind_since = stamp, math.inf
+        layout = self._feed.layout
+        assert layout is not None
+        self._feed.problem, self._last_row = "", now
         positions = np.array(message.positions)  # type: ignore[union-attr]
         if self.positions is None or np.abs(positions - self.positions).max() > REST:
             self.rest_since = now
-        self.positions, self.stamp = positions, now if stamp is None else stamp
+        self.positions, self.stamp = positions, stamp
         self.lowest = positions if self.lowest is None else np.minimum(self.lowest, positions)
         self.highest = positions if self.highest is None else np.maximum(self.highest, positions)
+        if self._log is None:
+            self.note = coarse_clock(message, self._form)
         self._heard.set()
         with self._lock:
             if self._log is not None:
-                t = (now if stamp is None else stamp) + self._offset
+                t = stamp + self._offset
                 self.statistics.add(t, now)
-                self._log.append(t, self._layout.row(message))  # type: ignore[arg-type]
+                self._log.append(t, layout.row(message))  # type: ignore[arg-type]
 
 
 def _echo(message: Message) -> Message:

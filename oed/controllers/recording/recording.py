@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-import warnings
+from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 from os import PathLike, fspath
 from typing import Any
@@ -12,8 +12,9 @@ from oed.controllers.interrupts import signals_held
 from oed.controllers.links import Endpoint, open_link
 from oed.controllers.recording.log_file import check_log_path
 from oed.controllers.recording.recorder import Recorder
-from oed.controllers.recording.reported_joints import doubts_about_robot, require_no_further_joints
-from robots.common.errors import InputError, OedError, OtherRobotWarning
+from oed.controllers.recording.reported_joints import require_no_further_joints, warn_of_other_robot
+from robots.common.errors import InputError, OedError
+from robots.common.plain import several
 from robots.common.progress import SILENT, Progress
 from robots.robot import Robot
 from robots.version import VERSION
@@ -51,9 +52,7 @@ class Recording:
 
     def summary(self) -> str:
         """Says in one line what was recorded."""
-        lost = self.feedback.get("lost")
-        loss = "loss unknown: the feedback carries no time" if lost is None else f"{lost} lost"
-        text = f"{self.rows} rows of {self.robot} in {self.duration:.1f} s written to {self.log}, {loss}"
+        text = f"{self.rows} rows of {self.robot} in {self.duration:.1f} s written to {self.log}, {loss(self.feedback)}"
         return "\n".join([text, *([self.note] if self.note else [])])
 
 
@@ -122,8 +121,7 @@ def record(
     if failure is not None:
         raise with_rows(failure, recorder.rows, log)
     if recorder.lowest is not None and recorder.highest is not None:
-        for doubt in doubts_about_robot(robot, recorder.lowest, recorder.highest):
-            warnings.warn(OtherRobotWarning(doubt), stacklevel=2)
+        warn_of_other_robot(robot, recorder.lowest, recorder.highest)
     return Recording(
         robot=robot.name,
         place=place,
@@ -134,6 +132,19 @@ def record(
         feedback=recorder.statistics.summary(),
         note=recorder.note,
     )
+
+
+def loss(feedback: Mapping[str, Any]) -> str:
+    """Says how many rows were lost, and how many messages came too late to be one.
+
+    Args:
+        feedback: `Statistics.summary`.
+    """
+    lost, late = feedback.get("lost"), feedback.get("late_or_twice")
+    if lost is None:
+        return "loss unknown: rows have the times of their arrival"
+    text = f"{lost} lost" if lost else "none lost"
+    return f"{text}, {several(late, 'message')} left out that came late or twice" if late else text
 
 
 def with_rows(error: OedError, rows: int, log: str | PathLike[str] | None, *further: str) -> OedError:

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import warnings
+
 import numpy as np
 from numpy.typing import NDArray
 
-from robots.common.errors import InputError
+from robots.common.errors import InputError, OtherRobotWarning
 from robots.robot import Robot
 
 Array = NDArray[np.float64]
@@ -33,6 +35,12 @@ def require_no_further_joints(unused: Array, robot: Robot) -> None:
         )
 
 
+def warn_of_other_robot(robot: Robot, lowest: Array, highest: Array) -> None:
+    """Warns of what `doubts_about_robot` finds."""
+    for doubt in doubts_about_robot(robot, lowest, highest):
+        warnings.warn(OtherRobotWarning(doubt), stacklevel=3)
+
+
 def doubts_about_robot(robot: Robot, lowest: Array, highest: Array) -> list[str]:
     """Names what speaks against a robot in the positions that its controller reports.
 
@@ -55,9 +63,11 @@ def doubts_about_robot(robot: Robot, lowest: Array, highest: Array) -> list[str]
     for joint in range(n):
         lower, upper = float(robot.limits.lower[joint]), float(robot.limits.upper[joint])
         outside = lowest[joint] if lowest[joint] < lower - BEYOND else highest[joint]
+        in_degrees = robot.chain.kinds[joint] == "revolute" and abs(outside) > 2 * np.pi
+        cause = "be of another robot, or send degrees" if in_degrees else "be of another robot"
         if lowest[joint] < lower - BEYOND or highest[joint] > upper + BEYOND:
             found.append(
                 f"joint {joint + 1} is reported at {outside:.3g} {robot.limits.unit(joint)}, outside the limits of "
-                f"{robot.name} ({lower:.3g} to {upper:.3g}): the controller may be of another robot. Check --robot"
+                f"{robot.name} ({lower:.3g} to {upper:.3g}): the controller may {cause}. Check --robot"
             )
     return found

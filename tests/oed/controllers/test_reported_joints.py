@@ -29,6 +29,11 @@ def test_doubts() -> None:
     silent, outside = doubts_about_robot(panda, ten(0.1, -0.2, 0.3, 0.2, 0.1, 0.5), ten(0.2, 0.1, 0.4, 0.4, 0.2, 0.6))
     assert "joint 7 of panda reads exactly 0 all the time: the controller may have 6 joints" in silent
     assert "joint 4 is reported at 0.4 rad, outside the limits of panda" in outside
+    turned = np.degrees(panda.limits.home)
+    assert any(
+        "may be of another robot, or send degrees" in text
+        for text in doubts_about_robot(panda, ten(*turned), ten(*turned))
+    )
     # A robot that stands at zero says nothing of its joints.
     assert not [text for text in doubts_about_robot(load_robot("er3a"), ten(), ten()) if "exactly 0" in text]
 

@@ -68,6 +68,14 @@ def test_every_point_is_played_in_order(transport, points, robot, controllers, l
     assert 0 < read.metadata["message_delay"] < 0.5
 
 
+def test_a_robot_that_never_moves_has_not_played(robot, controllers, log: Path) -> None:
+    """A controller takes all points at once and does not move: the trajectory ends where it began, and is not done."""
+    controller, endpoint = controllers(stuck=True, capacity=5000, status=False)
+    with pytest.raises(ControllerError, match="the robot has not begun to move"):
+        stream(swing(robot), robot, endpoint, log=log, options=StreamOptions(patience=1.0))
+    assert (controller.points, controller.player.played_trajectories) == (300, 0)
+
+
 def test_torque_is_that_of_the_virtual_robot(robot, controllers, log: Path) -> None:
     """Torque in the log is that of `oed simulate` for the same trajectory, computed piece by piece or not."""
     motion = swing(robot)
