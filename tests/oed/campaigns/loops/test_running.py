@@ -207,7 +207,7 @@ def test_two_hidden_effects_are_named(two, designed, controllers, tmp_path: Path
     place = controllers(load_plant(tmp_path / "plant.yaml", two), seed=4)
     options = replace(FREE, friction="coulomb-viscous")
     result = run_loop(two, place, tmp_path / "loop", design=designed, options=options, stream_options=FAST, speed=SPEED)
-    assert result.success
+    assert result.success, result.summary()
     assert result.diagnosis.verdict == "named"
     assert sorted(result.diagnosis.causes) == ["asymmetric friction of joint 1", "load dependent friction of joint 2"]
     assert result.experiments[0].diagnosis.verdict == "ambiguous"
