@@ -9,7 +9,14 @@ from typing import Any
 from robots.common.errors import InputError
 from robots.common.registry import Registry, subclass_check
 from robots.terms.base import Column, Term
-from robots.terms.friction import COULOMB_VISCOUS, POLYNOMIAL, BendingFriction, FrictionPolynomial, FrictionTerm
+from robots.terms.friction import (
+    COULOMB_VISCOUS,
+    FINE_BENDS,
+    POLYNOMIAL,
+    BendingFriction,
+    FrictionPolynomial,
+    FrictionTerm,
+)
 from robots.terms.position_torque import PositionTorque
 from robots.terms.rigid_body import RigidBody
 from robots.terms.rotor_inertia import RotorInertia
@@ -50,6 +57,7 @@ def build_term(description: Mapping[str, Any]) -> Term:
 __all__ = [
     "TERMS",
     "COULOMB_VISCOUS",
+    "FINE_BENDS",
     "POLYNOMIAL",
     "Column",
     "FrictionPolynomial",

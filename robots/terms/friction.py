@@ -18,8 +18,10 @@ if TYPE_CHECKING:
 
 COULOMB_VISCOUS = (1, 2)
 POLYNOMIAL = (1, 2, 3, 4)
-# Where the saturating parts bend, as shares of the usual highest speed.
+# Where the saturating parts bend, as shares of the usual highest speed; and where they do so that the polynomial's
+# terms are held to 2.4 % of what Coulomb and viscous friction leave of them, instead of 28 %.
 BENDS = (0.1, 0.4)
+FINE_BENDS = (0.1, 0.4, 1.0)
 # Speed [rad/s or m/s] below which a joint stands, and share of the rows whose speed is usual: noise makes larger ones.
 SLOWEST, USUAL = 1e-3, 0.999
 
@@ -137,64 +139,69 @@ class FrictionPolynomial(FrictionTerm):
 
 @dataclass(frozen=True, kw_only=True)
 class BendingFriction(FrictionTerm):
-    """tau_f = f1 sign(dq) + f2 dq + f3 tanh(dq / (0.1 v)) + f4 tanh(dq / (0.4 v)), on each joint.
+    """tau_f = f1 sign(dq) + f2 dq + f3 tanh(dq / (b1 v)) + f4 tanh(dq / (b2 v)) + ..., on each joint.
 
     v is the highest speed of the data. Within it the curve bends as measured ones do: it falls after the start
     (Stribeck) or flattens at high speed. Beyond it grows like f2 dq, and a log says nothing that could make it explode.
 
     Attributes:
         speed: v [rad/s or m/s], one value for all joints or one per joint.
+        bends: b1, b2, ...
         velocity_scale: see `FrictionTerm`.
 
     Raises:
-        InputError: a speed that is not positive, or a negative scale.
+        InputError: a speed or a bend that is not positive, or a negative scale.
     """
 
     speed: float | tuple[float, ...] = 1.0
+    bends: tuple[float, ...] = BENDS
     velocity_scale: float | tuple[float, ...] = 0.0
     name: str = "bending_friction"
 
     def __post_init__(self) -> None:
-        """Checks the speeds and the scale.
+        """Checks the speeds, the bends and the scale.
 
         Raises:
-            InputError: a speed that is not positive, or a negative scale.
+            InputError: a speed or a bend that is not positive, or a negative scale.
         """
         super().__post_init__()
         if not np.all(np.asarray(self.speed) > 0):
             raise InputError(f"highest speed {self.speed} of the friction", allowed="positive numbers")
+        if not np.all(np.asarray(self.bends) > 0):
+            raise InputError(f"bends {self.bends} of the friction", allowed="positive numbers")
 
     @classmethod
-    def within(cls, speeds: NDArray[np.float64]) -> BendingFriction:
+    def within(cls, speeds: NDArray[np.float64], bends: tuple[float, ...] = BENDS) -> BendingFriction:
         """Builds the friction of motions with these highest speeds (n,) [rad/s or m/s], rounded to two digits."""
         # A joint that stands says nothing of its speed.
-        return cls(speed=tuple(float(f"{speed:.2g}") if speed > SLOWEST else 1.0 for speed in speeds))
+        return cls(speed=tuple(float(f"{speed:.2g}") if speed > SLOWEST else 1.0 for speed in speeds), bends=bends)
 
     def units(self, force: str, length: str) -> dict[str, str]:
-        """Returns the units of one joint's four coefficients."""
-        return {"f1": force, "f2": f"{force} s/{length}", "f3": force, "f4": force}
+        """Returns the units of one joint's coefficients."""
+        bent = {f"f{3 + k}": force for k in range(len(self.bends))}
+        return {"f1": force, "f2": f"{force} s/{length}"} | bent
 
     def row(self, dq: casadi.SX, sign: casadi.SX, scale: float) -> casadi.SX:
         """Builds the columns that do not depend on v (1, 2)."""
         return casadi.horzcat(sign, dq)
 
     def joint_row(self, robot: Robot, joint: int, dq: casadi.SX, sign: casadi.SX, scale: float) -> casadi.SX:
-        """Builds the four columns of a joint (1, 4).
+        """Builds the columns of a joint (1, k).
 
         Raises:
             InputError: the number of speeds is not the number of joints.
         """
         speed = _each(self.speed, robot, "highest speeds of the friction")[joint]
-        return casadi.horzcat(self.row(dq, sign, scale), *(casadi.tanh(dq / (share * speed)) for share in BENDS))
+        return casadi.horzcat(self.row(dq, sign, scale), *(casadi.tanh(dq / (share * speed)) for share in self.bends))
 
     def nominal(self, robot: Robot) -> NDArray[np.float64]:
-        """Returns the coefficients (4 n,) that come nearest to the description's polynomial up to each v."""
+        """Returns the coefficients (k n,) that come nearest to the description's polynomial up to each v."""
         found = []
         for described, speed in zip(
             np.asarray(robot.friction, dtype=float), _each(self.speed, robot, "speeds"), strict=True
         ):
             v = speed * (np.arange(50) + 0.5) / 50
-            shapes = np.column_stack([np.ones_like(v), v, *(np.tanh(v / (share * speed)) for share in BENDS)])
+            shapes = np.column_stack([np.ones_like(v), v, *(np.tanh(v / (share * speed)) for share in self.bends)])
             polynomial = np.column_stack([np.ones_like(v), v, v**2, v**3]) @ described
             found.append(np.linalg.lstsq(shapes, polynomial, rcond=None)[0])
         return np.concatenate(found)

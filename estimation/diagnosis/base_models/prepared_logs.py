@@ -19,7 +19,7 @@ from robots.common.errors import NotIdentifiableError
 from robots.common.forks import forked
 from robots.robot import Robot
 from robots.signals import Log
-from robots.terms import BendingFriction
+from robots.terms import FINE_BENDS, BendingFriction
 from robots.terms.friction import USUAL
 
 # Width of the friction sign [rad/s or m/s] before it is fitted to the logs.
@@ -79,7 +79,8 @@ def prepare_logs(
     # Held-out logs count too: a gravity that occurs only there needs the robot's description as a prior.
     gravities = [log.gravity for log in (*fit, *other) if log.gravity is not None]
     speeds = np.quantile(np.abs(recording.dq), USUAL, axis=0)
-    chosen = BendingFriction.within(speeds) if friction == "auto" else friction
+    # A curve that the base model cannot follow would have a name.
+    chosen = BendingFriction.within(speeds, FINE_BENDS) if friction == "auto" else friction
     base = base_parameters(robot, chosen, (FIRST_VELOCITY_SCALE,) * robot.n, gravities)
     if unusable := find_unusable_logs(base, recording):
         notes += [_UNUSABLE.format(k + 1, _in_brackets(recording.names[k]), 100 * s) for k, s in unusable.items()]

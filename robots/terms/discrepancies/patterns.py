@@ -185,7 +185,7 @@ class Pattern(JointEffect):
         who = f"joint {self.other}" if self.other and self.other != joint else "its own joint"
         point = f"{shape[0]:.3g}" if shape else ""
         text = FAMILIES[self.kind].words.format(who=who, point=point)
-        turn = "and changes sign with the direction of motion" if self.odd else ""
+        turn = " and changes sign with the direction of motion" if self.odd else ""
         return f"The residual torque {where} {text}{turn}."
 
 

@@ -8,7 +8,7 @@ import pytest
 from robots.common.errors import InputError
 from robots.geometry.chain import Joint
 from robots.regressor import TorqueModel
-from robots.terms import COULOMB_VISCOUS, FrictionPolynomial
+from robots.terms import COULOMB_VISCOUS, FINE_BENDS, BendingFriction, FrictionPolynomial
 
 DQ = np.array([[-2.0, 0.0], [0.0, 0.5], [1e-9, -0.3], [3.0, 4.0]])
 EXACT = 1e-15  # a few multiplications
@@ -78,3 +78,24 @@ def test_each_joint_may_have_its_own_velocity_scale(robot):
     )
     with pytest.raises(InputError, match="3 friction velocity scales; allowed: one, or 2"):
         torque(robot, FrictionPolynomial(powers=(1,), velocity_scale=(0.02, 0.0, 1.0)), [1, 1])
+
+
+@pytest.mark.parametrize("power", [2, 3])
+def test_fine_bends_follow_the_polynomial(robot, power):
+    """They hold its terms to 2.5 % of what Coulomb and viscous friction leave, at speeds up to the highest one."""
+    v = np.linspace(0.01, 1.0, 200)[:, None] * [1.0, 2.0]
+    model = TorqueModel(robot, (BendingFriction(speed=(1.0, 2.0), bends=FINE_BENDS),))
+    Y = model.regressor(v, v, v).reshape(len(v), 2, 2, 5)
+    for joint in (0, 1):
+        left = []
+        for X in (Y[:, joint, joint, :2], Y[:, joint, joint]):
+            y = v[:, joint] ** power
+            left.append((y - X @ np.linalg.lstsq(X, y, rcond=None)[0]).std())
+        assert left[1] < 0.025 * left[0]
+    assert [c.symbol for c in model.columns[:5]] == ["f1", "f2", "f3", "f4", "f5"]
+
+
+def test_a_bend_of_zero_is_refused():
+    """A bend is a share of the highest speed, and positive."""
+    with pytest.raises(InputError, match="bends"):
+        BendingFriction(bends=(0.1, 0.0))

@@ -51,6 +51,20 @@ def test_friction_that_turns_round_at_once_leaves_nothing(
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize("power", [2, 3])
+def test_friction_that_bends_over_all_speeds_has_no_name(
+    arm: Robot, arm_plant: Callable, fourier_motion: Callable, power: int
+) -> None:
+    """The square or the cube of the speed belongs to the base model, and is no Stribeck friction at high speed."""
+    motion = fourier_motion(arm, 0, duration=60.0)
+    log = simulate(arm_plant(torque_noise=0.005), motion, seed=0)
+    speed = motion.dq / np.abs(motion.dq).max(axis=0)
+    bent = replace(log, tau=log.tau - 0.15 * log.tau.std(axis=0) * speed * np.abs(speed) ** (power - 1))
+    result = diagnose(arm, bent, candidates=("stribeck", "load_dependent_friction", "torque_constant_saturation"))
+    assert result.verdict == "none", result.summary()
+
+
+@pytest.mark.slow
 def test_beside_reversals_a_fit_to_the_other_rows_leaves_no_more_than_the_torque(
     arm: Robot, arm_plant: Callable, fourier_motion: Callable
 ) -> None:
