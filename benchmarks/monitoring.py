@@ -33,9 +33,10 @@ import numpy as np
 
 from benchmarks.monitoring_parts.tables import print_table
 from benchmarks.monitoring_parts.virtual_robot import DAY, Cause, VirtualRobot
+from benchmarks.monitoring_parts.weeks import draw_causes, size_of
 from estimation import fit_campaign, identify
 from estimation.models.model import model_from_dict
-from estimation.monitoring import Baseline, Finding, Monitor, MonitorSettings, baseline_of
+from estimation.monitoring import Baseline, Monitor, MonitorSettings, baseline_of
 from oed.benchmarks.truth.description import write_description
 from robots import load_robot
 from robots.signals import Log
@@ -209,41 +210,7 @@ def week(folder: Path, number: int, *, stops: bool = False) -> dict[str, Any]:
     robot.swing = float(rng.uniform(0.0, 6.0))
     robot.rest(float(rng.uniform(0.2, 1.0)) * DAY)
     begin = robot.clock
-    kinds = (
-        ("nothing", 0.2),
-        ("damage", 0.25),
-        ("payload", 0.15),
-        ("contact", 0.15),
-        ("damage+payload", 0.1),
-        ("damage+contact", 0.05),
-        ("damage+damage", 0.1),
-    )
-    kind = str(rng.choice([name for name, _ in kinds], p=[share for _, share in kinds]))
-    # From the second day on, anywhere in a cycle; a contact within a log, for it is not seen elsewhere.
-    day, place = int(rng.integers(1, 4)), int(rng.integers(0, 6))
-    offset = float(rng.uniform(0.0, CYCLE if "contact" not in kind else 45.0)) + (10.0 if "contact" in kind else 0.0)
-    moment = begin + day * DAY + place * CYCLE + offset
-    joints = rng.permutation(robot.n)[:2] + 1
-    causes: list[Cause] = []
-    for part in kind.split("+"):
-        if part == "damage":
-            joint = int(joints[sum(cause.kind == "damage" for cause in causes)])
-            causes.append(Cause(kind=part, time=moment, joint=joint, amount=float(rng.uniform(0.1, 0.4))))
-        elif part == "payload":
-            centre = (float(rng.uniform(-0.05, 0.05)), float(rng.uniform(-0.05, 0.05)), float(rng.uniform(0.05, 0.15)))
-            causes.append(Cause(kind=part, time=moment, amount=float(rng.uniform(0.5, 2.5)), centre=centre))
-        elif part == "contact":
-            direction = rng.normal(size=3)
-            direction /= np.linalg.norm(direction)
-            causes.append(
-                Cause(
-                    kind=part,
-                    time=moment,
-                    amount=float(rng.uniform(30.0, 80.0)),
-                    seconds=float(rng.uniform(0.3, 1.0)),
-                    direction=tuple(direction.tolist()),
-                )
-            )
+    kind, moment, causes = draw_causes(rng, begin, robot.n, CYCLE)
     robot.causes = causes
     monitors = monitors_of(models, "stops" if stops else "weeks")
     for _ in range(5):
@@ -265,19 +232,9 @@ def week(folder: Path, number: int, *, stops: bool = False) -> dict[str, Any]:
             "right": [tuple(item) for item in named] == truth,
             "found": [f.sentence(begin) for f in found],
             "dated": [bool(f.earliest <= moment <= f.latest) for f in found],
-            "sizes": [_size(f, causes) for f in found if _size(f, causes) is not None],
+            "sizes": [size_of(f, causes) for f in found if size_of(f, causes) is not None],
         }
     return row
-
-
-def _size(f: Finding, causes: Sequence[Cause]) -> list[float] | None:
-    """Found and true size with the interval, of a finding with a cause."""
-    for cause in causes:
-        if f.kind == cause.kind == "damage" and f.joint == cause.joint:
-            return [f.size, 100 * cause.amount, f.low, f.high]
-        if f.kind == cause.kind == "payload":
-            return [f.size, cause.amount, f.low, f.high]
-    return None
 
 
 def speed(folder: Path) -> dict[str, Any]:
