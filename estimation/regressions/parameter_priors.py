@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from scipy.linalg import solve_triangular
 
 from robots.base_parameters import BaseParameters
+from robots.terms import Column
 from robots.terms.rigid_body import SYMBOLS
 
 Array = NDArray[np.float64]
@@ -18,6 +19,8 @@ SMALLEST_LINK = 0.05
 SMALLEST_REACH = 0.3
 # Friction, rotor and offset of a joint may make so many times its torque: descriptions rarely state them.
 OWN = 3.0
+# The same of friction beyond Coulomb and viscous friction: its parts are alike where rows at low speed do not count.
+BENT = 0.2
 # A column below this RMS does not act.
 SILENT = 1e-9
 # Standard deviations from which a contradiction weakens the description's prior, and iterations of that weakening.
@@ -72,8 +75,13 @@ def prior_from_description(base: BaseParameters, torque: Array, level: Array) ->
             spread[i] = links[joint, SYMBOLS.index(column.symbol)]
         elif i in own:
             # A column that never acts is held at its description by any spread.
-            spread[i] = OWN * torque[joint] / (level[own[i]] if level[own[i]] > SILENT else 1.0)
+            spread[i] = usual_share(column) * torque[joint] / (level[own[i]] if level[own[i]] > SILENT else 1.0)
     return prior_of_spreads(base, spread, model.nominal)
+
+
+def usual_share(column: Column) -> float:
+    """Gives the torque that friction, rotor or offset of a joint may make, over that of the joint."""
+    return BENT if column.friction and column.symbol not in ("f1", "f2") else OWN
 
 
 def prior_of_spreads(base: BaseParameters, spread: Array, target: Array) -> GaussianPrior:

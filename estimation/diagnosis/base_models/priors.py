@@ -7,7 +7,14 @@ from numpy.typing import NDArray
 
 from estimation.diagnosis.base_models.baseline import Baseline
 from estimation.diagnosis.recordings.log_reading import Recording
-from estimation.regressions.parameter_priors import OWN, SILENT, GaussianPrior, friction_levels, prior_from_description
+from estimation.regressions.parameter_priors import (
+    OWN,
+    SILENT,
+    GaussianPrior,
+    friction_levels,
+    prior_from_description,
+    usual_share,
+)
 
 Array = NDArray[np.float64]
 
@@ -49,7 +56,8 @@ def base_model_prior(baseline: Baseline, recording: Recording, strength: float =
     pull = prior_from_description(baseline.base, torque, raised)
     if pull is None:
         levels[own, np.arange(len(own))] = raised
-        share = (levels / torque[:, None]).max(axis=0) / OWN
+        usual = np.array([usual_share(column) for column in baseline.base.columns])
+        share = (levels / torque[:, None]).max(axis=0) / usual
         pull = GaussianPrior(np.diag(np.maximum(share, SILENT) ** 2), np.zeros(len(own)))
     b, m = len(pull.target), baseline.nuisance.shape[2]
     precision = np.zeros((b + m, b + m))
