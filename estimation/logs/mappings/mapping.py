@@ -6,7 +6,7 @@ from os import PathLike
 from typing import Annotated, Any, Literal
 
 import numpy as np
-from pydantic import BeforeValidator, Field, field_validator
+from pydantic import BeforeValidator, Field, field_validator, model_validator
 
 from robots.common.config import Config, read_config
 
@@ -27,12 +27,25 @@ Texts = Annotated[list[str], BeforeValidator(_named)]
 Numbers = Annotated[list[float], BeforeValidator(_listed)]
 
 
+# The usual names of the columns of each quantity of all joints, with the joint's number behind.
+USUAL = {
+    "position": "q",
+    "velocity": "dq",
+    "acceleration": "ddq",
+    "torque": "tau",
+    "current": "i",
+    "temperature": "temp",
+    "link_position": "qlink",
+}
+
+
 class PerJoint(Config):
     """One quantity of all joints.
 
     Attributes:
         columns: one name a joint in the robot's order, or one name for all: a pattern with ``{joint}`` (the joint's
-            name where `LogMapping.joints` states them, else its number from 1) or ``{index}`` (its number from 0).
+            name where `LogMapping.joints` states them, else its number from 1) or ``{index}`` (its number from 0). By
+            default the usual names of a log.
         unit: as in `docs/files.md`, or ``%`` of ``rated``; one for all or one per joint. One of angles for all joints
             leaves linear axes in m and N.
         sign: 1 or -1, one for all or one per joint.
@@ -122,6 +135,18 @@ class LogMapping(Config):
     torque_is: str | None = None
     coupling: dict[int, dict[int, float]] | None = None
     coupled_torques: bool = False
+
+    @model_validator(mode="before")
+    @classmethod
+    def _usual_columns(cls, data: Any) -> Any:
+        if not isinstance(data, dict):
+            return data
+        usual = {
+            key: {"columns": USUAL[key], **value}
+            for key, value in data.items()
+            if key in USUAL and isinstance(value, dict)
+        }
+        return data | usual
 
 
 def read_mapping(path: str | PathLike[str]) -> LogMapping:

@@ -44,6 +44,16 @@ def test_motor_side_and_torque_constants(tmp_path):
     np.testing.assert_allclose(log.tau, [[0.05 * 20, 0.01 * 5], [0.1 * 20, -0.01 * 5]])
 
 
+def test_a_sign_alone_keeps_the_usual_columns(tmp_path):
+    """The check of a log advises a sign, a scale or a unit for one joint: no columns need be named for it."""
+    path, mapping = files(
+        tmp_path, "t,q1,q2,tau1,tau2\n0,1,2,3,4\n1,2,3,4,5\n", "position: {sign: [1, -1]}\ntorque: {unit: N mm}\n"
+    )
+    log = read_log(path, 2, mapping=mapping)
+    np.testing.assert_allclose(log.q, [[1, -2], [2, -3]])
+    np.testing.assert_allclose(log.tau, [[0.003, 0.004], [0.004, 0.005]])
+
+
 COUPLED = "t,q1,q2,q3,tau1,tau2,tau3\n0,1,2,5,7,8,9\n1,2,3,7,8,9,10\n"
 
 
