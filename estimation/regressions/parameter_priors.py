@@ -46,17 +46,18 @@ class GaussianPrior:
         return GaussianPrior(self.precision[np.ix_(chosen, chosen)], self.target[chosen])
 
 
-def prior_from_description(base: BaseParameters, torque: Array, level: Array) -> GaussianPrior | None:
+def prior_from_description(base: BaseParameters, bodies: Array, torque: Array, level: Array) -> GaussianPrior | None:
     """Builds the prior from the robot's description, scaled by its expected errors.
 
     Standard inertial parameters scatter about the description by each link's mass m, m l and m l^2, l its radius of
     gyration about its frame; regrouped, that is the covariance K S K' of base parameters, so that a combination which
     only light links feel is held tighter than one of heavy ones. Friction, rotor and offset scatter about what is
-    described by three times what makes their joint's torque at the joint's limit velocity: a cubic term that a slow log
-    leaves open must not explode beyond it.
+    described by three times what makes their joint's torque at the joint's limit velocity, friction beyond Coulomb and
+    viscous friction by a fifth: a cubic term that a slow log leaves open must not explode beyond it.
 
     Args:
         base: base parameters.
+        bodies: by whose size the links scatter (n, 10), such as the described ones.
         torque: each joint's torque RMS (n,) [N m or N].
         level: RMS of each column on the joint of its own (b,).
 
@@ -67,7 +68,7 @@ def prior_from_description(base: BaseParameters, torque: Array, level: Array) ->
     if not np.isfinite(model.nominal).all() or not np.any(model.robot.inertia):
         return None
     spread = np.zeros(model.size)
-    links = link_spreads(np.asarray(model.robot.inertia, dtype=float))
+    links = link_spreads(bodies)
     own = {column: position for position, column in enumerate(base.independent)}
     for i, column in enumerate(model.columns):
         joint = column.joint - 1

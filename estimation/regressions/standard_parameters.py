@@ -26,6 +26,9 @@ OWN_SHARE, ARM_SHARE = 0.2, 0.05
 GRAVITY = 9.81
 # A column whose share of those that span it cancels to this part of their squares does not act.
 SPANNED = 1e-12
+# Placeholders: all links of a description that together weigh less than this share of what the torques suggest, and a
+# link below this share of the heaviest one.
+PLACEHOLDERS, PLACEHOLDER = 0.1, 1e-3
 # Speeds, as shares of the largest, at which friction must not drive the joint, and from which on it must not fall.
 SPEEDS = np.linspace(0.0, 1.0, 13)
 RISING = 0.5
@@ -92,6 +95,8 @@ def body_columns(model: TorqueModel) -> NDArray[np.intp]:
 def reference_bodies(robot: Robot, mass: float) -> tuple[Array, NDArray[np.bool_]]:
     """Gives a physically possible body per link: the description's, corrected if degenerate, or a plausible one.
 
+    Exporters write tiny masses for links without material. Such placeholders are no description.
+
     Args:
         robot: the robot.
         mass: of an arm without description [kg].
@@ -106,6 +111,8 @@ def reference_bodies(robot: Robot, mass: float) -> tuple[Array, NDArray[np.bool_
     arm = max(float(lengths.sum()), float(np.linalg.norm(joints[0].translation)), 0.1)
     bodies = np.empty((robot.n, SIZE))
     described = np.isfinite(inertia).all(axis=1) & (inertia[:, 0] > 0)
+    masses = np.where(described, inertia[:, 0], 0.0)
+    described &= (masses > PLACEHOLDER * masses.max()) & (masses.sum() > PLACEHOLDERS * mass)
     for link in range(robot.n):
         if described[link]:
             bodies[link] = _corrected_body(inertia[link], 0.01 * arm)

@@ -15,6 +15,7 @@ from estimation.regressions.parameter_priors import (
     prior_from_description,
     usual_share,
 )
+from estimation.regressions.standard_parameters import mass_from_torque, reference_bodies
 
 Array = NDArray[np.float64]
 
@@ -53,7 +54,9 @@ def base_model_prior(baseline: Baseline, recording: Recording, strength: float =
     raised = friction_levels(
         baseline.base, levels[own, np.arange(len(own))], np.quantile(np.abs(recording.dq), FASTEST, axis=0)
     )
-    pull = prior_from_description(baseline.base, torque, raised)
+    robot = baseline.base.model.robot
+    bodies, _ = reference_bodies(robot, mass_from_torque(robot, float(torque.max())))
+    pull = prior_from_description(baseline.base, bodies, torque, raised)
     if pull is None:
         levels[own, np.arange(len(own))] = raised
         usual = np.array([usual_share(column) for column in baseline.base.columns])

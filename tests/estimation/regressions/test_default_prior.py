@@ -27,6 +27,22 @@ def test_the_target_is_the_description(base, arm):
     assert (np.linalg.eigvalsh(prior.precision) > 0).all()
 
 
+@pytest.mark.parametrize("links", [slice(None), slice(1, None)])
+def test_a_placeholder_is_no_description(arm, links):
+    """Links of a gram, as exporters write them for links without material, scatter as links without description do.
+
+    Else the fit would hold them at a gram: 26 % of a joint's torque remained with such a description.
+    """
+    spreads = []
+    for mass in (1e-3, np.nan):
+        inertia = np.array(arm.inertia)
+        inertia[links] = mass * np.array([1.0, 0, 0, 0, 1e-3, 0, 0, 1e-3, 0, 1e-3])
+        base = find_base_parameters(default_model(replace(arm, inertia=inertia), velocity_scale=0.01))
+        prior = default_prior(base, np.array([20.0, 5.0]), np.ones(base.model.size))
+        spreads.append(np.sqrt(np.diag(np.linalg.inv(prior.precision))))
+    np.testing.assert_allclose(spreads[0], spreads[1], rtol=1e-6)
+
+
 def test_units_of_mass_do_not_matter(arm):
     """An arm a thousand times lighter, with torques a thousand times smaller, has a prior a thousand times narrower."""
     for inertia in (np.asarray(arm.inertia), None):

@@ -17,7 +17,7 @@ def base(arm):
 def test_the_pull_is_to_the_description(base, arm):
     """Its target is what the robot's description says, and what the description calls large may be off by more."""
     ones = np.ones(base.size)
-    pull = prior_from_description(base, np.ones(2), ones)
+    pull = prior_from_description(base, np.asarray(arm.inertia), np.ones(2), ones)
     np.testing.assert_allclose(pull.target, base.from_standard(base.model.nominal))
     assert (np.linalg.eigvalsh(pull.precision) > 0).all()
     spreads = link_spreads(np.asarray(arm.inertia))
@@ -29,7 +29,10 @@ def test_the_pull_is_to_the_description(base, arm):
 def test_without_description_there_is_no_pull(arm):
     """A robot whose inertial parameters nobody states is not pulled to zero masses."""
     bare = replace(arm, inertia=None)
-    assert prior_from_description(find_base_parameters(default_model(bare)), np.ones(2), np.ones(100)) is None
+    assert (
+        prior_from_description(find_base_parameters(default_model(bare)), np.ones((2, 10)), np.ones(2), np.ones(100))
+        is None
+    )
 
 
 def test_friction_counts_at_the_limit_velocity(base, arm):
