@@ -30,6 +30,8 @@ Array = NDArray[np.float64]
 Element = ElementTree.Element
 
 EYE = np.eye(4)
+# Limits that are not known: a URDF states both, velocity and effort, in finite numbers.
+UNKNOWN = 1e9
 ROUGH = 0.02  # of the friction: a larger difference from the identified curve is named in the file
 
 
@@ -92,6 +94,8 @@ def build_urdf(model: Model, robot: Robot | None = None) -> Urdf:
     from_file = is_description(source) and split_arguments(source)[0].is_file()
     kept: list[str] = []
     root = _updated(source, known, inertia, kept) if from_file else _chain(known, inertia)
+    if not from_file and not np.isfinite([known.limits.velocity, known.limits.torque]).all():
+        kept.append(f"limits of velocity and effort that are not known are {UNKNOWN:g}")
     if friction is not None:
         _state_friction(root, known, friction)
     remarks = (*_remarks(model, friction, moved), *kept)
@@ -129,6 +133,9 @@ def _remarks(model: Model, friction: LinearFriction | None, moved: float) -> lis
         parts.append(NEAREST.format(moved))
     left = unstated_terms(model, {"rigid_body"})
     left += [e.effect.replace("_", " ") + ("" if e.joint is None else f" of joint {e.joint}") for e in model.extensions]
+    gravity = np.asarray(model.robot.chain.gravity, dtype=float)
+    if np.abs(gravity[:2]).max() > 1e-3 * np.abs(gravity).max() or gravity[2] > 0:
+        left.append(f"gravity along ({', '.join(f'{g:.4g}' for g in gravity)}) m/s2 in the base frame")
     if left:
         parts.append(f"not stated, because a URDF cannot: {', '.join(left)}")
     return parts
@@ -215,8 +222,9 @@ def _joint(joint: Joint, parent: str, child: str, bounds: Sequence[float]) -> El
     ElementTree.SubElement(element, "child", link=child)
     ElementTree.SubElement(element, "axis", xyz=_numbers(joint.axis))
     limit = {"lower": lower, "upper": upper} if limited else {}
-    limit |= {name: value for name, value in (("velocity", velocity), ("effort", effort)) if np.isfinite(value)}
-    if limit:
+    # A reader needs both, or neither: a missing one makes the file invalid.
+    if limited or np.isfinite([velocity, effort]).any():
+        limit |= {"velocity": min(velocity, UNKNOWN), "effort": min(effort, UNKNOWN)}
         ElementTree.SubElement(element, "limit", {name: repr(value) for name, value in limit.items()})
     return element
 

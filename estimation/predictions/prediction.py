@@ -33,6 +33,10 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 
 
+# Share of the torques within the band below which a joint is said to be outside.
+MOSTLY = 0.5
+
+
 @dataclass(frozen=True, kw_only=True)
 class Prediction:
     """Torques of a motion.
@@ -144,6 +148,12 @@ class Prediction:
             lines.append(
                 f"  worse than a constant on {joints_in_words(worse.tolist())}: check that the log is of this robot, "
                 "and what its torque columns hold (oed check)"
+            )
+        outside = np.flatnonzero((self.band_coverage < MOSTLY) & ~(self.relative_spread > 1.0)) + 1
+        if len(outside):
+            lines.append(
+                f"  most torques of {joints_in_words(outside.tolist())} are outside the band: this log shows what the "
+                "fit's logs do not, such as a payload, a mounting, a unit, heat or damage (oed check, oed diagnose)"
             )
         if self.rest is not None:
             lines.append(

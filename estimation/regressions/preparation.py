@@ -68,6 +68,7 @@ class Prepared:
         load: the log's known payload; None without.
         still: joints (n,) that stand here, but for a tremble, and move in another log; None for none.
         held: those of them whose rows do not count, for friction holds them with any torque; None for none.
+        silent: joints (n,) whose torque never changes though they move: their rows do not count; None for none.
     """
 
     log: Log
@@ -76,6 +77,7 @@ class Prepared:
     load: Load | None = None
     still: NDArray[np.bool_] | None = None
     held: NDArray[np.bool_] | None = None
+    silent: NDArray[np.bool_] | None = None
 
     @cached_property
     def period(self) -> float | None:
@@ -131,7 +133,9 @@ class Prepared:
     def cut(self, part: slice) -> Prepared:
         """Takes some rows."""
         positions = resample(self.log.t[part], self.log.q[part])
-        return Prepared(_window(self.log, part), self.tau[part], positions, self.load, self.still, self.held)
+        return Prepared(
+            _window(self.log, part), self.tau[part], positions, self.load, self.still, self.held, self.silent
+        )
 
     def stretches(self, count: int, rows: int) -> Iterator[Prepared]:
         """Gives `count` evenly spread stretches of so many rows each, or the log where that is all of it."""
@@ -165,7 +169,7 @@ class Prepared:
             speed: each joint's RMS speed (n,) in the whole log.
         """
         none = np.zeros(len(speed), dtype=bool)
-        still, held = (none if joints is None else joints for joints in (self.still, self.held))
+        still, held, silent = (none if joints is None else joints for joints in (self.still, self.held, self.silent))
         moves = (speed >= STANDING) & ~still
         if not moves.all():
             motion = Motion(motion.t, motion.q, motion.dq * moves, motion.ddq * moves)
@@ -175,7 +179,7 @@ class Prepared:
         rest = rows_at_rest(self.log.t[logged], self.log.q[logged], speed) & moves | held
         if self.load is not None:
             tau = tau - self.load.torque(motion)
-        mask = ((fast | ~moves) & ~held).astype(float)
+        mask = ((fast | ~moves) & ~held & ~silent).astype(float)
         return Rows(motion, tau, mask, self.log.gravity, rest if rest.any() else None)
 
 
@@ -189,7 +193,9 @@ def prepare(robot: Robot, log: Log) -> Prepared:
     if log.n != robot.n:
         raise InputError(f"{log.n} joints", file=file, allowed=f"{robot.n}, as {robot.name} has")
     try:
-        return Prepared(log, torque_of(robot, log), resample(log.t, log.q), load_of(robot, log))
+        tau = torque_of(robot, log)
+        silent = (np.ptp(tau, axis=0) == 0) & (np.ptp(log.q, axis=0) > 0)
+        return Prepared(log, tau, resample(log.t, log.q), load_of(robot, log), silent=silent if silent.any() else None)
     except InputError as error:
         raise InputError(
             error.problem, file=file, joint=error.joint, allowed=error.allowed, remedy=error.remedy

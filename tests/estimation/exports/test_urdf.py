@@ -214,3 +214,18 @@ def _model(base, values):
         determined=np.ones(base.size, dtype=bool),
         formulas=base.formulas(),
     )
+
+
+def test_limits_that_are_not_known_leave_a_readable_file(fourier_motion, tmp_path):
+    """A URDF needs velocity and effort together: pinocchio and our reader take a file of a robot that states none."""
+    known = load_robot("er3a")
+    limits = replace(known.limits, torque=np.full(6, np.inf))
+    tilted = replace(known.under(np.array([0.0, 9.81, 0.0])), limits=limits)
+    plant = nominal_plant(tilted, seed=1)
+    model = _model(find_base_parameters(plant.model), find_base_parameters(plant.model).from_standard(plant.parameters))
+    export_urdf(model, tmp_path / "open.urdf", robot=tilted)
+    assert pin.buildModelFromUrdf(str(tmp_path / "open.urdf")).nq == 6
+    assert load_robot(tmp_path / "open.urdf").n == 6
+    comment = (tmp_path / "open.urdf").read_text()
+    assert "limits of velocity and effort that are not known are 1e+09" in comment
+    assert "gravity along (0, 9.81, 0) m/s2 in the base frame" in comment

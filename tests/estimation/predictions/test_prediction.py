@@ -58,6 +58,11 @@ def test_a_model_of_another_robot_is_said_not_to_fit(model, arm_log):
     """Where the error is larger than the torque's own changes, the summary asks for the cause; else it does not."""
     log = arm_log(seed=1, motion_seed=1)
     assert "worse than a constant" not in predict(model, log).summary()
+    assert "outside the band" not in predict(model, log).summary()
+    shifted = predict(model, replace(log, tau=log.tau * np.array([1.0, 0.7])), check=False)
+    assert (
+        "most torques of joint 2 are outside the band: this log shows what the fit's logs do not" in shifted.summary()
+    )
     other = predict(model, replace(log, tau=log.tau * np.array([1.0, 0.05])), check=False)
     assert "worse than a constant on joint 2: check that the log is of this robot" in other.summary()
 

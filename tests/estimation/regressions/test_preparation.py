@@ -1,6 +1,9 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
+from estimation import identify
 from estimation.preprocessing import Harmonics, LowPass, SmoothingSpline
 from estimation.regressions.preparation import prepare, rows_of
 
@@ -31,3 +34,13 @@ def test_logs_that_differ_are_smoothed_one_by_one(arm, arm_log, stretches):
     short = prepare(arm, arm_log(1).rows(slice(0, 700)))
     found = rows_of([stretches[0], short], LowPass(5.0))
     assert [len(part.motion) for part in found] == [len(log.rows(5.0).motion) for log in (stretches[0], short)]
+
+
+@pytest.mark.slow
+def test_a_torque_that_never_changes_is_no_data(arm, arm_log):
+    """A dead channel beside a moving joint: the other joint is fitted as well as before, not towards zero torque."""
+    log = arm_log(seed=2)
+    dead = replace(log, tau=log.tau * np.array([1.0, 0.0]))
+    assert not prepare(arm, dead).rows(5.0).mask[:, 1].any()
+    errors = [identify(arm, one, check=False).joints[0].held_out_rms for one in (log, dead)]
+    assert errors[1] < 1.2 * errors[0]
