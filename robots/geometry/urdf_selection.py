@@ -79,7 +79,7 @@ def select(tree: _Tree, tip: str | None, joints: Sequence[str] | None, locked: M
             file=tree.file,
             joint=follower.name,
             allowed="joints that move independently",
-            remedy="choose the moving joints by name (joints), or lock it (locked)",
+            remedy="choose the moving joints by name (--joints), or lock it (--lock)",
         )
     return Selection(moving=moving, tip=tip or _flange(tree, moving), locked=values)
 
