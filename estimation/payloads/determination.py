@@ -39,8 +39,8 @@ SHOWABLE = ("mass", *(f"centre_{axis}" for axis in AXES))
 SHOWN = 1e-6
 
 LONGER = (
-    "record a longer log, more acceleration, or a heavier payload; beside a log without the payload, the arm must be as "
-    "warm in both"
+    "record a longer log, more acceleration, or a heavier payload; beside a log without the payload, the arm must be "
+    "as warm in both"
 )
 
 
