@@ -14,6 +14,8 @@ Rows = NDArray[np.intp]
 OUT = 25.0
 # ... and by more than this share of the column's usual range: a torque may return at once, a position cannot.
 SHARE_OF_POSITION, SHARE_OF_SIGNAL = 0.01, 0.1
+# Share of its larger step by which an outlier returns at least: a jump goes on from where it led to.
+BACK = 0.5
 # Steps of a coarse sensor by which its value flickers.
 FLICKER = 3.0
 # Share of rows above which outliers are not isolated: in a torque they are noise, in a position they spoil it.
@@ -51,7 +53,7 @@ def outlier_rows(values: Array, share: float, step: float, *, noisy: bool) -> Ro
         return np.empty(0, dtype=np.intp)
     large = np.abs(steps) > level
     rows = np.flatnonzero(large[:-1] & large[1:])
-    return rows[_returns(steps, rows) > 0] + 1
+    return rows[_returns(steps, rows) > BACK * np.maximum(np.abs(steps[rows]), np.abs(steps[rows + 1]))] + 1
 
 
 def find_outliers(columns: Columns) -> dict[tuple[str, int], Rows]:
