@@ -194,8 +194,9 @@ def prepare(robot: Robot, log: Log) -> Prepared:
         raise InputError(f"{log.n} joints", file=file, allowed=f"{robot.n}, as {robot.name} has")
     try:
         tau = torque_of(robot, log)
-        silent = (np.ptp(tau, axis=0) == 0) & (np.ptp(log.q, axis=0) > 0)
-        return Prepared(log, tau, resample(log.t, log.q), load_of(robot, log), silent=silent if silent.any() else None)
+        varies = np.ptp(tau, axis=0) > 0
+        silent = ~varies & (np.ptp(log.q, axis=0) > 0) if varies.any() and not varies.all() else None
+        return Prepared(log, tau, resample(log.t, log.q), load_of(robot, log), silent=silent)
     except InputError as error:
         raise InputError(
             error.problem, file=file, joint=error.joint, allowed=error.allowed, remedy=error.remedy
