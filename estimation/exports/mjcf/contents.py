@@ -140,10 +140,10 @@ def _spring(contents: Contents, model: Model, robot: Robot, extension: Extension
     low, high = _positions(model, robot, i)
     middle = _middle(robot, i)
     if tuple(extension.shape) == PLAIN or extension.shape[0] == 0.0:
-        c1, c2, c3, _ = extension.coefficients
+        c1, c2, c3, preload = extension.coefficients
         q = np.linspace(low, high, POSITIONS)
         s = q - middle
-        torque = c1 * s + c2 * s**2 + c3 * s**3
+        torque = c1 * s + c2 * s**2 + c3 * s**3 + preload
     else:
         q, torque = np.linspace(low, high, POSITIONS), _torque_at(model, extension, low, high)
     slope, intercept = (float(x) for x in np.polyfit(q, torque, 1))

@@ -107,12 +107,14 @@ def test_everything_else_of_the_file_stays(tmp_path):
     assert not changed & set(finger.attrib)
 
 
-@pytest.mark.parametrize("angle", ["degree", "radian"])
-def test_a_spring_takes_up_its_joints_offset(tmp_path, angle):
-    """Stiffness and springref state a straight spring and the constant torque exactly, in the file's angles."""
+@pytest.mark.parametrize(
+    ("angle", "power", "preload"), [("degree", 3.0, 0.0), ("radian", 3.0, -2.0), ("radian", 1.0, -2.0)]
+)
+def test_a_spring_takes_up_its_joints_offset(tmp_path, angle, power, preload):
+    """Stiffness and springref state a straight spring, its preload and the constant torque exactly."""
     text = GANTRY.replace('angle="radian"', f'angle="{angle}"')
     robot = file_of(tmp_path, text)
-    model = made(robot, offset=1.5, extensions=[effect("spring", 2, (0.0, 0.0, 3.0), [25.0, 0.0, 0.0, 0.0])])
+    model = made(robot, offset=1.5, extensions=[effect("spring", 2, (0.0, 0.0, power), [25.0, 0.0, 0.0, preload])])
     written = export_mjcf(model, tmp_path / "corrected.xml", robot=robot)
     assert "spring of joint swing" in written.stated
     # The rail has no spring, and its offset has no place.
