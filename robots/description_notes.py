@@ -15,6 +15,9 @@ from robots.limits import ACCELERATION_PER_VELOCITY, JERK_PER_ACCELERATION, Limi
 
 Array = NDArray[np.float64]
 
+# Sum of the distances between joints that no arm has [m].
+FAR = 50.0
+
 
 def require_stops(names: Sequence[str], accepted: bool, file: str | Path) -> None:
     """Refuses joints with stops whose positions are not stated.
@@ -50,6 +53,9 @@ def urdf_notes(taken: UrdfChain, unused: Sequence[str]) -> tuple[str, ...]:
         One sentence each.
     """
     notes = list(taken.notes)
+    reach = sum(float(np.linalg.norm(joint.translation)) for joint in taken.chain.joints[1:])
+    if reach > FAR:
+        notes.append(f"the distances between its joints add up to {reach:.3g} m: they may be in millimetres")
     if taken.unlimited:
         word = "joint" if len(taken.unlimited) == 1 else "joints"
         notes.append(f"{word} {', '.join(taken.unlimited)}: no position limits stated; positions are unlimited")

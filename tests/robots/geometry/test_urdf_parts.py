@@ -211,6 +211,17 @@ def test_unused_parts_are_named_once(write_urdf):
     assert robot.joint_names == ("j1",)
 
 
+@pytest.mark.parametrize(("distance", "noted"), [(0.4, False), (400.0, True)])
+def test_lengths_in_millimetres_are_noted(distance, noted, write_urdf):
+    """A link of 400 m is one of 400 mm."""
+    more = (
+        f'<link name="l2">{BODY}</link><joint name="j2" type="revolute"><parent link="l1"/><child link="l2"/>'
+        f'<origin xyz="{distance} 0 0"/>{LIMIT}</joint>'
+    )
+    notes = load_robot(write_urdf(arm(more=more))).notes
+    assert any("may be in millimetres" in note for note in notes) == noted
+
+
 def test_a_default_name_space_is_a_urdf(write_urdf):
     """A file whose root declares a default name space is read as any other."""
     path = write_urdf(arm())
