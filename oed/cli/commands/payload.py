@@ -129,6 +129,13 @@ def payload(
                 raise InputError(
                     f"a model of {known.robot.n} joints", allowed=f"{described.n}, as {described.name} has"
                 )
+            if known is not None:
+                zero = np.zeros((1, described.n))
+                if not np.allclose(described.chain.flange(zero), known.robot.chain.flange(zero), atol=1e-4):
+                    raise InputError(
+                        f"the flange of {described.name} is elsewhere than that of the model's robot",
+                        remedy="leave --robot out, state the flange by --frame, or identify the model with this robot",
+                    )
             options: dict[str, Any] = {"n": described.n, "mapping": mapping, "joints": described.joint_names}
             options["kinds"] = described.chain.kinds
             loaded, free = read_logs(log, **options), read_logs(without, **options) if without else ()

@@ -10,6 +10,7 @@ import pytest
 
 from robots.geometry.inertia import inertial_parameters
 from robots.terms.situations.flange_body import point_mass
+from tests.oed.cli.conftest import ROBOT
 
 BODY = inertial_parameters(1.5, [0.02, -0.01, 0.08], np.diag([0.004, 0.005, 0.003]), np.eye(4))
 
@@ -35,13 +36,16 @@ def payload_file(tmp_path: Path) -> Path:
         (("--model", "MODEL", "--frame", "0,0,x"), "numbers"),
         (("--model", "nowhere.json"), "no such file"),
         (("--model", "MODEL", "--robot", "ur10"), "6, as ur10 has"),
+        (("--model", "MODEL", "--robot", "OTHER"), "the flange of two is elsewhere than that of the model's robot"),
     ],
 )
 def test_bad_options_end_with_one_message_and_no_folder(
     run, experiment: Path, tmp_path: Path, options: tuple, words: str
 ) -> None:
     """Exit code 2, one line, and nothing written."""
-    names = {"LOG": experiment / "log.csv", "MODEL": experiment}
+    other = tmp_path / "other.yaml"
+    other.write_text(ROBOT.replace("VELOCITY", "2").replace("a: 0.1", "a: 0.15"))
+    names = {"LOG": experiment / "log.csv", "MODEL": experiment, "OTHER": other}
     out = tmp_path / "out"
     done = run("payload", "--log", experiment / "log.csv", *(names.get(o, o) for o in options), "--out", out)
     assert done.code == 2
