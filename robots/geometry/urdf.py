@@ -185,8 +185,8 @@ class UrdfTree:
                     f"the body it moves has no mass (links {listed})",
                     file=self.file,
                     joint=selection.moving[i].name,
-                    remedy="give one of these links an <inertial> (two joints of one MJCF body: put the first into a body "
-                    "of its own, with a small one), or lock the joint (--lock)",
+                    remedy="give one of these links an <inertial> (two joints of one MJCF body: put the first into a "
+                    "body of its own, with a small one), or lock the joint (--lock)",
                 )
         inertia.flags.writeable = False
         chain_joints.sort(key=lambda joint: moving[joint.name])
