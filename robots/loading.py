@@ -74,7 +74,7 @@ def load_robot(
             robot = robot_from_mjcf(path, tip, joints, locked, unlimited)
         else:
             robot = robot_from_yaml(path, str(path), tip, joints, locked, unlimited)
-    robot = replace(robot, stated=_as_words(robot.origin, tip, joints, locked, unlimited))
+    robot = replace(robot, stated=_as_words(robot.origin, tip, joints, locked))
     if robot.origin not in _warned:
         _warned.add(robot.origin)
         notes = () if robot.origin in catalogue() else robot.notes
@@ -90,7 +90,6 @@ def _as_words(
     tip: str | None,
     joints: Sequence[str] | None,
     locked: Mapping[str, float] | None,
-    unlimited: bool,
 ) -> str:
     """A robot and the choice of its joints, as a command line takes them."""
     words = [origin]
@@ -98,7 +97,6 @@ def _as_words(
     words += [] if joints is None else ["--joints", ",".join(joints)]
     for name, value in (locked or {}).items():
         words += ["--lock", f"{name}={value:g}"]
-    words += ["--unlimited"] if unlimited else []
     return shlex.join(words)
 
 
