@@ -17,7 +17,6 @@ from estimation.models.model import Model
 from robots.common.errors import InfeasibleError
 from robots.consistency import pseudo_inertia
 from robots.robot import Robot
-from robots.terms.effects.spring import PLAIN
 from robots.terms.situations.situation import situation
 
 Array = NDArray[np.float64]
@@ -138,14 +137,7 @@ def _spring(contents: Contents, model: Model, robot: Robot, extension: Extension
     assert extension.joint is not None
     i = extension.joint - 1
     low, high = _positions(model, robot, i)
-    middle = _middle(robot, i)
-    if tuple(extension.shape) == PLAIN or extension.shape[0] == 0.0:
-        c1, c2, c3, preload = extension.coefficients
-        q = np.linspace(low, high, POSITIONS)
-        s = q - middle
-        torque = c1 * s + c2 * s**2 + c3 * s**3 + preload
-    else:
-        q, torque = np.linspace(low, high, POSITIONS), _torque_at(model, extension, low, high)
+    q, torque = np.linspace(low, high, POSITIONS), _torque_at(model, extension, low, high)
     slope, intercept = (float(x) for x in np.polyfit(q, torque, 1))
     unit, name = robot.limits.unit(i, "torque"), robot.joint_names[i]
     if slope == 0.0:
@@ -182,11 +174,6 @@ def _positions(model: Model, robot: Robot, i: int) -> tuple[float, float]:
     if not np.isfinite(low + high) or low >= high:
         low, high = -np.pi, np.pi
     return low, high
-
-
-def _middle(robot: Robot, i: int) -> float:
-    lower, upper = float(robot.limits.lower[i]), float(robot.limits.upper[i])
-    return (lower + upper) / 2 if np.isfinite(lower + upper) else 0.0
 
 
 def _payload(contents: Contents, extension: Extension) -> bool:
