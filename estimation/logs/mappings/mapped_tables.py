@@ -8,23 +8,10 @@ import numpy as np
 
 from estimation.logs.columns import BY_FIELD, Quantity, column_name, refuse_text, suits, unit_factor, units_note
 from estimation.logs.mappings.coupled_axes import uncouple
-from estimation.logs.mappings.mapping import LogMapping, PerJoint, Single
+from estimation.logs.mappings.mapping import FIELDS, LogMapping, PerJoint, Single
 from robots.common.errors import InputError
 from robots.common.tables.table import Column, Table
 
-_FIELDS = {
-    "time": "t",
-    "position": "q",
-    "velocity": "dq",
-    "acceleration": "ddq",
-    "torque": "tau",
-    "current": "current",
-    "temperature": "temperature",
-    "link_position": "qlink",
-    "ambient": "ambient",
-    "segment": "segment",
-    "cycle": "cycle",
-}
 UNIT_NOTES = "unit_notes"
 """Key of a mapped table's metadata: notes on units that do not suit all joints."""
 
@@ -70,7 +57,7 @@ def mapped_sources(mapping: LogMapping, names: Sequence[str], joints: int) -> li
         joints: the number of joints.
     """
     used: set[str] = set()
-    for key in _FIELDS:
+    for key in FIELDS:
         entry = getattr(mapping, key)
         if entry is not None:
             single = isinstance(entry, Single)
@@ -98,7 +85,7 @@ def map_table(table: Table, mapping: LogMapping, joints: int, kinds: Sequence[st
     units: dict[str, str] = {}
     taken: set[str] = set()
     left: dict[tuple[str, str], list[int]] = {}
-    for key, field in _FIELDS.items():
+    for key, field in FIELDS.items():
         entry, quantity = getattr(mapping, key), BY_FIELD[field]
         if entry is None:
             continue

@@ -8,6 +8,7 @@ from typing import Annotated, Any, Literal
 import numpy as np
 from pydantic import BeforeValidator, Field, field_validator, model_validator
 
+from estimation.logs.columns import BY_FIELD
 from robots.common.config import Config, read_config
 
 
@@ -27,16 +28,22 @@ Texts = Annotated[list[str], BeforeValidator(_named)]
 Numbers = Annotated[list[float], BeforeValidator(_listed)]
 
 
-# The usual names of the columns of each quantity of all joints, with the joint's number behind.
-USUAL = {
+# The field of a log that each quantity is.
+FIELDS = {
+    "time": "t",
     "position": "q",
     "velocity": "dq",
     "acceleration": "ddq",
     "torque": "tau",
-    "current": "i",
-    "temperature": "temp",
+    "current": "current",
+    "temperature": "temperature",
     "link_position": "qlink",
+    "ambient": "ambient",
+    "segment": "segment",
+    "cycle": "cycle",
 }
+# The usual name of the columns of each quantity of all joints; the joint's number comes behind.
+USUAL = {key: BY_FIELD[field].prefix for key, field in FIELDS.items() if BY_FIELD[field].per_joint}
 
 
 class PerJoint(Config):
