@@ -85,12 +85,7 @@ def load_robot(
     return robot
 
 
-def _as_words(
-    origin: str,
-    tip: str | None,
-    joints: Sequence[str] | None,
-    locked: Mapping[str, float] | None,
-) -> str:
+def _as_words(origin: str, tip: str | None, joints: Sequence[str] | None, locked: Mapping[str, float] | None) -> str:
     """A robot and the choice of its joints, as a command line takes them."""
     words = [origin]
     words += [] if tip is None else ["--tip", tip]
