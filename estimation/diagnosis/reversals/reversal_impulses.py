@@ -82,6 +82,11 @@ class ImpulseResponse:
         share = (place - low)[:, None]
         return np.asarray((1 - share) * self.values[:, low] + share * self.values[:, low + 1])
 
+    @property
+    def most(self) -> int:
+        """The largest number of sample periods in the table."""
+        return (len(self.x) - 2) // FINE + 1
+
     def sampled(self, first: float, count: int) -> Array:
         """Interpolates as `at` does, at `count` sample periods from a first time [s] on, all of them in the table."""
         place = (first - self.x[0]) / (self.x[1] - self.x[0])
@@ -207,7 +212,8 @@ def impulse_columns(
     for r, (moment, way, k, inertia) in enumerate(zip(at, turns.way, turns.run, turns.inertia, strict=True)):
         table, rows = tables[k], recording.runs[k]
         reach = table.x[-1] / step
-        start, stop = max(rows.start, int(np.ceil(moment - reach))), min(rows.stop, int(moment + reach) + 1)
+        start = max(rows.start, int(np.ceil(moment - reach)))
+        stop = min(rows.stop, int(moment + reach) + 1, start + table.most)
         if stop <= start:
             continue
         here = table.sampled((start - moment) * step, stop - start)

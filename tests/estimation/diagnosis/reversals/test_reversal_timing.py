@@ -21,7 +21,7 @@ from estimation.diagnosis.recordings import log_reading
 from estimation.diagnosis.recordings.log_reading import build_recording
 from estimation.diagnosis.recordings.recording import Recording
 from estimation.diagnosis.recordings.smoothed_motion import low_pass_gain
-from estimation.diagnosis.reversals.reversal_impulses import ImpulseResponse, edges_of
+from estimation.diagnosis.reversals.reversal_impulses import ImpulseResponse, Reversals, edges_of, impulse_columns
 from estimation.diagnosis.reversals.reversal_timing import ReversalTiming, measure_reversal_timing
 from estimation.diagnosis.searches.search import fit_plain
 from oed.benchmarks.truth.cases import Case, draw_case
@@ -128,6 +128,23 @@ def test_positions_that_say_too_little_of_reversals_say_nothing(cases: Callable)
     timing = measure_reversal_timing(replace(recording, dq=once), baseline, settled.values, settled.residual)
     assert timing is not None
     assert np.isinf(timing.errors[0])
+
+
+def test_reversals_at_a_row_are_within_their_table(recording: Recording) -> None:
+    """A reversal exactly at a row, whose table ends exactly at rows on both sides, has all rows but the last."""
+    step = recording.step
+    cutoff = 0.04 / step
+    tables = [ImpulseResponse.of(cutoff, step, edges_of(cutoff, step))]
+    reach = tables[0].x[-1] / step
+    assert reach == round(reach)
+    one = np.array([300.0])
+    turns = Reversals(one, np.ones(1), np.zeros(1, dtype=np.intp), np.zeros(1, dtype=np.intp), np.ones(1))
+    columns, _, away = impulse_columns(recording, turns, one, tables)
+    expected = tables[0].at((np.arange(len(recording)) - 300.0) * step)
+    rows = np.isfinite(away)
+    assert rows.sum() == 2 * reach
+    for column, part in zip(columns, expected, strict=True):
+        np.testing.assert_allclose(column[rows], part[rows], atol=1e-9 * np.abs(part).max())
 
 
 @pytest.mark.slow
