@@ -108,7 +108,8 @@ class Recorder:
             raise self.error
         silence = time.monotonic() - self._last_row
         if silence > self._patience and self._heard.is_set():
-            if self.last_heard <= self._last_row:
+            # A state may come just after the last row; one that still comes later shows a live controller.
+            if self.last_heard - self._last_row < silence / 2:
                 problem, remedy = f"{self._link.place} is silent for {silence:.1f} s", "the controller and the network"
             else:
                 problem = f"no feedback from {self._link.place} for {silence:.1f} s: {self._why_no_row()}"
