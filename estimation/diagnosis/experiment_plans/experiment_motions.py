@@ -116,6 +116,11 @@ def _motion(room: MotionRange, q: NDArray[Any]) -> Motion:
     return Motion(t, q, dq, np.asarray(np.gradient(dq, room.step, axis=0)))
 
 
+def backwards(motion: Motion) -> Motion:
+    """Reverses a motion in time."""
+    return Motion(motion.t, motion.q[::-1], -motion.dq[::-1], motion.ddq[::-1])
+
+
 def at_rate(motion: Motion, period: float) -> Motion:
     """Resamples a motion of this module.
 
@@ -223,9 +228,7 @@ def micro_reversals(room: MotionRange, joint: int, variant: int) -> tuple[Stage,
 
 def mirrored(room: MotionRange, joint: int, variant: int) -> tuple[Stage, ...]:
     """Repeats the logged motion, then the same backwards in time."""
-    m = room.reference
-    back = Motion(m.t, m.q[::-1], -m.dq[::-1], m.ddq[::-1])
-    return (Stage(motion=m), Stage(motion=back))
+    return (Stage(motion=room.reference), Stage(motion=backwards(room.reference)))
 
 
 def second_base_pose(room: MotionRange, joint: int, variant: int) -> tuple[Stage, ...]:

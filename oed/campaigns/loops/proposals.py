@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from estimation.diagnosis.experiment_plans.choices import repeat_stages
-from estimation.diagnosis.experiment_plans.experiment_motions import MAKERS, Stage
+from estimation.diagnosis.experiment_plans.experiment_motions import MAKERS, Stage, backwards
 from estimation.diagnosis.experiment_plans.next_experiment import NextExperiment
 from oed.campaigns.discriminations.motions import ExperimentBuilder
 from robots.base_parameters import find_base_parameters
@@ -48,13 +48,13 @@ class PlannedExperiment:
     Attributes:
         kind: a name of `EXPERIMENTS`.
         why: in words.
-        resolves: probability that it leaves one cause.
+        resolves: probability that it leaves one cause; None where it is not known.
         runs: its motions.
     """
 
     kind: str
     why: str
-    resolves: float
+    resolves: float | None
     runs: tuple[PlannedRun, ...]
 
 
@@ -117,6 +117,20 @@ def plan_experiment(
     return f"no proposed experiment can be played unattended ({'; '.join(reasons)}). {following.why}"
 
 
+def more_data(motion: Motion) -> PlannedExperiment:
+    """Repeats a motion, forwards and backwards in time, for an error that no effect explains.
+
+    Two effects that show little each may leave a rest that neither explains. More data show both, and friction that
+    depends on the direction or on the load differs on the way back.
+
+    Args:
+        motion: from rest to rest at home.
+    """
+    runs = tuple(PlannedRun(motion=one, pause=0.0) for one in (motion, backwards(motion)))
+    why = f"{EXPERIMENTS['mirrored']}, because no cause explains the rest: two small ones may be in it"
+    return PlannedExperiment(kind="mirrored", why=why, resolves=None, runs=runs)
+
+
 def within(stages: Sequence[Stage], longest: float) -> tuple[Stage, ...]:
     """Leaves out repetitions of stages beyond a time; each different stage is made once at least.
 
@@ -146,13 +160,12 @@ def by_hand(stages: Sequence[Stage]) -> str:
 
 def _playable(stage: Stage, kind: str, builder: ExperimentBuilder, played: Sequence[Motion]) -> PlannedRun:
     logged = stage.motion
-    back = Motion(logged.t, logged.q[::-1], -logged.dq[::-1], logged.ddq[::-1])
+    back = backwards(logged)
     for motion in played:
         if repeats(logged, motion):
             return PlannedRun(motion=motion, pause=stage.pause)
         if repeats(back, motion):
-            reverse = Motion(motion.t, motion.q[::-1], -motion.dq[::-1], motion.ddq[::-1])
-            return PlannedRun(motion=reverse, pause=stage.pause)
+            return PlannedRun(motion=backwards(motion), pause=stage.pause)
     return PlannedRun(motion=builder.run_alone(stage, kind).motion, pause=stage.pause)
 
 

@@ -17,7 +17,7 @@ from oed.campaigns.checking import TorqueCheck, checked
 from oed.campaigns.excitation import excitation_stage
 from oed.campaigns.loops.diagnosing import diagnose_logs
 from oed.campaigns.loops.options import LoopOptions
-from oed.campaigns.loops.proposals import PlannedExperiment, PlannedRun, plan_experiment
+from oed.campaigns.loops.proposals import PlannedExperiment, PlannedRun, more_data, plan_experiment
 from oed.campaigns.loops.result import LoopResult
 from oed.campaigns.loops.state import Experiment, LoopRun, LoopState, Recorded, identity, remove_loop
 from oed.campaigns.runs.player import Player
@@ -181,7 +181,7 @@ class _Loop:
         self.state.home = home.tolist()
         why = "an excitation that determines all parameters" + "".join(f"; {note}" for note in notes)
         first = PlannedRun(motion=stage.motion, pause=0.0)
-        self._add(PlannedExperiment(kind="excitation", why=why, resolves=1.0, runs=(first,)))
+        self._add(PlannedExperiment(kind="excitation", why=why, resolves=None, runs=(first,)))
 
     def _add(self, planned: PlannedExperiment) -> None:
         """Writes the motions of an experiment, each once, and notes the experiment."""
@@ -196,8 +196,8 @@ class _Loop:
                     stated = {"robot": self.robot.name, "experiment": planned.kind, "tool": f"robot-oed {VERSION}"}
                     write_trajectory(out.path(file), run.motion, stated, kinds=self.robot.chain.kinds)
         runs = [LoopRun(trajectory=files[id(run.motion)], pause=run.pause) for run in planned.runs]
-        resolves = None if number == 1 else planned.resolves
-        self.state.experiments.append(Experiment(kind=planned.kind, why=planned.why, resolves=resolves, runs=runs))
+        made = Experiment(kind=planned.kind, why=planned.why, resolves=planned.resolves, runs=runs)
+        self.state.experiments.append(made)
         self.state.save(self.folder)
 
     def _play(self, number: int, player: Player, resumed: bool) -> None:
@@ -261,6 +261,9 @@ class _Loop:
         seen = state.experiments[-1].diagnosis
         assert seen is not None
         causes = ", ".join(seen.causes)
+        if seen.verdict == "unexplained" and number < options.experiments and not state.has("mirrored"):
+            self._add(more_data(self._motions()[0]))
+            return
         if following is None:
             state.success = seen.verdict in CONCLUSIVE
             if seen.verdict == "none":

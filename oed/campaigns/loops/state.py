@@ -123,6 +123,10 @@ class LoopState:
         """Runs of all experiments, in order."""
         return [run for experiment in self.experiments for run in experiment.runs]
 
+    def has(self, kind: str) -> bool:
+        """Whether an experiment of this kind was made."""
+        return any(experiment.kind == kind for experiment in self.experiments)
+
     @property
     def last(self) -> Recorded | None:
         """What was recorded last."""
