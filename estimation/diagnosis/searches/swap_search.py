@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 
 from estimation.diagnosis.calibration import MIN_BIC_GAIN
@@ -70,11 +69,10 @@ def refine_with_swaps(
             rest = [o for o in near if o.hypothesis != members[i].hypothesis]
             if still:
                 rest = [o for o in rest if cleared.intersection(_acts_on(problem, o.hypothesis))]
-            # In parallel, because refining the member takes as long as refining its rivals.
-            with ThreadPoolExecutor(1) as apart:
-                own = apart.submit(refine, now, members[i].hypothesis, members[i].shape, beside)
-                rivals = refine_candidates(problem, rest[:RIVALS], beside)
-            first = max([own.result(), *rivals], key=lambda m: m.bic_gain)
+            starts = [(problem, o.hypothesis, o.shape) for o in rest[:RIVALS]]
+            own, *rivals = _refined([(now, members[i].hypothesis, members[i].shape), *starts], beside)
+            rivals.sort(key=lambda m: -m.bic_gain)
+            first = max([own, *rivals], key=lambda m: m.bic_gain)
             was, members[i] = members[i].hypothesis, first
             if first.hypothesis == was:
                 wide = [rival for rival in rivals if cleared.intersection(rival.group.joints)]
@@ -142,15 +140,23 @@ def refine_candidates(
     Returns:
         The best fit of each hypothesis, the best BIC first.
     """
-    starts = [(o.hypothesis, o.shape) for o in outcomes]
-    starts += [(o.hypothesis, known[o.hypothesis]) for o in outcomes if known and o.hypothesis in known]
-    fits = forked(lambda start: refine(problem, start[0], start[1], accepted), starts)
-    # Effects are compared by identity, and a forked process returns a copy.
-    refined = [replace(fit, hypothesis=own) for fit, (own, _) in zip(fits, starts, strict=True)]
+    starts = [(problem, o.hypothesis, o.shape) for o in outcomes]
+    starts += [(problem, o.hypothesis, known[o.hypothesis]) for o in outcomes if known and o.hypothesis in known]
     tops: dict[Hypothesis, FittedEffect] = {}
-    for member in sorted(refined, key=lambda member: -member.bic_gain):
+    for member in sorted(_refined(starts, accepted), key=lambda member: -member.bic_gain):
         tops.setdefault(member.hypothesis, member)
     return list(tops.values())
+
+
+def _refined(starts: Sequence[tuple[Problem, Hypothesis, tuple[float, ...]]], accepted: Accepted) -> list[FittedEffect]:
+    """Refines hypotheses from shapes, all at once.
+
+    A thread must not compute while processes are forked: it may hold a lock, such as that of the Fourier transform's
+    tables, which nobody releases in the copy.
+    """
+    fits = forked(lambda start: refine(*start, accepted), starts)
+    # Effects are compared by identity, and a forked process returns a copy.
+    return [replace(fit, hypothesis=own) for fit, (_, own, _) in zip(fits, starts, strict=True)]
 
 
 def remeasure(problem: Problem, member: FittedEffect, beside: Accepted) -> FittedEffect:

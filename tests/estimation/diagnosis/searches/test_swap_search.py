@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import threading
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from types import SimpleNamespace
+from typing import Any
 
 import pytest
 
@@ -16,6 +18,7 @@ from estimation.diagnosis.hypothesis_tests.scan import measure
 from estimation.diagnosis.hypothesis_tests.scoring import accept
 from estimation.diagnosis.recordings.log_reading import build_recording
 from estimation.diagnosis.searches import swap_search
+from robots.common.forks import forked
 from robots.robot import Robot
 from robots.signals import Log
 from robots.terms.effects import EFFECTS
@@ -79,12 +82,10 @@ def test_rivals_are_tried_again_where_what_is_beside_changes_a_gain(
     monkeypatch.setattr(swap_search, "accept_all_but", lambda problem, members, i: ())
     monkeypatch.setattr(swap_search, "with_total_torque", lambda problem, members, hypotheses: problem)
     monkeypatch.setattr(swap_search, "refine", lambda problem, h, shape, beside: member(h, gains[h]))
+    monkeypatch.setattr(swap_search, "_refined", lambda starts, beside: [member(h, gains[h]) for _, h, _ in starts])
     monkeypatch.setattr(swap_search, "remeasure", lambda problem, m, beside: member(m.hypothesis, gains[m.hypothesis]))
     monkeypatch.setattr(swap_search, "scan", scan)
-    monkeypatch.setattr(swap_search, "screen_candidates", lambda *args: [SimpleNamespace(hypothesis=C)])
-    monkeypatch.setattr(
-        swap_search, "refine_candidates", lambda problem, rest, beside: [member(C, gains[C])] if rest else []
-    )
+    monkeypatch.setattr(swap_search, "screen_candidates", lambda *args: [SimpleNamespace(hypothesis=C, shape=())])
     won = {A: 100.0, B: 100.0}
     members, _ = swap_search.refine_with_swaps(
         SimpleNamespace(rows=1000),  # type: ignore[arg-type]
@@ -111,8 +112,21 @@ def late(arm: Robot, arm_log: Callable[..., Log], pose_arm: Callable[..., Proble
 
 
 @pytest.mark.slow
-def test_a_rival_on_the_joint_of_the_newest_takes_the_place_of_one_that_won(late: Problem) -> None:
-    """A lag of joint 1 is replaced by a delay of all joints, once the ripple on joint 2 is in the model."""
+def test_a_rival_on_the_joint_of_the_newest_takes_the_place_of_one_that_won(
+    late: Problem, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A lag of joint 1 is replaced by a delay of all joints, once the ripple on joint 2 is in the model.
+
+    No thread computes while processes are forked, because a lock that it holds would stay closed in them.
+    """
+    threads: list[int] = []
+
+    def counting(function: Callable[..., Any], items: Sequence[Any]) -> list[Any]:
+        threads.append(threading.active_count())
+        return forked(function, items)
+
+    monkeypatch.setattr(swap_search, "forked", counting)
+    before = threading.active_count()
     lag = refine(late, LAG, (0.003,), accept(late, ()))
     ripple = refine(late, RIPPLE, (40.0, 0.0, 0.0), accept(late, (lag.group,)))
     lag = refine(late, LAG, lag.shape, accept(late, (ripple.group,)))
@@ -121,6 +135,8 @@ def test_a_rival_on_the_joint_of_the_newest_takes_the_place_of_one_that_won(late
     members, _ = swap_search.refine_with_swaps(late, entries, [lag, ripple], [0.0, 0.0], set(), won, 0.01)
     assert [m.hypothesis for m in members] == [DELAY, RIPPLE]
     assert members[0].coefficients[0] == pytest.approx(0.006, rel=0.25)
+    assert threads
+    assert max(threads) <= before
 
 
 @pytest.mark.parametrize(("together", "chosen"), [(260.0, [C, B]), (190.0, [A, B])])
@@ -160,8 +176,8 @@ def test_a_rival_is_tried_with_the_others_refined_beside_it(
         "refine": refined,
         "remeasure": lambda problem, m, beside: m,
         "scan": lambda *args: None,
-        "screen_candidates": lambda *args: [SimpleNamespace(hypothesis=C)],
-        "refine_candidates": lambda problem, rest, beside: [refined(problem, o.hypothesis, (), beside) for o in rest],
+        "screen_candidates": lambda *args: [SimpleNamespace(hypothesis=C, shape=())],
+        "_refined": lambda starts, beside: [refined(*start, beside) for start in starts],
         "_acts_on": lambda problem, hypothesis: (0, 1),
     }.items():
         monkeypatch.setattr(swap_search, name, value)
