@@ -161,9 +161,7 @@ def _static(situation: Situation) -> Array:
 
 def _torque(situation: Situation, static: Array, shape: tuple[float, ...]) -> Array:
     """Computes the torque of all joints (N, n, k) on a base with static tilts (N, 2, k) that oscillates."""
-    slow = (static, *situation.derivatives(static))
-    beyond = _oscillation(situation, slow[1], slow[2], shape)
-    courses = [a + b for a, b in zip(slow, (beyond, *situation.derivatives(beyond)), strict=True)]
+    courses = _oscillation(situation, static, shape)
     rates = (situation.sensitivity(f"base_{kind}") @ _axes(situation).T for kind in ("rate", "acceleration"))
     parts = (tilted_torque(situation), *rates)
     return np.asarray(sum(X @ course for X, course in zip(parts, courses, strict=True)))
@@ -190,43 +188,41 @@ def _stiffness(situation: Situation, resonance: float) -> tuple[float, float]:
     return float(first), float(second)
 
 
-def _oscillation(situation: Situation, rate: Array, curve: Array, shape: tuple[float, ...]) -> Array:
-    """Computes what a base's tilt has beyond the static one, C m: that of a spring with the robot's inertia.
+def _oscillation(situation: Situation, static: Array, shape: tuple[float, ...]) -> tuple[Array, Array, Array]:
+    """Computes the tilts of a base on a spring with the robot's inertia, and their first two time derivatives.
 
     Args:
         situation: the motion (N samples).
-        rate: first time derivative of the static tilts about both axes (N, 2, k).
-        curve: second time derivative of them (N, 2, k).
+        static: static tilts about both axes (N, 2, k), by the moments that act on the base.
         shape: stiffness about each axis, own inertia and damping ratio.
 
     Returns:
-        The difference (N, 2, k); zero in logs whose resonances are both above 0.4 of the Nyquist frequency.
+        Tilts and derivatives (N, 2, k); static in logs whose resonances are both above 0.4 of the Nyquist frequency.
     """
     K, own, damping = np.array(shape[:2]), shape[2], shape[3]
     axes, inertia = _axes(situation), _inertia(situation) + own * np.eye(2)
     about = np.einsum("nkk->nk", inertia)
     lost = axes @ situation.sensitivity("base_damping") @ axes.T
     lost = lost + 2 * damping * np.sqrt(K * about)[:, :, None] * np.eye(2)
-    push = -(inertia @ curve + lost @ rate)
-    result = np.zeros_like(push)
+    tilt = static.copy()
     for run in situation.runs:
         w = np.sqrt(K / about[run].mean(axis=0))
-        if w.min() * situation.period > 0.4 * np.pi or situation.period == 0.0:
+        if run.stop - run.start < 3 or not 0 < w.min() * situation.period <= 0.4 * np.pi:
             continue
-        # Bilinear rule, exact at the mean resonance: two rows of a banded system per sample. Two samples at rest are
-        # put before each log.
+        # Bilinear rule, exact at the mean resonance: two rows of a banded system per sample. The first two tilts are
+        # static, because a log may begin in the middle of a motion.
         centre = float(np.clip(np.sqrt(w[0] * w[1]), w.min(), 0.4 * np.pi / situation.period))
         s = centre / np.tan(0.5 * centre * situation.period)
-        x, m, d = (np.concatenate([values[run][:1]] * 2 + [values[run]]) for values in (push, inertia, lost))
-        m, d, spring = s**2 * m[1:-1], s * d[1:-1], np.diag(K)
+        x, rows = static[run], 2 * (run.stop - run.start)
+        m, d, spring = s**2 * inertia[run][1:-1], s * lost[run][1:-1], np.diag(K)
         blocks = [m + d + spring, 2.0 * (spring - m), m - d + spring]  # of the sample itself and of the two before
-        rows = 2 * len(x)
         band = np.zeros((7, rows))
         band[1, :4] = 1.0
         for back, block in enumerate(blocks):
             for k, j in product(range(2), range(2)):
                 first = 2 * (2 - back) + j
                 band[1 + k - j + 2 * back, first : first + 2 * len(block) : 2] = block[:, k, j]
-        right = np.concatenate([np.zeros_like(x[:2]), x[2:] + 2.0 * x[1:-1] + x[:-2]]).reshape(rows, -1)
-        result[run] = solve_banded((5, 1), band, right).reshape(len(x), 2, -1)[2:]
-    return result
+        push = K[:, None] * (x[2:] + 2.0 * x[1:-1] + x[:-2])
+        right = np.concatenate([x[:2], push]).reshape(rows, -1)
+        tilt[run] = solve_banded((5, 1), band, right).reshape(x.shape)
+    return tilt, *situation.derivatives(tilt)
