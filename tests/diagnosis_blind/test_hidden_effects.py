@@ -16,7 +16,15 @@ import pytest
 from estimation import diagnose
 from oed.benchmarks.truth.cases import Case, draw_case, write_log
 from oed.benchmarks.truth.description import write_description
-from oed.benchmarks.truth.effects import actuator, friction, strangers, surroundings, transmission, whole_strangers
+from oed.benchmarks.truth.effects import (
+    actuator,
+    compliant_base,
+    friction,
+    strangers,
+    surroundings,
+    transmission,
+    whole_strangers,
+)
 from oed.benchmarks.truth.effects.base import Effect
 from oed.benchmarks.truth.oracle import ask_oracle
 from oed.cli import main
@@ -86,7 +94,7 @@ MORE = (
     Hide(seed=7005, effects=(surroundings.Contact,), periodic=False),
     Hide(seed=7006, effects=(friction.PositionDependent,), joint=4),
     Hide(seed=7007, effects=(surroundings.Tilt,), kind="ur10"),
-    Hide(seed=7073, effects=(whole_strangers.LeaningBase,), size=0.02, kind="ur10"),
+    Hide(seed=7073, effects=(compliant_base.LeaningBase,), size=0.02, kind="ur10"),
 )
 MORE_STRANGE = (
     Hide(seed=7071, effects=(strangers.Drag,), joint=1, size=0.03),

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from oed.benchmarks.truth.effects.actuator import Clipping, Delay, Drift, EncoderOffset, Saturation, TorqueConstant
 from oed.benchmarks.truth.effects.base import Effect
+from oed.benchmarks.truth.effects.compliant_base import LeaningBase
 from oed.benchmarks.truth.effects.friction import (
     Asymmetric,
     FrictionStep,
@@ -26,7 +27,7 @@ from oed.benchmarks.truth.effects.strangers import (
 )
 from oed.benchmarks.truth.effects.surroundings import Contact, Payload, Tilt
 from oed.benchmarks.truth.effects.transmission import Backlash, Balancer, Cable, Elastic, Ripple, WristCoupling
-from oed.benchmarks.truth.effects.whole_strangers import Conveyor, FloorVibration, Hose, LeaningBase, SlippedBase, Slosh
+from oed.benchmarks.truth.effects.whole_strangers import Conveyor, FloorVibration, Hose, SlippedBase, Slosh
 
 KNOWN: tuple[type[Effect], ...] = (
     Stribeck,

@@ -117,37 +117,6 @@ class Hose(Effect):
 
 
 @dataclass(frozen=True, kw_only=True)
-class LeaningBase(Effect):
-    """A compliant base that rotates about its x and y axes under the robot's weight: `amount` [rad/(N m)]."""
-
-    ratio: float = 1.0
-
-    name = "base_compliance"
-    largest = 1e-2
-
-    @classmethod
-    def joints(cls, machine: Machine) -> tuple[int | None, ...]:
-        return (None,)
-
-    @classmethod
-    def draw(cls, machine: Machine, rng: np.random.Generator, joint: int | None, span: float) -> LeaningBase:
-        return cls(ratio=rng.uniform(0.5, 2.0))
-
-    def torque(self, ride: Ride) -> np.ndarray:
-        every = _thinning(ride)
-        q, model = ride.link_q[::every], ride.machine.model
-        data, weight = model.createData(), np.empty((len(q), 3))
-        for k in range(len(q)):
-            weight[k] = data.mass[0] * pin.centerOfMass(model, data, q[k])
-        weight = np.cross(weight, model.gravity.linear)
-        still, torque = np.zeros_like(q), np.zeros_like(q)
-        for axis, softness in enumerate((self.amount, self.amount * self.ratio)):
-            turned = with_gravity(model, np.cross(model.gravity.linear, np.eye(3)[axis]))
-            torque += softness * weight[:, axis, None] * rigid_torque(turned, q, still, still)
-        return _between(ride, torque, every)
-
-
-@dataclass(frozen=True, kw_only=True)
 class SlippedBase(Effect):
     """A base that tilts at one time by `amount` [rad] about a horizontal axis."""
 
