@@ -7,13 +7,13 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg import block_diag
 
 from estimation.diagnosis.base_models.priors import solve_map
 from estimation.diagnosis.hypothesis_tests.fitted_effects import FittedEffect, accept_all_but
 from estimation.diagnosis.hypothesis_tests.hypotheses import Hypothesis
 from estimation.diagnosis.hypothesis_tests.problem import Problem
 from estimation.diagnosis.hypothesis_tests.scoring import accept, score
+from estimation.diagnosis.joint_fits.block_errors import widened_by_blocks
 from estimation.diagnosis.joint_fits.event_window import open_event_edges
 from estimation.diagnosis.joint_fits.shape_errors import (
     formula_errors,
@@ -87,6 +87,7 @@ def fit_extended(problem: Problem, members: Sequence[FittedEffect], provenance: 
         rows, effect = slice(start, start + size + shapes), member.hypothesis.effect
         fast[rows], kicks[rows] = effect.above_band is not AboveBand.NO, effect.at_reversals is AtReversals.IMPACT
     flat, tau = white.independent(columns), white.independent(problem.recording.tau)
+    plain = len(tau)
     if problem.high_band is not None and fast.any():
         above, beyond = problem.high_band.regression(columns[:, :, fast], calm=kicks[fast])
         higher = np.zeros((len(above), len(fast)))
@@ -97,24 +98,26 @@ def fit_extended(problem: Problem, members: Sequence[FittedEffect], provenance: 
         linear[start + size : start + size + shapes] = False
     values = np.zeros(columns.shape[2])
     known = np.zeros(columns.shape[2], dtype=bool)
-    tangents = []
+    forms = [np.zeros((0, columns.shape[2]))]
     for i, (member, (start, size, _)) in enumerate(zip(members, slices, strict=True)):
-        effect, tangent = member.hypothesis.effect, None
+        effect = member.hypothesis.effect
         if effect.constrained:
             beside = accept_all_but(problem, members, i)
             found = score(problem, member.group, beside).limited(
                 member.hypothesis, problem.situation.robot, member.shape
             )
             known[start : start + size], values[start : start + size] = True, found.coefficients
-            tangent = effect.tangent(found.coefficients, member.shape)
-        tangents.append(tangent)
+            held = effect.form_rows(found.coefficients, member.shape)
+            forms.append(np.zeros((len(held), columns.shape[2])))
+            forms[-1][:, start : start + size] = held
     free = flat[:, linear & ~known]
     # The prior is stated for plain rows of the log; `row_weight` converts it to white rows.
     pull, kept = effects_prior(problem, members), ~known[linear]
     pull = GaussianPrior(pull.precision[np.ix_(kept, kept)] / white.row_weight, pull.target[kept])
     values[linear & ~known] = solve_map(free.T @ free, free.T @ (tau - flat[:, known] @ values[known]), pull)
     by_reversals = reversal_columns(members, [start for start, *_ in slices], (problem.n, flat.shape[1]))
-    covariance, unseen = _covariance(np.concatenate([flat, by_reversals]), _directions(slices, tangents, flat.shape[1]))
+    covariance, unseen = _covariance(np.concatenate([flat, by_reversals, *forms]))
+    covariance = widened_by_blocks(covariance, flat[:plain], (tau - flat @ values)[:plain])
     lower_upper = [m.hypothesis.coefficient_bounds(problem.situation.robot, m.shape) for m in members]
     extensions, determined_of = [], []
     for member, (start, size, shapes), steps, (lower, upper) in zip(
@@ -226,20 +229,7 @@ def _narrowed(covariance: Array, k: int, error: float) -> Array:
     return np.asarray(covariance * scale[:, None] * scale)
 
 
-def _directions(slices: Sequence[tuple[int, int, int]], tangents: Sequence[Array | None], size: int) -> Array | None:
-    """Returns the directions (p, d) in which all values together may vary; None if these are all."""
-    if all(tangent is None for tangent in tangents):
-        return None
-    parts: list[Array] = []
-    at = 0
-    for (start, own, _), tangent in zip(slices, tangents, strict=True):
-        if tangent is not None:
-            parts += [np.eye(start - at), tangent]
-            at = start + own
-    return block_diag(*parts, np.eye(size - at))
-
-
-def _covariance(matrix: Array, directions: Array | None) -> tuple[Array, NDArray[np.bool_]]:
+def _covariance(matrix: Array) -> tuple[Array, NDArray[np.bool_]]:
     """Returns the covariance of minimum-norm least squares from the data alone, without the prior.
 
     Also returns a mask (p,) of the coefficients that the data do not determine. Their variance is that of the minimum
@@ -247,11 +237,7 @@ def _covariance(matrix: Array, directions: Array | None) -> tuple[Array, NDArray
 
     Args:
         matrix: the columns (N, p).
-        directions: in which the coefficients may vary (p, d); None for all.
     """
-    if directions is not None:
-        inner, lost = _covariance(matrix @ directions, None)
-        return directions @ inner @ directions.T, (np.abs(directions) @ lost.astype(float)) > 0
     norms = np.linalg.norm(matrix, axis=0)
     norms[norms < NOTHING] = 1.0
     values, vectors = np.linalg.eigh((matrix.T @ matrix) / norms[:, None] / norms)

@@ -105,6 +105,14 @@ class Effect(ABC):
         """Gives the directions (k, d) in which coefficients (k,) may vary, for given shape values; None for all."""
         return None
 
+    def form_rows(self, coefficients: Array, shape: tuple[float, ...]) -> Array:
+        """Gives rows (r, k) that hold coefficients (k,) near a form with fewer freedoms.
+
+        Each row times the deviation is in units of a standard deviation: how exact the form is. The intervals contain
+        this error.
+        """
+        return np.zeros((0, len(coefficients)))
+
     def ties(self, coefficients: Array) -> tuple[tuple[int, int, float], ...]:
         """Lists pairs of a coefficient and a shape parameter that describe the same quantity.
 

@@ -139,4 +139,18 @@ def point_mass_tangent(parameters: Array) -> Array:
     return np.asarray(inertial_from_pseudo(np.array(changes)).T)
 
 
-__all__ = ["is_body", "nearest_body", "nearest_point_mass", "point_mass_tangent"]
+def point_mass_rows(parameters: Array) -> Array:
+    """Gives the rows (6, 10) that take a body's moments of inertia about its own centre, over their usual size.
+
+    That is a third of the mass times the squared distance of the centre, as of a rod that begins at the flange.
+
+    Args:
+        parameters: (10,) of a point mass that is not zero.
+    """
+    mass, centre = parameters[0], parameters[1:4] / parameters[0]
+    size = abs(mass) * max(float(centre @ centre), LENGTH**2) / 3.0
+    own = np.vstack([np.zeros((4, 6)), size * np.eye(6)])
+    return np.asarray(np.linalg.inv(np.hstack([point_mass_tangent(parameters), own]))[4:])
+
+
+__all__ = ["is_body", "nearest_body", "nearest_point_mass", "point_mass_rows", "point_mass_tangent"]

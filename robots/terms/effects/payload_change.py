@@ -9,7 +9,12 @@ from numpy.typing import NDArray
 
 from robots.terms.effect_bases.base import Coefficient, Effect, Place, Shape, Situation
 from robots.terms.effect_bases.capabilities import GearLoad, Persistence
-from robots.terms.effect_bases.carried_bodies import nearest_body, nearest_point_mass, point_mass_tangent
+from robots.terms.effect_bases.carried_bodies import (
+    nearest_body,
+    nearest_point_mass,
+    point_mass_rows,
+    point_mass_tangent,
+)
 from robots.terms.effect_bases.states import change_times
 
 if TYPE_CHECKING:
@@ -74,6 +79,12 @@ class PayloadChange(Effect):
     def tangent(self, coefficients: Array, shape: tuple[float, ...]) -> Array | None:
         """Gives the directions in which a point mass may vary; a body may vary in all."""
         return None if shape[1] or not coefficients[0] else point_mass_tangent(coefficients)
+
+    def form_rows(self, coefficients: Array, shape: tuple[float, ...]) -> Array:
+        """Gives the rows by which a body that was fitted as a point mass may have moments of inertia of its own."""
+        if shape[1] or not coefficients[0]:
+            return np.zeros((0, len(coefficients)))
+        return point_mass_rows(coefficients)
 
     def describe(
         self,

@@ -190,7 +190,7 @@ def test_no_log_knows_a_delay_better_than_its_formula(
 def test_a_column_that_is_hardly_one_is_left_open() -> None:
     """A column of size 1e-170 counts as not determined, without an overflow."""
     matrix = np.random.default_rng(0).normal(size=(50, 3)) * [1.0, 1.0, 1e-170]
-    covariance, lost = _covariance(matrix, None)
+    covariance, lost = _covariance(matrix)
     assert covariance[:2, :2] == pytest.approx(np.linalg.inv(matrix[:, :2].T @ matrix[:, :2]))
     assert np.isfinite(covariance).all()
     assert lost.tolist() == [False, False, True]

@@ -7,7 +7,13 @@ import numpy as np
 import pytest
 
 from robots.consistency import pseudo_inertia
-from robots.terms.effect_bases.carried_bodies import is_body, nearest_body, nearest_point_mass, point_mass_tangent
+from robots.terms.effect_bases.carried_bodies import (
+    is_body,
+    nearest_body,
+    nearest_point_mass,
+    point_mass_rows,
+    point_mass_tangent,
+)
 
 # Torque per kg, kg m and kg m2 of a usual motion, up to rotations.
 SIZES = np.array([5.0, 50.0, 50.0, 50.0, 30.0, 30.0, 30.0, 30.0, 30.0, 30.0])
@@ -71,3 +77,15 @@ def test_the_tangent_is_the_derivative_of_a_point_mass() -> None:
     assert is_body(parameters(at))
     assert is_body(-parameters(at))
     assert not is_body(np.array([1.0, 0.1, 0.0, 0.0, 0.0, 0.0, 0.0, 0.005, 0.0, 0.01]))
+
+
+def test_own_moments_of_inertia_are_those_of_a_rod_from_the_flange() -> None:
+    """The rows are zero for changes of mass and centre; a rod has one of each unit about its two cross axes."""
+    mass, centre = 1.4, np.array([0.0, 0.0, 0.25])
+    point = mass * np.array([1.0, *centre, *inertia_of(centre)])
+    rows = point_mass_rows(point)
+    np.testing.assert_allclose(rows @ point_mass_tangent(point), 0.0, atol=1e-9)
+    # From the flange to twice the distance of its centre, about the flange: m (2 c)^2 / 3.
+    rod = mass * np.array([1.0, *centre, *np.array([1.0, 0, 0, 1.0, 0, 0]) * (2 * 0.25) ** 2 / 3])
+    np.testing.assert_allclose(rows @ (rod - point), [1.0, 0, 0, 1.0, 0, 0], atol=1e-9)
+    np.testing.assert_allclose(point_mass_rows(-point) @ (point - rod), [-1.0, 0, 0, -1.0, 0, 0], atol=1e-9)
