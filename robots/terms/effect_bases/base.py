@@ -106,11 +106,7 @@ class Effect(ABC):
         return None
 
     def form_rows(self, coefficients: Array, shape: tuple[float, ...]) -> Array:
-        """Gives rows (r, k) that hold coefficients (k,) near a form with fewer freedoms.
-
-        Each row times the deviation is in units of a standard deviation: how exact the form is. The intervals contain
-        this error.
-        """
+        """Gives rows (r, k) that measure how far coefficients are from a form, over the standard error of that form."""
         return np.zeros((0, len(coefficients)))
 
     def ties(self, coefficients: Array) -> tuple[tuple[int, int, float], ...]:
