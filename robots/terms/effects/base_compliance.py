@@ -209,8 +209,8 @@ def _oscillation(situation: Situation, static: Array, shape: tuple[float, ...]) 
         w = np.sqrt(K / about[run].mean(axis=0))
         if run.stop - run.start < 3 or not 0 < w.min() * situation.period <= 0.4 * np.pi:
             continue
-        # Bilinear rule, exact at the mean resonance: two rows of a banded system per sample. The first two tilts are
-        # static, because a log may begin in the middle of a motion.
+        # Bilinear rule, exact at the mean resonance: two rows of a banded system per sample, for the tilt beyond the
+        # static one. It begins with none, because a log may begin in the middle of a motion.
         centre = float(np.clip(np.sqrt(w[0] * w[1]), w.min(), 0.4 * np.pi / situation.period))
         s = centre / np.tan(0.5 * centre * situation.period)
         x, rows = static[run], 2 * (run.stop - run.start)
@@ -222,7 +222,7 @@ def _oscillation(situation: Situation, static: Array, shape: tuple[float, ...]) 
             for k, j in product(range(2), range(2)):
                 first = 2 * (2 - back) + j
                 band[1 + k - j + 2 * back, first : first + 2 * len(block) : 2] = block[:, k, j]
-        push = K[:, None] * (x[2:] + 2.0 * x[1:-1] + x[:-2])
-        right = np.concatenate([x[:2], push]).reshape(rows, -1)
-        tilt[run] = solve_banded((5, 1), band, right).reshape(x.shape)
+        push = -(m @ (x[2:] - 2.0 * x[1:-1] + x[:-2]) + d @ (x[2:] - x[:-2]))
+        right = np.concatenate([np.zeros_like(x[:2]), push]).reshape(rows, -1)
+        tilt[run] += solve_banded((5, 1), band, right).reshape(x.shape)
     return tilt, *situation.derivatives(tilt)

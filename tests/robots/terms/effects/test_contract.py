@@ -153,9 +153,8 @@ def test_logs_do_not_touch_each_other(effect, seen):
     second = seen(times=t[700:], velocity_scale=2e-3)
     for joint, point in _points(effect, both):
         alone = effect.columns(second, joint, point)
-        # The same arithmetic, summed in chunks that begin elsewhere; rounding is that of the largest values, and two
-        # differences of a solution amplify it.
-        atol = 1e-7 * max(float(np.abs(alone).max()), 1.0)
+        # The same arithmetic, summed in chunks that begin elsewhere; rounding is that of the largest values.
+        atol = 1e-9 * max(float(np.abs(alone).max()), 1.0)
         np.testing.assert_allclose(effect.columns(both, joint, point)[700:], alone, rtol=1e-9, atol=atol)
 
 
