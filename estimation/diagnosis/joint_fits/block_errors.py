@@ -7,6 +7,8 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
+from estimation.uncertainty.sandwich import at_least
+
 Array = NDArray[np.float64]
 
 BLOCKS = 30
@@ -29,7 +31,5 @@ def widened_by_blocks(covariance: Array, matrix: Array, residual: Array) -> Arra
     """
     edges = np.linspace(0, len(matrix), BLOCKS + 1).astype(int)
     scores = np.array([residual[a:b] @ matrix[a:b] for a, b in pairwise(edges)])
-    robust = np.einsum("bp,bp->p", scores @ covariance, scores @ covariance) * BLOCKS / (BLOCKS - 1)
-    variance = np.diag(covariance)
-    wider = np.sqrt(np.maximum(robust / np.where(variance > 0, variance, np.inf), 1.0))
-    return covariance * wider[:, None] * wider
+    changes = scores @ covariance  # of the values, by each block
+    return at_least(covariance, np.sum(changes**2, axis=0) * BLOCKS / (BLOCKS - 1))
