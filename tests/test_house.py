@@ -10,7 +10,7 @@ import pytest
 
 ROOT = Path(__file__).parents[1]
 PACKAGES = ("robots", "estimation", "oed")
-MOST_LINES, MOST_FILES, MEDIAN_LINES = 300, 15, 150
+MOST_LINES, MOST_FILES, MEDIAN_LINES = 450, 15, 150
 # One file a member: these folders grow with the catalogue, and their machinery is elsewhere.
 FAMILIES = {"robots/terms/effects", "estimation/gate/checks", "oed/cli/commands"}
 
@@ -37,7 +37,7 @@ def imports_of(path: Path, modules: dict[str, Path]) -> set[str]:
 
 
 def test_files_are_short():
-    """No file of the packages has more than 300 lines, and half of them have at most 150."""
+    """No file of the packages has more than 450 lines, and half of them have at most 150."""
     lengths = {path: len(path.read_text(encoding="utf-8").splitlines()) for path in FILES}
     long = {str(path.relative_to(ROOT)): count for path, count in lengths.items() if count > MOST_LINES}
     assert long == {}

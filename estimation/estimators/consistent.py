@@ -24,7 +24,7 @@ from estimation.regressions.standard_parameters import (
     nonnegative_rows,
     scaling,
 )
-from robots.collision.link_boxes import link_boxes
+from robots.collision.drawn.link_boxes import link_boxes
 from robots.common.errors import InputError, SolverError
 from robots.consistency import BASIS, normalised_eigenvalues
 

@@ -21,8 +21,9 @@ from oed.campaigns.stages import Stage
 from oed.campaigns.timetable import make_timetable
 from oed.experiments import Design, LimitOptions, SearchOptions, usable_limits
 from oed.experiments import design as design_experiment
+from oed.experiments.checks import velocity_share
 from oed.trajectories import PiecewisePolynomial
-from robots.collision import collision_model
+from robots.collision import Surroundings
 from robots.common.errors import InputError
 from robots.common.parallel import one_blas_thread
 from robots.common.progress import SILENT, Progress
@@ -41,6 +42,7 @@ def campaign(
     velocity_fraction: float = 1.0,
     torque_margin: float = 0.1,
     collision: bool = True,
+    surroundings: Surroundings | None = None,
     ambient: float = 20.0,
     cold_friction: float = 1.0,
     thermal: KnownThermal | None = None,
@@ -61,10 +63,11 @@ def campaign(
         robot: the robot.
         programme: what to run how often; 24 cycles of 5 min by default.
         design: the excitation, or its folder; a quick one is designed by default. Its first pose is home.
-        velocity_fraction: of the velocity limits that may be used.
+        velocity_fraction: share of the velocity limits to use.
         torque_margin: share of the torque limits kept as reserve for errors of the nominal dynamics.
         collision: keep the stages free of collisions, if the robot's bodies are described. The quick excitation avoids
             them, warm-up and friction stages use only the free part of the ranges, and moves go around obstacles.
+        surroundings: the floor, and boxes that the arm must not enter.
         ambient: ambient temperature [degC].
         cold_friction: friction of the cold robot over that of the description, for the expected temperatures: above 1
             where the description is of the warm robot.
@@ -83,18 +86,19 @@ def campaign(
     """
     plan = programme or Programme()
     for name, value, allowed, good in (
-        ("velocity_fraction", velocity_fraction, "above 0, up to 1", 0.0 < velocity_fraction <= 1.0),
         ("ambient", ambient, "a temperature in degC", bool(np.isfinite(ambient))),
         ("cold_friction", cold_friction, "a positive number", 0.0 < cold_friction < np.inf),
     ):
         if not good:
             raise InputError(f"{name} is {value}", allowed=allowed)
+    velocity_share(robot, velocity_fraction)  # refuses one that is out of range
     limits = usable_limits(robot.limits, velocity_fraction)
     torque = TorqueCheck(robot, torque_margin)
     listener = progress or SILENT
     notes: list[str] = []
     excitation, home = None, limits.home
-    bodies = collision_model(robot) if collision else None
+    around = surroundings or Surroundings()
+    bodies = around.model(robot)
     if plan.cycles:
         made: Design | str | os.PathLike[str]
         if design is not None:
@@ -105,7 +109,8 @@ def campaign(
                 limits=LimitOptions(
                     velocity_fraction=velocity_fraction,
                     torque_margin=torque_margin,
-                    collision=bodies is not None and bool(bodies.pairs),
+                    collision=collision,
+                    surroundings=around,
                 ),
                 search=SearchOptions(effort="quick", seed=seed, workers=workers, executor=executor),
                 progress=progress,
@@ -117,9 +122,9 @@ def campaign(
         excitation = checked(excitation, robot, home, torque)
     listener.start(f"planning a campaign for {robot.name}", None)
     try:
-        free_ranges = CollisionFreeRanges(bodies, home) if bodies is not None else None
+        free_ranges = CollisionFreeRanges(bodies, home) if collision else None
         if free_ranges is not None and not free_ranges.possible:
-            if bodies is not None and bodies.pairs:
+            if bodies.pairs:
                 notes.append(
                     "The home pose collides in the collision model, so collisions of the stages could not be avoided."
                 )
@@ -139,7 +144,7 @@ def campaign(
             raise InputError(f"{len(known.models)} thermal models", allowed=f"{robot.n}, one per joint")
         if known is not None:
             known = replace(known, models=tuple(replace(model, ambient=ambient) for model in known.models))
-        notes += campaign_notes(stages, planner, known)
+        notes += campaign_notes(stages, planner, known, bodies)
     finally:
         listener.finish()
     return Campaign(
@@ -156,6 +161,7 @@ def campaign(
         settings={
             "velocity_fraction": velocity_fraction,
             "collision": collision,
+            **around.settings(),
             "seed": seed,
             "design": os.path.abspath(design) if isinstance(design, str | os.PathLike) else None,
         },

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from oed.campaigns.stages import Stage
 from oed.trajectories.sequence import ACCELERATION_TOLERANCE, POSITION_TOLERANCE, VELOCITY_TOLERANCE
-from robots.collision import collision_model
+from robots.collision import CollisionModel
 from robots.common.errors import InfeasibleError, InputError
 from robots.limits import Margin, symmetric_margins
 from robots.regressor import TorqueModel, default_model
@@ -121,20 +121,19 @@ def require_rest(stage: Stage, home: Array) -> None:
                 )
 
 
-def closest_bodies(robot: Robot, motion: Motion) -> tuple[str, float, float] | None:
+def closest_bodies(bodies: CollisionModel, motion: Motion) -> tuple[str, float, float] | None:
     """Looks for the smallest clearance between the robot's own bodies and its stated surroundings.
 
     Args:
-        robot: the robot.
+        bodies: of the robot, and what stands around it.
         motion: looked at in every fifth sample.
 
     Returns:
         The pair's name, its clearance [m], negative where bodies overlap, and when [s]; None without any pair.
     """
-    model = collision_model(robot)
-    if not model.names:
+    if not bodies.names:
         return None
     rows = slice(None, None, CLEARANCE_STEP)
-    clearance = np.asarray(model.clearance(motion.q[rows]))
+    clearance = np.asarray(bodies.clearance(motion.q[rows]))
     row, pair = (int(index) for index in np.unravel_index(clearance.argmin(), clearance.shape))
-    return model.names[pair], float(clearance[row, pair]), float(motion.t[rows][row])
+    return bodies.names[pair], float(clearance[row, pair]), float(motion.t[rows][row])

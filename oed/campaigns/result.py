@@ -20,6 +20,7 @@ from oed.campaigns.stages import Stage
 from oed.campaigns.timetable import Slot
 from oed.experiments.safety_checks.margins import assumed_values
 from oed.exports import read_trajectory, write_trajectory
+from robots.collision import Surroundings
 from robots.common.errors import InputError
 from robots.common.files import existing_file, sha256, write_atomic
 from robots.loading import load_robot
@@ -65,6 +66,11 @@ class Campaign:
     torque_margin: float
     notes: tuple[str, ...] = ()
     settings: Mapping[str, Any] = field(default_factory=dict)
+
+    @property
+    def surroundings(self) -> Surroundings:
+        """The floor, and boxes that the arm must not enter."""
+        return Surroundings.from_settings(self.settings)
 
     @property
     def stages_by_name(self) -> dict[str, Stage]:

@@ -7,6 +7,7 @@ from typing import Any
 
 import typer
 
+from robots.collision import Surroundings
 from robots.common.errors import InputError
 from robots.common.progress import Progress
 from robots.robot import Robot
@@ -17,6 +18,10 @@ APPLY = {
     "friction",
     "home",
     "velocity_fraction",
+    "collision",
+    "floor",
+    "no_floor",
+    "keep_out",
     "noise",
     "seed",
     "out",
@@ -62,7 +67,9 @@ def design_discriminating(
     noise: list[float] | None,
     friction: str,
     home: list[float] | None,
-    velocity_fraction: float,
+    velocity_fraction: float | None,
+    collision: bool,
+    surroundings: Surroundings,
     seed: int,
     out: Path,
     png: bool,
@@ -82,6 +89,8 @@ def design_discriminating(
             friction=friction,
             home=home,
             velocity_fraction=velocity_fraction,
+            collision=collision,
+            surroundings=surroundings,
             seed=seed,
             progress=progress,
         )

@@ -89,10 +89,44 @@ BaseFrequencyOption = Annotated[
     float, typer.Option("--base-frequency", help="Frequency of the first harmonic: one over the period [Hz].")
 ]
 CollisionOption = Annotated[
-    bool, typer.Option("--collision", help="Avoid self-collisions and the obstacles in the robot file.")
+    bool,
+    typer.Option(
+        help=(
+            "Avoid collisions with the robot itself, the floor and the obstacles in the robot file. Without it, all "
+            "files say that the motion was not checked."
+        )
+    ),
+]
+FloorOption = Annotated[
+    float | None,
+    typer.Option(
+        "--floor",
+        help=(
+            "Height of the floor in the base frame [m]. Default: that of the robot file, else the plane that the base "
+            "is mounted on."
+        ),
+        show_default=False,
+    ),
+]
+NoFloorOption = Annotated[bool, typer.Option("--no-floor", help="There is no floor, as under a robot on a pedestal.")]
+KeepOutOption = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--keep-out",
+        help="Box that the arm must not enter, in the base frame: xmin,xmax,ymin,ymax,zmin,zmax [m]. Repeat for more.",
+        show_default=False,
+    ),
 ]
 VelocityFractionOption = Annotated[
-    float, typer.Option("--velocity-fraction", help="Fraction of the velocity limits to use.")
+    float | None,
+    typer.Option(
+        "--velocity-fraction",
+        help=(
+            "Fraction of the velocity limits to use. Default: 1 for robots of the catalogue, 0.5 for others, whose "
+            "first motion should be slower."
+        ),
+        show_default=False,
+    ),
 ]
 TorqueMarginOption = Annotated[
     float, typer.Option("--torque-margin", help="Fraction of the torque limits to keep as reserve.")

@@ -4,11 +4,14 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from oed.cli.options import numbers
 from robots.common.errors import InputError
 
 if TYPE_CHECKING:
     from oed.constraints.geometric import GeometricLimit
+    from robots.collision import Surroundings
 
 
 def spaces_from(tool_box: str | None, singularity: float | None) -> tuple[GeometricLimit, ...]:
@@ -25,15 +28,39 @@ def spaces_from(tool_box: str | None, singularity: float | None) -> tuple[Geomet
     from oed.constraints.tool import ToolBox
 
     limits: list[GeometricLimit] = []
-    sides = numbers("--tool-box", tool_box)
-    if sides is not None:
-        if len(sides) != 6:
-            raise InputError(
-                f"--tool-box {tool_box}",
-                allowed="six numbers xmin,xmax,ymin,ymax,zmin,zmax, such as 0.1,0.6,-0.5,0.5,0.05,inf",
-            )
-        low, high = sides[::2], sides[1::2]
+    if tool_box is not None:
+        low, high = _corners("--tool-box", tool_box)
         limits.append(ToolBox(lower=(low[0], low[1], low[2]), upper=(high[0], high[1], high[2])))
     if singularity is not None:
         limits.append(SingularityLimit(smallest=singularity))
     return tuple(limits)
+
+
+def surroundings_from(floor: float | None, no_floor: bool, keep_out: list[str] | None) -> Surroundings:
+    """Reads ``--floor``, ``--no-floor`` and ``--keep-out``.
+
+    Raises:
+        InputError: a floor and none, other than six finite numbers, or an empty box.
+    """
+    from robots.collision import Box, Surroundings
+
+    if no_floor and floor is not None:
+        raise InputError("--floor with --no-floor", allowed="one of them")
+    boxes = []
+    for number, text in enumerate(keep_out or (), start=1):
+        low, high = map(np.array, _corners("--keep-out", text))
+        if not (np.isfinite(low) & np.isfinite(high) & (low < high)).all():
+            raise InputError(f"--keep-out {text}", allowed="finite numbers, each minimum below its maximum")
+        pose = np.eye(4)
+        pose[:3, 3] = (low + high) / 2.0
+        boxes.append(Box(name=f"keep-out {number}", size=high - low, pose=pose))
+    return Surroundings(floor=False if no_floor else True if floor is None else floor, keep_out=tuple(boxes))
+
+
+def _corners(option: str, text: str) -> tuple[tuple[float, ...], tuple[float, ...]]:
+    """The lowest and the highest corner of a box."""
+    sides = numbers(option, text)
+    if sides is None or len(sides) != 6:
+        allowed = "six numbers xmin,xmax,ymin,ymax,zmin,zmax, such as 0.1,0.6,-0.5,0.5,0.05,inf"
+        raise InputError(f"{option} {text}", allowed=allowed)
+    return tuple(sides[::2]), tuple(sides[1::2])

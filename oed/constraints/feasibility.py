@@ -12,6 +12,7 @@ from scipy.optimize import least_squares, minimize
 from oed.constraints.geometric import CollisionLimit, GeometricLimits
 from oed.constraints.tool import ToolBox
 from robots.collision import CollisionModel, Plane
+from robots.collision.pairs import random_poses
 from robots.common.errors import InfeasibleError, InputError
 from robots.robot import Robot
 
@@ -19,6 +20,7 @@ Array = NDArray[np.float64]
 
 SAMPLES = 4000  # poses from which the tool's nearest approach to its box is sought
 STARTS = 6
+ROOM = 0.1  # around a start pose, in the scale of the limits, mostly [m]
 REACHED = 1e-5  # of the box's distance, below which the tool is within it [m]
 
 
@@ -127,7 +129,7 @@ def nearest_feasible(limits: GeometricLimits, home: ArrayLike, *, seed: int = 0,
         room: to keep from every bound, in its own scale.
 
     Returns:
-        The first local solution found (n,), sought from that pose first; None where none was found.
+        The first local solution found (n,), sought from that pose first, else a pose of `roomy_pose`.
     """
     robot, q = limits.robot, np.asarray(home, dtype=np.float64)
     lower, upper = robot.limits.lower, robot.limits.upper
@@ -154,7 +156,27 @@ def nearest_feasible(limits: GeometricLimits, home: ArrayLike, *, seed: int = 0,
         pose = np.clip(result.x, lower, upper)
         if np.isfinite(pose).all() and values(pose).min(initial=np.inf) >= -REACHED:
             return np.asarray(pose)
-    return None
+    return roomy_pose(limits, q, seed=seed)
+
+
+def roomy_pose(limits: GeometricLimits, home: Array, *, seed: int = 0) -> Array | None:
+    """Looks for a pose that keeps all limits with room around it, so that motions can start there.
+
+    Args:
+        limits: the limits.
+        home: (n,) [rad or m].
+        seed: of the poses that are tried.
+
+    Returns:
+        Of the poses (n,) with `ROOM` to every bound, or nearly the most that any has, the one nearest to `home`; None
+        where no pose was found that keeps all limits.
+    """
+    q = random_poses(limits.robot.limits, SAMPLES, seed)
+    room = limits.values(q, q, q).min(axis=1, initial=np.inf)
+    if room.max() < 0.0:
+        return None
+    enough = np.flatnonzero(room >= min(ROOM, 0.8 * room.max()))
+    return np.round(q[enough[np.linalg.norm(q[enough] - home, axis=1).argmin()]], 3)
 
 
 def tool_approach(robot: Robot, box: ToolBox, *, seed: int = 0) -> tuple[float, Array]:

@@ -7,11 +7,16 @@ from dataclasses import replace
 import numpy as np
 
 from oed.retiming import finite_limits
-from robots.common.errors import InfeasibleError
+from robots.common.errors import InfeasibleError, InputError
 from robots.limits import Limits
+from robots.loading import catalogue
+from robots.robot import Robot
 
 # The controller interpolates between the file's samples; a hair of every limit is left to it.
 RESERVE = 0.9995
+FIRST_SPEED = 0.5
+"""Share of the velocity limits that motions use by default on a robot that is not of the catalogue."""
+
 # The share of its range that a joint must be able to travel in one period for an experiment to be worth its name.
 TRAVEL = 0.01
 
@@ -46,6 +51,23 @@ def check_period(limits: Limits, duration: float) -> None:
             joint=joint + 1,
             allowed=f"{shortest[joint]:.3g} s or longer (base frequency up to {1 / shortest[joint]:.3g} Hz)",
         )
+
+
+def velocity_share(robot: Robot, stated: float | None) -> float:
+    """Gives the share of the velocity limits that motions may use.
+
+    Args:
+        robot: the robot; the first motions on one that is not of the catalogue are slower.
+        stated: what a user asks for; None for the default.
+
+    Raises:
+        InputError: a share out of range.
+    """
+    if stated is None:
+        return 1.0 if robot.origin in catalogue() else FIRST_SPEED
+    if not 0.0 < stated <= 1.0:
+        raise InputError(f"the velocity fraction is {stated}", allowed="above 0, up to 1")
+    return stated
 
 
 def usable_limits(limits: Limits, velocity_fraction: float = 1.0) -> Limits:

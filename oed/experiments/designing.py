@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from oed.criteria import Criterion
 from oed.criteria import criterion as choose_criterion
 from oed.experiments.assembly import assemble, rest_pose
-from oed.experiments.checks import check_period, usable_limits
+from oed.experiments.checks import check_period, usable_limits, velocity_share
 from oed.experiments.options import LimitOptions, ModelOptions, SearchOptions, TrajectoryOptions, WeightOptions
 from oed.experiments.problems.criterion_weighting import choose_weighting
 from oed.experiments.problems.essential import essential_part
@@ -20,8 +20,9 @@ from oed.experiments.problems.problem import FourierProblem
 from oed.experiments.quality import measure
 from oed.experiments.results.outcome import Outcome
 from oed.experiments.results.result import Design
+from oed.experiments.safety_checks.freedom import collision_data
 from oed.experiments.safety_checks.margins import measured_margins
-from oed.experiments.safety_checks.safety import Safety, choose_safety, collision_data
+from oed.experiments.safety_checks.safety import Safety, choose_safety
 from oed.experiments.safety_checks.spatial_check import SpatialMargin, motion_margins
 from oed.experiments.searches.islands import search_islands
 from oed.experiments.searches.search import Found
@@ -89,7 +90,9 @@ def design(
         settings |= group.settings()
     family = plan.excitation
     count_periods(family.duration, known.period)
-    bounds = usable_limits(known.limits, kept.velocity_fraction)
+    share = velocity_share(known, kept.velocity_fraction)
+    bounds = usable_limits(known.limits, share)
+    settings["velocity_fraction"] = share
     check_period(bounds, family.duration)
     base = _base(known, fitted, bounds, plan, chosen)
     samples = plan.periods * family.duration / known.period
@@ -168,7 +171,7 @@ def _assembled(
 ) -> Design:
     """The whole experiment around the best optimised part, measured."""
     base, family, robot = problem.base, problem.family, problem.base.model.robot
-    sequence, freedom, left_out = safety.assembled(
+    sequence, report, left_out, safety = safety.assembled(
         problem.series(z, plan.periods), family.kind, problem.limits, robot.period, plan.strokes
     )
     motion = sequence.motion()
@@ -186,7 +189,7 @@ def _assembled(
         home=safety.home,
         home_moved=safety.moved,
         space=_space(safety, motion),
-        freedom=None if freedom is None else collision_data(freedom),
+        freedom=None if report is None or safety.collision is None else collision_data(safety.collision, report),
         strokes_left_out=left_out,
     )
     parts = [family.kind, *(["sinusoid"] if any(s["kind"] == "sinusoid" for s in design.segments) else [])]

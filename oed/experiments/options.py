@@ -17,9 +17,11 @@ from oed.experiments.searches.search import EFFORTS, Effort
 from oed.experiments.solvers import InteriorPoint, Solver
 from oed.trajectories import Family, Fourier, check_family
 from oed.trajectories import family as choose_family
+from robots.collision import CollisionModel, Surroundings
 from robots.common.errors import InputError
 from robots.common.plain import finite
 from robots.plants import PlantEffect
+from robots.robot import Robot
 from robots.signal_checks import checked_body
 from robots.signals import Motion
 from robots.terms import FrictionTerm
@@ -109,12 +111,14 @@ class LimitOptions:
     """Which limits the whole experiment keeps, besides position, acceleration and jerk.
 
     Attributes:
-        velocity_fraction: of the velocity limits that may be used.
+        velocity_fraction: share of the velocity limits to use. By default 1 for robots of the catalogue, and half for
+            others, whose first motion should be slower.
         torque: keep the torque limits by the robot's nominal dynamics, where both are described.
         torque_margin: share of the torque limits kept for what the nominal dynamics are wrong by.
-        collision: keep the arm clear of itself and of the obstacles in the robot's file; the whole experiment is then
-            proved free at all times.
+        collision: keep the arm clear of itself, of the floor and of the obstacles in the robot's file; the whole
+            experiment is then proved free at all times. Without it the design is marked as not checked.
         clearance: to keep [m].
+        surroundings: the floor, and boxes that the arm must not enter.
         space: limits in space, such as `ToolBox`, `PlaneLimit` and `SingularityLimit`, or one of one's own.
         motion: limits of position, velocity and acceleration of one's own, see `StateLimit`.
         effects: what the robot has beyond its description, as a diagnosis found it: the torque of those that follow
@@ -126,18 +130,19 @@ class LimitOptions:
         InputError: a velocity fraction out of range, or a payload of another shape.
     """
 
-    velocity_fraction: float = 1.0
+    velocity_fraction: float | None = None
     torque: bool = True
     torque_margin: float = 0.1
-    collision: bool = False
+    collision: bool = True
     clearance: float = 0.01
+    surroundings: Surroundings = field(default_factory=Surroundings)
     space: Sequence[GeometricLimit] = ()
     motion: Sequence[StateLimit] = ()
     effects: Sequence[PlantEffect] = ()
     payload: ArrayLike | None = None
 
     def __post_init__(self) -> None:
-        if not 0 < self.velocity_fraction <= 1:
+        if self.velocity_fraction is not None and not 0 < self.velocity_fraction <= 1:
             raise InputError(f"the velocity fraction is {self.velocity_fraction}", allowed="above 0, up to 1")
         if self.payload is not None:
             object.__setattr__(self, "payload", checked_body(self.payload))
@@ -147,6 +152,14 @@ class LimitOptions:
         for own in self.motion:
             if not isinstance(own, StateLimit):
                 raise InputError(f"the limit {own!r}", allowed="a subclass of StateLimit in `motion`")
+
+    def collision_model(self, robot: Robot) -> CollisionModel | None:
+        """Makes the bodies and obstacles that the design keeps apart; None where collisions are not to be checked.
+
+        Args:
+            robot: the robot.
+        """
+        return self.surroundings.model(robot) if self.collision else None
 
     @property
     def static_effects(self) -> list[PlantEffect]:
@@ -160,6 +173,7 @@ class LimitOptions:
             "torque_margin": self.torque_margin if self.torque else None,
             "collision": self.collision,
             "clearance": self.clearance if self.collision else None,
+            **self.surroundings.settings(),
             "space": [repr(limit) for limit in self.space],
             "motion": [repr(limit) for limit in self.motion],
             "effects": [asdict(effect) for effect in self.effects],

@@ -13,10 +13,12 @@ from oed.criteria import criterion as choose_criterion
 from oed.experiments.checks import usable_limits
 from oed.experiments.quality import design_model, measure
 from oed.experiments.results.retimed import RetimedExperiment, torque_use
+from oed.experiments.safety_checks.freedom import collision_data
 from oed.experiments.safety_checks.margins import measured_margins
 from oed.retiming import Retimed, retime_with_stops
 from oed.retiming import retime as retime_by_toppra
 from robots.base_parameters import find_base_parameters
+from robots.collision import Surroundings, check_motion
 from robots.common.errors import InputError
 from robots.limits import Limits
 from robots.regressor import TorqueModel
@@ -38,6 +40,8 @@ def retime(
     friction: str = "polynomial",
     velocity_scale: float = 0.02,
     tolerance: float = 0.01,
+    collision: bool = True,
+    surroundings: Surroundings | None = None,
 ) -> RetimedExperiment:
     """Runs through the path of a motion, or through waypoints, as fast as the robot's limits allow.
 
@@ -53,6 +57,8 @@ def retime(
         friction: the model whose parameters are meant.
         velocity_scale: of its Coulomb column.
         tolerance: how far ruckig's polyline may leave the path [rad or m].
+        collision: check the new motion for collisions; where it collides, the result says so.
+        surroundings: the floor, and boxes that the arm must not enter.
 
     Returns:
         The new motion and the criterion before and after.
@@ -80,6 +86,7 @@ def retime(
         retimed = retime_with_stops(motion, limits, period=robot.period, tolerance=tolerance)
     if stops is not None:
         retimed = replace(retimed, duration_before=stops.duration_after, usage_before=stops.usage, waypoints=True)
+    bodies = (surroundings or Surroundings()).model(robot) if collision else None
     return RetimedExperiment(
         robot=robot,
         base=base,
@@ -91,6 +98,7 @@ def retime(
         torque_after=torque_use(base, retimed.motion),
         margins=measured_margins(robot, retimed.motion, base),
         settings=settings,
+        freedom=None if bodies is None else collision_data(bodies, check_motion(bodies, retimed.motion, confirm=False)),
     )
 
 

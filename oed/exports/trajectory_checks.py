@@ -18,6 +18,9 @@ from robots.signals import Motion
 REST = 1e-3
 """Speed at both ends up to which the robot stands [rad/s or m/s]."""
 
+UNKNOWN_COLLISIONS = "NOT CHECKED for collisions, as far as its file says."
+"""What is said of a trajectory whose file does not state under ``collisions`` what was checked."""
+
 SHARE = 1e-6
 """A limit may be exceeded by this share: trajectories touch their limits, and files round."""
 

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 from os import PathLike
 from pathlib import Path
 from typing import Any
 
 from oed.exports.forms import FORMS, ExportOptions
 from oed.exports.forms.sampling import at_period
-from oed.exports.trajectory_checks import check_trajectory
+from oed.exports.trajectory_checks import UNKNOWN_COLLISIONS, check_trajectory
 from robots.common.errors import InputError
 from robots.common.files import write_atomic
 from robots.robot import Robot
@@ -64,5 +65,8 @@ def export_trajectory(
     if step is None:
         raise InputError("the motion is not uniform in time", remedy="give a period (--period)")
     sampled = at_period(motion, step)
-    write_atomic(path, chosen.write(sampled, robot, options or ExportOptions(), suffix), force=force)
+    remark = str((metadata or {}).get("collisions") or UNKNOWN_COLLISIONS)
+    write_atomic(
+        path, chosen.content(sampled, robot, replace(options or ExportOptions(), remark=remark), suffix), force=force
+    )
     return sampled

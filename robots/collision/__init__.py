@@ -9,6 +9,7 @@ from robots.collision.model import CollisionModel
 from robots.collision.motion import check_motion
 from robots.collision.pairs import Pair
 from robots.collision.report import CollisionReport
+from robots.collision.surroundings import Surroundings
 from robots.collision.travel import travel_bound
 
 __all__ = [
@@ -21,6 +22,7 @@ __all__ = [
     "Pair",
     "Plane",
     "Scene",
+    "Surroundings",
     "check_motion",
     "collision_model",
     "floor",

@@ -83,9 +83,13 @@ class Plane:
 Obstacle = Box | Plane | Capsule
 
 
+FLOOR = "floor"
+"""The name of a robot's floor among its obstacles."""
+
+
 def floor(height: float) -> Plane:
     """Makes a floor: nothing may come below ``z = height`` [m] of the base frame."""
-    return Plane(name="floor", normal=np.array([0.0, 0.0, 1.0]), offset=height)
+    return Plane(name=FLOOR, normal=np.array([0.0, 0.0, 1.0]), offset=height)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -117,7 +121,7 @@ class Scene:
 
 
 def stated_scene(description: CollisionDescription) -> Scene:
-    """Makes the obstacles that a robot's file states.
+    """Makes the obstacles that a robot's file states, but its floor.
 
     Args:
         description: the entry ``collision``.
@@ -125,7 +129,7 @@ def stated_scene(description: CollisionDescription) -> Scene:
     Raises:
         InputError: two obstacles of one name.
     """
-    obstacles: list[Obstacle] = [] if description.floor is None else [floor(description.floor)]
+    obstacles: list[Obstacle] = []
     for box in description.boxes:
         pose = homogeneous(rotation_from_rpy(box.rpy), box.xyz)
         obstacles.append(Box(name=box.name, size=np.array(box.size), pose=pose))

@@ -106,6 +106,11 @@ def stated_capsules(descriptions: Iterable[CapsuleDescription], chain: Chain) ->
     return numbered(capsules)
 
 
+def has_extent(chain: Chain) -> bool:
+    """Whether the joints and the flange of a chain are apart, so that its links have a length."""
+    return bool(reach(chain) or np.linalg.norm(chain.joints[0].translation))
+
+
 def segment_capsules(chain: Chain, fraction: float) -> tuple[Capsule, ...]:
     """Lays a capsule along each link, from its joint's origin to the next one's, for robots that state none.
 

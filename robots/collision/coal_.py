@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from importlib import import_module
 from typing import Any
 
 import numpy as np
@@ -10,9 +9,9 @@ from numpy.typing import ArrayLike, NDArray
 
 from robots.collision.boxes import Box, Obstacle, Plane
 from robots.collision.capsules import Capsule
+from robots.collision.drawn.shapes import coal
 from robots.collision.model import CollisionModel
 from robots.collision.pairs import poses_of
-from robots.common.errors import InputError
 
 Array = NDArray[np.float64]
 
@@ -28,7 +27,7 @@ class CoalChecker:
     """
 
     def __init__(self, model: CollisionModel) -> None:
-        self._coal = _coal()
+        self._library = coal()
         self._model = model
         self._bodies = [(self._body(pair.first), self._body(pair.second)) for pair in model.pairs]
         self._still = [(self._moved(first), self._moved(second)) for first, second in self._bodies]
@@ -42,9 +41,9 @@ class CoalChecker:
         Returns:
             (N, P) [m].
         """
-        coal, pairs = self._coal, self._model.pairs
+        library, pairs = self._library, self._model.pairs
         poses = poses_of(self._model.chain, np.atleast_2d(np.asarray(q, dtype=np.float64)))
-        request, result = coal.DistanceRequest(), coal.DistanceResult()
+        request, result = library.DistanceRequest(), library.DistanceResult()
         clearances = np.empty((len(poses), len(pairs)))
         for column, (pair, bodies, moved) in enumerate(zip(pairs, self._bodies, self._still, strict=True)):
             places = [self._places(body, poses) for body in bodies]
@@ -54,23 +53,25 @@ class CoalChecker:
                     transform.setRotation(rotations[row])
                     transform.setTranslation(shifts[row])
                 result.clear()
-                clearances[row, column] = coal.distance(bodies[0][0], moved[0], bodies[1][0], moved[1], request, result)
+                clearances[row, column] = library.distance(
+                    bodies[0][0], moved[0], bodies[1][0], moved[1], request, result
+                )
         return clearances
 
     def _body(self, body: Obstacle) -> tuple[Any, int, Array, Array]:
         """The shape, its link, and its rotation and shift in that link's frame."""
-        coal = self._coal
+        library = self._library
         if isinstance(body, Box):
-            return coal.Box(*body.size), 0, body.pose[:3, :3], body.pose[:3, 3]
+            return library.Box(*body.size), 0, body.pose[:3, :3], body.pose[:3, 3]
         if isinstance(body, Plane):
             # Coal's half-space is solid where normal . x <= offset.
-            return coal.Halfspace(np.array(body.normal), float(body.offset)), 0, np.eye(3), np.zeros(3)
+            return library.Halfspace(np.array(body.normal), float(body.offset)), 0, np.eye(3), np.zeros(3)
         length = float(np.linalg.norm(body.end - body.start))
-        shape = coal.Capsule(body.radius, length) if length else coal.Sphere(body.radius)
+        shape = library.Capsule(body.radius, length) if length else library.Sphere(body.radius)
         return shape, body.link, _along(body), (body.start + body.end) / 2.0
 
     def _moved(self, body: tuple[Any, int, Array, Array]) -> Any:
-        return self._coal.Transform3s(np.array(body[2]), np.array(body[3]))
+        return self._library.Transform3s(np.array(body[2]), np.array(body[3]))
 
     def _places(self, body: tuple[Any, int, Array, Array], poses: Array) -> tuple[Array, Array]:
         _, link, rotation, shift = body
@@ -88,12 +89,3 @@ def _along(capsule: Capsule) -> Array:
     x = np.cross(z, np.eye(3)[int(np.argmin(np.abs(z)))])
     x /= np.linalg.norm(x)
     return np.column_stack([x, np.cross(z, x), z])
-
-
-def _coal() -> Any:
-    for name in ("coal", "pinocchio.hppfcl"):
-        try:
-            return import_module(name)
-        except ImportError:
-            continue
-    raise InputError("the package coal is not installed", remedy="pip install coal (it comes with pin)")

@@ -6,10 +6,13 @@ import warnings
 from collections.abc import Collection
 from pathlib import Path
 
-from robots.collision.boxes import Scene, stated_scene
-from robots.collision.capsules import Capsule, numbered, segment_capsules, stated_capsules
+from robots.collision.base_plane import base_plane
+from robots.collision.boxes import FLOOR, Plane, Scene, stated_scene
+from robots.collision.boxes import floor as floor_at
+from robots.collision.capsules import Capsule, has_extent, numbered, segment_capsules, stated_capsules
 from robots.collision.drawn.links import drawn_links
 from robots.collision.model import SMOOTHING, CollisionModel
+from robots.collision.pairs import always_touching, sampled_poses
 from robots.common.config import read_config
 from robots.common.errors import AssumedValueWarning, InputError
 from robots.description import CollisionDescription, RobotDescription
@@ -26,6 +29,7 @@ def collision_model(
     robot: Robot,
     *,
     scene: Scene | None = None,
+    floor: float | bool = True,
     ignored: Collection[frozenset[int | str]] = (),
     radius_fraction: float = RADIUS_FRACTION,
     smoothing: float = SMOOTHING,
@@ -33,12 +37,14 @@ def collision_model(
 ) -> CollisionModel:
     """Make the collision model of a robot.
 
-    The shapes are those of the robot's YAML; without any, capsules about the collision shapes of its URDF; without
-    those, capsules along the links.
+    The shapes are those of the robot's YAML; without any, capsules about the shapes of its URDF; without those,
+    capsules along the links.
 
     Args:
         robot: the robot.
         scene: obstacles, in addition to those of the robot's file.
+        floor: height of a floor in the base frame [m]. True is that of the robot's file, else the plane that the base
+            is mounted on; False is none. A scene's own floor goes before.
         ignored: pairs that may touch, in addition to those of the file.
         radius_fraction: radius of the links as a share of the reach, where the file states no capsules.
         smoothing: how much too small a smooth clearance may be [m].
@@ -58,27 +64,40 @@ def collision_model(
     if stated is None:
         stated, own_links = stated_collision(robot)
     try:
-        shapes, reason = Scene(), ""
-        touching: tuple[frozenset[int | str], ...] = ()
+        reason, span, bodies = "", None, None
+        drawn_boxes, touching = Scene(), set[frozenset[int | str]]()
+        apart: Collection[frozenset[int]] = ()
         if stated.links and own_links:
             capsules = stated_capsules(stated.links, robot.chain)
         else:
             drawn = drawn_links(robot) if description is None else None
             if drawn is None:
-                capsules = assumed = segment_capsules(robot.chain, radius_fraction)
+                # Links without any extent have no shape to assume: such a robot cannot be checked.
+                capsules = assumed = segment_capsules(robot.chain, radius_fraction) if has_extent(robot.chain) else ()
             else:
-                shapes, touching = Scene(obstacles=drawn.boxes), drawn.ignored
-                assumed = tuple(segment_capsules(robot.chain, radius_fraction)[link] for link in drawn.without)
+                drawn_boxes, span, bodies = Scene(obstacles=drawn.boxes), drawn.span, drawn.bodies
+                touching, apart = {*drawn.ignored, *drawn.joined}, drawn.apart
+                along = segment_capsules(robot.chain, radius_fraction) if drawn.without else ()
+                assumed = tuple(along[link] for link in drawn.without)
                 capsules = numbered([*drawn.capsules, *assumed])
             if assumed:
                 reason = f"radius {1e3 * assumed[0].radius:.0f} mm = {radius_fraction:g} of the reach, "
+        given = any(obstacle.name == FLOOR for obstacle in (scene or Scene()).obstacles)
+        ground = None if given else _floor(robot, stated, floor, span)
+        if ground is not None and floor is True and stated.floor is None:
+            touching |= always_touching(ground, capsules, sampled_poses(robot.chain, robot.limits))
         model = CollisionModel(
             name=robot.name,
             chain=robot.chain,
             limits=robot.limits,
             capsules=capsules,
-            scene=stated_scene(stated) + shapes + (scene or Scene()),
+            scene=Scene(obstacles=() if ground is None else (ground,))
+            + stated_scene(stated)
+            + drawn_boxes
+            + (scene or Scene()),
             ignored=(*(frozenset(pair) for pair in stated.ignore), *touching, *ignored),
+            apart=apart,
+            bodies=bodies,
             smoothing=smoothing,
         )
     except InputError as error:
@@ -87,6 +106,17 @@ def collision_model(
         raise
     _warn(robot, model.capsules, reason)
     return model
+
+
+def _floor(
+    robot: Robot, stated: CollisionDescription, floor: float | bool, span: tuple[float, float] | None
+) -> Plane | None:
+    """The floor that is asked for: one at a height, that of the file or of the base, or none."""
+    if floor is False:
+        return None
+    if floor is not True:
+        return floor_at(float(floor))
+    return base_plane(robot.chain, robot.limits, span) if stated.floor is None else floor_at(stated.floor)
 
 
 def stated_collision(robot: Robot) -> tuple[CollisionDescription, bool]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Collection
 from dataclasses import dataclass, field, fields
 from functools import cached_property
@@ -13,10 +14,11 @@ from numpy.typing import ArrayLike, NDArray
 from robots.batch import BatchFunction, batch_function
 from robots.collision import distance
 from robots.collision.boxes import Box, Obstacle, Plane, Scene
-from robots.collision.capsules import Capsule
+from robots.collision.capsules import Capsule, link_name
 from robots.collision.distance import Contact, Segment
+from robots.collision.drawn.shapes import DrawnBodies
 from robots.collision.kinematics import Frames, symbolic_frames
-from robots.collision.pairs import Pair, choose_pairs, poses_of
+from robots.collision.pairs import Pair, choose_pairs, clearances, poses_of
 from robots.common.errors import InputError
 from robots.geometry.chain import Chain
 from robots.limits import Limits
@@ -38,11 +40,14 @@ class CollisionModel:
         capsules: of the links; link 0 is the base.
         scene: the obstacles.
         ignored: pairs that may touch: of link numbers, or of a link number and an obstacle's name.
+        apart: pairs of link numbers whose drawn shapes were not seen to meet.
+        bodies: the drawn shapes themselves, where a file has them.
         smoothing: how much too small a smooth clearance may be [m]; more of it makes the solver's way smoother.
 
     Attributes:
         pairs: the P pairs to be watched, the links' first.
         excluded: names of the pairs of links that are not, with the reason.
+        by_shape: pairs of link numbers that drawn shapes have to judge, for capsules cannot.
 
     Raises:
         InputError: a capsule on a link that the chain has not, two bodies of one name, a pair to be ignored that does
@@ -55,9 +60,12 @@ class CollisionModel:
     capsules: tuple[Capsule, ...]
     scene: Scene = field(default_factory=Scene)
     ignored: Collection[frozenset[int | str]] = ()
+    apart: Collection[frozenset[int]] = ()
+    bodies: DrawnBodies | None = None
     smoothing: float = SMOOTHING
     pairs: tuple[Pair, ...] = field(init=False)
     excluded: tuple[tuple[str, str], ...] = field(init=False)
+    by_shape: tuple[frozenset[int], ...] = field(init=False)
 
     def __post_init__(self) -> None:
         set_, n = object.__setattr__, self.chain.n
@@ -79,9 +87,26 @@ class CollisionModel:
         thinnest = min((capsule.radius for capsule in self.capsules), default=np.inf)
         if not 0.0 < self.smoothing < thinnest:
             raise InputError(f"a smoothing of {self.smoothing} m", allowed=f"more than 0, less than {thinnest:g} m")
-        pairs, excluded = choose_pairs(self.chain, self.limits, self.capsules, self.obstacles, self.ignored)
+        pairs, excluded = choose_pairs(self.chain, self.limits, self.capsules, self.obstacles, self.ignored, self.apart)
         set_(self, "pairs", pairs)
         set_(self, "excluded", excluded)
+        set_(self, "by_shape", self._by_shape())
+
+    def _by_shape(self) -> tuple[frozenset[int], ...]:
+        """Pairs of links with drawn shapes that not all of their capsules watch, but neighbours that never meet."""
+        drawn = sorted(self.bodies.bodies) if self.bodies is not None else []
+        capsules, own = Counter(capsule.link for capsule in self.capsules), set(map(id, self.capsules))
+        watched = Counter(
+            frozenset((pair.first.link, pair.second.link)) for pair in self.pairs if id(pair.first) in own
+        )
+        pairs = (frozenset((i, j)) for j in drawn for i in drawn if i < j)
+        return tuple(
+            pair
+            for pair in pairs
+            if pair not in self.ignored
+            and watched[pair] < np.prod([capsules[i] for i in pair])
+            and not (pair in self.apart and max(pair) - min(pair) == 1)
+        )
 
     @property
     def obstacles(self) -> tuple[Obstacle, ...]:
@@ -107,9 +132,7 @@ class CollisionModel:
         Returns:
             (N, P) [m].
         """
-        poses = poses_of(self.chain, np.atleast_2d(np.asarray(q, dtype=np.float64)))
-        columns = [pair.clearance(poses) for pair in self.pairs]
-        return np.column_stack(columns) if columns else np.empty((len(poses), 0))
+        return clearances(self.pairs, poses_of(self.chain, np.atleast_2d(np.asarray(q, dtype=np.float64))))
 
     def smooth_clearance(self, q: ArrayLike) -> tuple[Array, Array]:
         """Smooth clearances, at most `smoothing` below the exact ones of free pairs, and their exact gradients.
@@ -169,7 +192,10 @@ class CollisionModel:
         lines += [f"  {obstacle.name}: {type(obstacle).__name__.lower()}" for obstacle in self.obstacles]
         lines += [f"{len(self.pairs)} pairs checked: {', '.join(self.names) or 'none'}"]
         lines += [f"not checked: {name} ({reason})" for name, reason in self.excluded]
-        lines += ["not checked: bodies of one link and of neighbouring links"]
+        if self.by_shape:
+            lines += [f"judged by the drawn shapes at samples: {', '.join(map(body_names, self.by_shape))}"]
+        else:
+            lines += ["not checked: bodies of one link and of neighbouring links"]
         return "\n".join(lines)
 
     def __getstate__(self) -> dict[str, object]:
@@ -178,3 +204,8 @@ class CollisionModel:
 
     def __setstate__(self, state: dict[str, object]) -> None:
         self.__dict__.update(state)
+
+
+def body_names(pair: frozenset[int]) -> str:
+    """Names two bodies, such as "link 2 / link 5"."""
+    return " / ".join(map(link_name, sorted(pair)))

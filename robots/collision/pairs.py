@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -17,6 +17,8 @@ from robots.limits import Limits
 Array = NDArray[np.float64]
 
 POSES = 1000  # of which a pair must leave one free to be worth watching
+NEAR = 0.015  # m; bodies that no pose takes farther apart touch by construction
+COARSE = 0.25  # of these poses; capsules so near in more of them would take too much of the free space
 SEED = 0
 
 
@@ -56,32 +58,56 @@ class Pair:
         Returns:
             (N,) [m].
         """
-        b0, b1 = spine(self.second, poses)
+        return clearances([self], poses)[:, 0]
+
+    def _between(self, place: Callable[[Capsule], tuple[Array, Array]]) -> Array:
+        """The clearance from where the spines' ends are."""
+        b0, b1 = place(self.second)
         if isinstance(self.first, Plane):
             return exact.segment_plane(b0, b1, self.first.normal, self.first.offset) - self.radii
         if isinstance(self.first, Box):
             rotation, centre = self.first.pose[:3, :3], self.first.pose[:3, 3]
             distance = exact.segment_box((b0 - centre) @ rotation, (b1 - centre) @ rotation, self.first.half)
         else:
-            distance = exact.segment_segment(*spine(self.first, poses), b0, b1)
+            distance = exact.segment_segment(*place(self.first), b0, b1)
         return distance - self.radii
+
+
+def clearances(pairs: Sequence[Pair], poses: Array) -> Array:
+    """Exact clearances of pairs, the spine of each capsule placed once.
+
+    Args:
+        pairs: P of them.
+        poses: (N, n + 1, 4, 4) of the base and the links.
+
+    Returns:
+        (N, P) [m].
+    """
+    placed: dict[int, tuple[Array, Array]] = {}
+
+    def place(capsule: Capsule) -> tuple[Array, Array]:
+        if id(capsule) not in placed:
+            placed[id(capsule)] = spine(capsule, poses)
+        return placed[id(capsule)]
+
+    columns = [pair._between(place) for pair in pairs]
+    return np.column_stack(columns) if columns else np.empty((len(poses), 0))
 
 
 def spine(capsule: Capsule, poses: Array) -> tuple[Array, Array]:
     """Places the ends of a capsule's spine in the base frame: (N, 3) each [m], from poses (N, n + 1, 4, 4)."""
-    rotation, origin = poses[:, capsule.link, :3, :3], poses[:, capsule.link, :3, 3]
-    return origin + rotation @ capsule.start, origin + rotation @ capsule.end
+    pose = np.ascontiguousarray(poses[:, capsule.link, :3, :])
+    ends = np.ones((4, 2))
+    ends[:3] = np.column_stack([capsule.start, capsule.end])
+    # One product of large matrices, not N of small ones.
+    placed = (pose.reshape(-1, 4) @ ends).reshape(len(pose), 3, 2)
+    return placed[:, :, 0], placed[:, :, 1]
 
 
 def poses_of(chain: Chain, q: Array) -> Array:
     """Poses (N, n + 1, 4, 4) of the base and all links at q (N, n)."""
     base = np.broadcast_to(np.eye(4), (len(q), 1, 4, 4))
     return np.concatenate([base, chain.transforms(q)], axis=1)
-
-
-def reference_pose(limits: Limits) -> Array:
-    """The pose zero, moved within the limits where it is outside of them (n,) [rad or m]."""
-    return np.clip(np.zeros(limits.n), limits.lower, limits.upper)
 
 
 def random_poses(limits: Limits, count: int, seed: int = SEED) -> Array:
@@ -92,18 +118,47 @@ def random_poses(limits: Limits, count: int, seed: int = SEED) -> Array:
     return np.random.default_rng(seed).uniform(lower, upper, (count, limits.n))
 
 
+def sampled_poses(chain: Chain, limits: Limits) -> Array:
+    """Poses (N, n + 1, 4, 4) of the base and the links, by which pairs that always touch are found."""
+    return poses_of(chain, random_poses(limits, POSES))
+
+
+def distinct_rows(q: Array, bodies: frozenset[int], cell: float) -> NDArray[np.intp]:
+    """Rows of q (N, n) that differ in a joint between two bodies by more than a cell's size [rad or m], in order."""
+    low, high = sorted(bodies)
+    return np.sort(np.unique(np.round(q[:, low:high] / cell), axis=0, return_index=True)[1])
+
+
+def body_clearance(capsules: Sequence[Capsule], bodies: frozenset[int], poses: Array) -> Array:
+    """Smallest clearance between the capsules of two bodies (N,) [m]; infinite where one has none."""
+    low, high = sorted(bodies)
+    pairs = [Pair(first=a, second=b) for a in capsules if a.link == low for b in capsules if b.link == high]
+    return clearances(pairs, poses).min(axis=1, initial=np.inf)
+
+
+def always_touching(obstacle: Obstacle, capsules: Sequence[Capsule], poses: Array) -> set[frozenset[int | str]]:
+    """Links, with the name of an obstacle, that a capsule of theirs touches in every pose."""
+    return {
+        frozenset((capsule.link, obstacle.name))
+        for capsule in capsules
+        if capsule.link and (Pair(first=obstacle, second=capsule).clearance(poses) < NEAR).all()
+    }
+
+
 def choose_pairs(
     chain: Chain,
     limits: Limits,
     capsules: Sequence[Capsule],
     obstacles: Sequence[Obstacle],
     ignored: Collection[frozenset[int | str]] = (),
+    apart: Collection[frozenset[int]] = (),
 ) -> tuple[tuple[Pair, ...], tuple[tuple[str, str], ...]]:
     """Lists the pairs to watch, and why the others are not.
 
-    Left out are capsules of one link and of neighbouring links, and pairs to be ignored. Pairs of links that overlap at
-    pose zero, or in all of many random poses, are left out as well: they touch by construction, as planners assume
-    (MoveIt's default and always colliding pairs). A pair of a link and an obstacle is never left out automatically.
+    Left out are capsules of one link and of neighbouring links, pairs to be ignored, and pairs of links that touch in
+    all of many random poses, by construction, as planners assume (MoveIt's always colliding pairs). Where drawn shapes
+    never meet but their capsules often do, the capsules are too coarse to judge. A pair of a link and an
+    obstacle is never left out automatically.
 
     Args:
         chain: the chain.
@@ -111,6 +166,7 @@ def choose_pairs(
         capsules: of the links.
         obstacles: in the base frame.
         ignored: pairs of link numbers, or of a link number and an obstacle's name.
+        apart: pairs of links whose drawn shapes were not seen to meet.
 
     Returns:
         The pairs, and the name and the reason of each pair of links left out.
@@ -118,18 +174,17 @@ def choose_pairs(
     pairs = [
         Pair(first=first, second=second) for first in capsules for second in capsules if second.link > first.link + 1
     ]
-    q = np.vstack([reference_pose(limits), random_poses(limits, POSES)])
-    poses = poses_of(chain, q)
+    poses = sampled_poses(chain, limits)
     kept: list[Pair] = []
     excluded: list[tuple[str, str]] = []
-    for pair in pairs:
-        meets = pair.clearance(poses) < 0.0
-        if frozenset((pair.first.link, pair.second.link)) in ignored:
+    for pair, share in zip(pairs, (clearances(pairs, poses) < NEAR).mean(axis=0), strict=True):
+        bodies = frozenset((pair.first.link, pair.second.link))
+        if bodies in ignored:
             excluded.append((pair.name, "to be ignored"))
-        elif meets.all():
-            excluded.append((pair.name, "overlap in every pose"))
-        elif meets[0]:
-            excluded.append((pair.name, "overlap at the pose zero"))
+        elif share == 1.0:
+            excluded.append((pair.name, "touch in every pose"))
+        elif bodies in apart and share > COARSE:
+            excluded.append((pair.name, "the drawn shapes do not meet, only the capsules about them"))
         else:
             kept.append(pair)
     for obstacle in obstacles:

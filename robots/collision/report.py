@@ -26,6 +26,8 @@ class CollisionReport:
         certified: whether every pair is proved to keep the margin at all times.
         evaluations: poses looked at.
         disagreement: by how much coal differed at the samples [m]; None if it was not asked.
+        by_shape: names of the pairs of links that drawn shapes judge, at the samples.
+        meetings: those of them whose shapes meet, and when first [s].
     """
 
     names: tuple[str, ...]
@@ -36,11 +38,13 @@ class CollisionReport:
     certified: bool
     evaluations: int
     disagreement: float | None
+    by_shape: tuple[str, ...] = ()
+    meetings: tuple[tuple[str, float], ...] = ()
 
     @property
     def collides(self) -> bool:
-        """Whether a pair was found to fall below the margin."""
-        return bool((self.clearance < self.margin).any())
+        """Whether a pair was found to fall below the margin, or drawn shapes meet."""
+        return bool((self.clearance < self.margin).any() or self.meetings)
 
     @property
     def confirmed(self) -> bool | None:
@@ -54,7 +58,7 @@ class CollisionReport:
 
     def summary(self) -> str:
         """Says in a few lines whether the motion is free, and what comes closest when."""
-        if self.worst is None:
+        if self.worst is None and not self.by_shape:
             return "no pair of bodies to check"
         state = "proved free of collisions at all times" if self.certified else "not proved between samples"
         if self.collides:
@@ -65,6 +69,7 @@ class CollisionReport:
                 f"  {self.names[index]}: {1e3 * self.clearance[index]:.1f} mm at {self.time[index]:.3f} s"
                 f" (proved: {1e3 * self.lower_bound[index]:.1f} mm)"
             )
+        lines += [f"  {name}: their drawn shapes meet at {time:.3f} s" for name, time in self.meetings]
         if self.disagreement is not None:
             lines.append(f"coal differs by {1e6 * self.disagreement:.1f} um at most")
         return "\n".join(lines)

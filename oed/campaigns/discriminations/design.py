@@ -20,7 +20,9 @@ from oed.campaigns.discriminations.discrimination import Discrimination, Discrim
 from oed.campaigns.discriminations.motions import ExperimentBuilder, Run
 from oed.campaigns.discriminations.probabilities import STEP, Discriminator, require_separable
 from oed.campaigns.discriminations.rivals import parse_rivals
+from oed.experiments.checks import velocity_share
 from robots.base_parameters import find_base_parameters
+from robots.collision import Surroundings
 from robots.common.errors import InfeasibleError, InputError, NotIdentifiableError
 from robots.common.progress import SILENT, Progress
 from robots.plants import Sensors
@@ -46,7 +48,9 @@ def discriminate(
     size: float = 0.005,
     friction: str = "polynomial",
     home: ArrayLike | None = None,
-    velocity_fraction: float = 1.0,
+    velocity_fraction: float | None = None,
+    collision: bool = True,
+    surroundings: Surroundings | None = None,
     seed: int = 0,
     progress: Progress = SILENT,
 ) -> Discrimination:
@@ -64,7 +68,9 @@ def discriminate(
         size: of what the effect shows beyond the base model, as a share of the joint's torque RMS in the reference.
         friction: of the base model, ``polynomial`` or ``coulomb-viscous``.
         home: pose (n,) at both ends of all motions; by default `Limits.home`.
-        velocity_fraction: share of the velocity limits to use.
+        velocity_fraction: share of the velocity limits to use; by default see `LimitOptions`.
+        collision: check the motions for collisions; they are not designed to avoid them, and the result says so.
+        surroundings: the floor, and boxes that the arm must not enter.
         seed: of the reference motion.
         progress: receives the progress of each kind.
 
@@ -77,8 +83,7 @@ def discriminate(
     level = _level(noise, robot)
     if not (np.isfinite(size) and 0.0 < size <= 1.0):
         raise InputError(f"found the size {size}", allowed="above 0, up to 1")
-    if not (np.isfinite(velocity_fraction) and 0.0 < velocity_fraction <= 1.0):
-        raise InputError(f"found the velocity fraction {velocity_fraction}", allowed="above 0, up to 1")
+    velocity_fraction = velocity_share(robot, velocity_fraction)
     model = default_model(robot, friction=friction, velocity_scale=SHARP)
     builder = ExperimentBuilder(find_base_parameters(model), home=home, velocity_fraction=velocity_fraction, seed=seed)
     reference = builder.runs()[0]
@@ -139,6 +144,7 @@ def discriminate(
             "velocity_fraction": velocity_fraction,
             "seed": seed,
         },
+        surroundings=(surroundings or Surroundings()) if collision else None,
     )
 
 

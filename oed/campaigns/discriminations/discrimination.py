@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
@@ -14,8 +15,10 @@ from numpy.typing import NDArray
 from estimation.diagnosis.hypothesis_tests.power import resolving_energy
 from oed.campaigns.discriminations.motions import Run
 from oed.experiments.results.design_file import DESIGN, TRAJECTORY
+from oed.experiments.safety_checks.freedom import collision_data, freedom_text
 from oed.experiments.safety_checks.margins import margin_data, missing_limits
 from oed.exports import write_trajectory
+from robots.collision import Surroundings, check_motion
 from robots.common.files import write_atomic
 from robots.common.plain import percent
 from robots.robot import Robot
@@ -90,6 +93,7 @@ class Discrimination:
         noise: standard deviation of the torque noise (n,) [N m or N].
         size: of what the effect shows beyond the base model, as a share of the joint's torque RMS in the reference.
         settings: what makes the same experiment again.
+        surroundings: what the motions are checked against; None where they are not checked for collisions.
     """
 
     robot: Robot
@@ -102,6 +106,19 @@ class Discrimination:
     noise: Array
     size: float
     settings: Mapping[str, Any]
+    surroundings: Surroundings | None = None
+
+    @cached_property
+    def freedom(self) -> dict[str, Any] | None:
+        """Of collisions, as `collision_data` writes it, of the run that comes nearest to one; None: not checked."""
+        if self.surroundings is None:
+            return None
+        bodies = self.surroundings.model(self.robot)
+        motions = {id(run.motion): run.motion for run in self.runs}.values()
+        found = [collision_data(bodies, check_motion(bodies, motion, confirm=False)) for motion in motions]
+        return min(
+            (one for one in found if one), key=lambda one: (not one["meetings"], one["clearance"] or 0.0), default=None
+        )
 
     @property
     def resolves(self) -> float:
@@ -199,6 +216,7 @@ class Discrimination:
             ],
             "alternatives": [judged.to_dict(self.size) for judged in self.ranking],
             "quality": [],
+            "collision": self.freedom,
             "duration": sum(run.motion.duration for run in self.runs),
             "period": self.robot.period,
             "warnings": list(self.warnings),
@@ -215,7 +233,12 @@ class Discrimination:
         written: set[str] = set()
         for file, run in zip(self.files, self.runs, strict=True):
             if file not in written:
-                stated = {"robot": self.robot.name, "experiment": self.kind, "tool": f"robot-oed {VERSION}"}
+                stated = {
+                    "robot": self.robot.name,
+                    "experiment": self.kind,
+                    "collisions": freedom_text(self.freedom),
+                    "tool": f"robot-oed {VERSION}",
+                }
                 write_trajectory(target / file, run.motion, stated, kinds=self.robot.chain.kinds, force=True)
                 written.add(file)
         write_atomic(target / DESIGN, json.dumps(self.to_dict(), indent=2, allow_nan=False) + "\n")
@@ -235,5 +258,6 @@ class Discrimination:
         for file, run in zip(self.files, self.runs, strict=True):
             load = f", payload {run.payload:.3g} kg" if run.payload else ""
             tilt = ", base tilted by 15 degrees" if run.gravity is not None else ""
-            lines.append(f"  play {file}: {run.motion.duration:.1f} s{load}{tilt}")
+            lines.append(f"  {file}: {run.motion.duration:.1f} s{load}{tilt}")
+        lines.append(f"  {freedom_text(self.freedom)}")
         return "\n".join([*lines, *(f"note: {text}" for text in self.warnings)])

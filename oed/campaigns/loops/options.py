@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, field
 from typing import Any
 
+from robots.collision import CollisionModel, Surroundings
 from robots.common.errors import InputError
+from robots.robot import Robot
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -17,9 +19,10 @@ class LoopOptions:
         least_probability: a proposed experiment that separates the causes with a lower probability is not made.
         longest: repetitions beyond this time of an experiment, rests included, are left to the next one [s].
         friction: of the base model: ``auto``, ``polynomial`` or ``coulomb-viscous``.
-        velocity_fraction: of the velocity limits that may be used.
+        velocity_fraction: share of the velocity limits to use; by default see `LimitOptions`.
         effort: of the design's search.
         collision: whether the design avoids collisions, and motions are checked for them.
+        surroundings: the floor, and boxes that the arm must not enter.
         seed: of everything random.
     """
 
@@ -27,9 +30,10 @@ class LoopOptions:
     least_probability: float = 0.5
     longest: float = 600.0
     friction: str = "auto"
-    velocity_fraction: float = 1.0
+    velocity_fraction: float | None = None
     effort: str = "standard"
     collision: bool = True
+    surroundings: Surroundings = field(default_factory=Surroundings)
     seed: int = 0
 
     def __post_init__(self) -> None:
@@ -44,12 +48,22 @@ class LoopOptions:
             raise InputError(f"a least probability of {self.least_probability}", allowed="0 to 1")
         if not self.longest > 0.0:
             raise InputError(f"experiments of at most {self.longest} s", allowed="above 0")
-        if not 0.0 < self.velocity_fraction <= 1.0:
+        if self.velocity_fraction is not None and not 0.0 < self.velocity_fraction <= 1.0:
             raise InputError(f"a velocity fraction of {self.velocity_fraction}", allowed="above 0, up to 1")
+
+    def bodies(self, robot: Robot) -> CollisionModel | None:
+        """Makes the bodies and obstacles that have to stay apart; None where nothing has to.
+
+        Args:
+            robot: the robot.
+        """
+        bodies = self.surroundings.model(robot) if self.collision else None
+        return bodies if bodies is not None and bodies.pairs else None
 
     def settings(self) -> dict[str, Any]:
         """Writes what must stay the same when the loop goes on as plain data."""
-        data = asdict(self)
+        data = asdict(self) | self.surroundings.settings()
+        del data["surroundings"]
         # The budget may be raised later.
         del data["experiments"], data["least_probability"], data["longest"]
         return data

@@ -13,7 +13,7 @@ from estimation.diagnosis.experiment_plans.experiment_motions import MAKERS, Sta
 from estimation.diagnosis.experiment_plans.next_experiment import NextExperiment
 from oed.campaigns.discriminations.motions import ExperimentBuilder
 from robots.base_parameters import find_base_parameters
-from robots.collision import check_motion, collision_model
+from robots.collision import CollisionModel, check_motion
 from robots.common.errors import InfeasibleError
 from robots.regressor import default_model
 from robots.robot import Robot
@@ -67,7 +67,7 @@ def plan_experiment(
     least_probability: float = 0.5,
     longest: float = np.inf,
     velocity_fraction: float = 1.0,
-    collision: bool = True,
+    bodies: CollisionModel | None = None,
     seed: int = 0,
 ) -> PlannedExperiment | str:
     """Makes the proposed experiment playable, or the best other kind that needs no change by hand.
@@ -80,7 +80,7 @@ def plan_experiment(
         least_probability: of an experiment that is made.
         longest: repetitions beyond this time are left out [s].
         velocity_fraction: of the velocity limits that may be used.
-        collision: whether motions are checked for collisions.
+        bodies: what has to stay apart in all motions; by default they are not checked for collisions.
         seed: of a random reference motion.
 
     Returns:
@@ -108,8 +108,8 @@ def plan_experiment(
             continue
         try:
             runs = tuple(_playable(stage, kind, builder, played) for stage in within(stages, longest))
-            if collision:
-                _require_free(robot, runs)
+            if bodies is not None:
+                _require_free(bodies, runs)
         except InfeasibleError as error:
             reasons.append(f"{kind.replace('_', ' ')}: {error}")
             continue
@@ -188,12 +188,9 @@ def repeats(logged: Motion, played: Motion) -> bool:
     return bool((away <= np.maximum(ALIKE * np.ptp(played.q, axis=0), BEGINS)).all())
 
 
-def _require_free(robot: Robot, runs: Sequence[PlannedRun]) -> None:
+def _require_free(bodies: CollisionModel, runs: Sequence[PlannedRun]) -> None:
     """Raises InfeasibleError where a motion is not proved free of collisions."""
-    model = collision_model(robot)
-    if not model.pairs:
-        return
     for motion in {id(run.motion): run.motion for run in runs}.values():
-        report = check_motion(model, motion, confirm=False)
+        report = check_motion(bodies, motion, confirm=False)
         if not report.certified:
             raise InfeasibleError(f"its motion may collide ({report.summary()})")

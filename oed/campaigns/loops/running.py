@@ -26,8 +26,8 @@ from oed.campaigns.runs.state import run_lock
 from oed.controllers import Endpoint, StreamOptions
 from oed.experiments import LimitOptions, SearchOptions
 from oed.experiments import design as design_experiment
+from oed.experiments.checks import velocity_share
 from oed.exports import read_trajectory, write_trajectory
-from robots.collision import collision_model
 from robots.common.errors import InputError, OedError
 from robots.common.files import ResultFolder
 from robots.common.plain import several
@@ -139,7 +139,7 @@ class _Loop:
             endpoint=self.endpoint,
             options=self.stream_options,
             folder=self.folder,
-            collision=self.options.collision,
+            bodies=self.options.bodies(self.robot),
             needs_torque=True,
         )
         while not state.ended:
@@ -164,11 +164,12 @@ class _Loop:
 
     def _design(self, given: str | PathLike[str] | None, workers: int | None, executor: Executor | None) -> None:
         """Makes the first experiment: an excitation, or what a design's folder holds."""
-        bodies = collision_model(self.robot) if self.options.collision else None
         made = given or design_experiment(
             self.robot,
             limits=LimitOptions(
-                velocity_fraction=self.options.velocity_fraction, collision=bodies is not None and bool(bodies.pairs)
+                velocity_fraction=self.options.velocity_fraction,
+                collision=self.options.collision,
+                surroundings=self.options.surroundings,
             ),
             search=SearchOptions(
                 effort=self.options.effort, seed=self.options.seed, workers=workers, executor=executor
@@ -285,8 +286,8 @@ class _Loop:
                 self._motions(),
                 least_probability=options.least_probability,
                 longest=options.longest,
-                velocity_fraction=options.velocity_fraction,
-                collision=options.collision,
+                velocity_fraction=velocity_share(self.robot, options.velocity_fraction),
+                bodies=options.bodies(self.robot),
                 seed=options.seed,
             )
             if isinstance(planned, PlannedExperiment):

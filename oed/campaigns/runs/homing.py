@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from oed.campaigns.clearances import CollisionFreeRanges
 from oed.retiming import plan_move
 from oed.trajectories import PiecewisePolynomial
-from robots.collision import check_motion, collision_model
+from robots.collision import CollisionModel, check_motion
 from robots.common.errors import InfeasibleError
 from robots.limits import Limits
 from robots.robot import Robot
@@ -22,14 +22,14 @@ SLOW = 0.2
 """Share of the velocity limits: a person may stand near a robot that was stopped."""
 
 
-def move_home(robot: Robot, pose: Array, home: Array, *, collision: bool = True) -> Motion | None:
+def move_home(robot: Robot, pose: Array, home: Array, bodies: CollisionModel | None) -> Motion | None:
     """Plans a slow move home on a way that is proved free of collisions.
 
     Args:
         robot: the robot.
         pose: where it stands (n,) [rad or m].
         home: where it has to go (n,).
-        collision: whether the way is checked against the robot's own bodies and its stated surroundings.
+        bodies: what has to stay apart on the way; None for a way that is not checked.
 
     Returns:
         The motion at the controller's period; None where the robot stands at home.
@@ -38,12 +38,11 @@ def move_home(robot: Robot, pose: Array, home: Array, *, collision: bool = True)
         InfeasibleError: no way is proved free, or the robot stands outside its position limits.
     """
     limits = robot.limits.scaled(velocity=SLOW, acceleration=SLOW**2, jerk=SLOW**3)
-    model = collision_model(robot) if collision else None
-    if model is None or not model.pairs:
+    if bodies is None or not bodies.pairs:
         return _along((pose, home), limits, robot.period)
-    for way in CollisionFreeRanges(model, home).ways(pose, home):
+    for way in CollisionFreeRanges(bodies, home).ways(pose, home):
         motion = _along(way, limits, robot.period)
-        if motion is None or check_motion(model, motion, confirm=False).certified:
+        if motion is None or check_motion(bodies, motion, confirm=False).certified:
             return motion
     raise InfeasibleError(
         "no way from where the robot stands to the home pose is proved free of collisions",

@@ -15,6 +15,7 @@ from oed.campaigns.runs.homing import move_home
 from oed.controllers import Endpoint, StreamOptions, StreamResult, stream
 from oed.controllers.recording.clock import ClockAnchor
 from oed.controllers.recording.pose import read_pose
+from robots.collision import CollisionModel
 from robots.common.progress import SILENT, Progress
 from robots.robot import Robot
 from robots.signals import Motion
@@ -34,7 +35,7 @@ class Player:
         endpoint: the controller.
         options: of the streams.
         folder: recordings go to its folder ``interrupted`` until they are complete.
-        collision: whether a move home is checked for collisions.
+        bodies: what has to stay apart on a move home; None for a move that is not checked.
         needs_torque: whether a controller without torque in its feedback is refused.
     """
 
@@ -43,7 +44,7 @@ class Player:
     endpoint: Endpoint
     options: StreamOptions
     folder: Path
-    collision: bool = True
+    bodies: CollisionModel | None = None
     needs_torque: bool = False
 
     def play(
@@ -106,7 +107,7 @@ class Player:
         pose = read_pose(self.robot, self.endpoint, self.options.patience)
         if np.abs(pose - self.home).max() <= self.options.start_tolerance:
             return
-        motion = move_home(self.robot, pose, self.home, collision=self.collision)
+        motion = move_home(self.robot, pose, self.home, self.bodies)
         if motion is not None:
             self.play(motion, name, {"stage": "home"}, anchor=anchor, progress=progress)
 

@@ -102,7 +102,7 @@ class _Run:
             endpoint=endpoint,
             options=options,
             folder=folder,
-            collision=collision,
+            bodies=campaign.surroundings.model(campaign.robot) if collision else None,
         )
         self.played = [slot for slot in campaign.slots if slot.stage is not None]
         self.width = max(3, len(str(len(self.played))))

@@ -31,10 +31,14 @@ from oed.cli.links import (
 )
 from oed.cli.options import (
     ClusterOption,
+    CollisionOption,
+    FloorOption,
     ForceOption,
     JointsOption,
     JsonOption,
+    KeepOutOption,
     LockOption,
+    NoFloorOption,
     OutOption,
     PngOption,
     QuietOption,
@@ -43,7 +47,6 @@ from oed.cli.options import (
     TipOption,
     TorqueMarginOption,
     UnlimitedOption,
-    VelocityFractionOption,
     WorkersOption,
     executor_from,
     robot_from,
@@ -80,9 +83,14 @@ def campaign(
             show_default=False,
         ),
     ] = None,
-    velocity_fraction: VelocityFractionOption = 1.0,
+    velocity_fraction: Annotated[
+        float, typer.Option("--velocity-fraction", help="Fraction of the velocity limits to use.")
+    ] = 1.0,
     torque_margin: TorqueMarginOption = 0.1,
-    collision: Annotated[bool, typer.Option(help="Avoid self-collisions and the obstacles in the robot file.")] = True,
+    collision: CollisionOption = True,
+    floor: FloorOption = None,
+    no_floor: NoFloorOption = False,
+    keep_out: KeepOutOption = None,
     ambient: Annotated[float, typer.Option(help="Ambient temperature [degC].")] = 20.0,
     cold_friction: Annotated[
         float,
@@ -136,6 +144,7 @@ def campaign(
     with console.working() as progress:
         from oed.campaigns import Campaign, Programme
         from oed.campaigns import campaign as plan
+        from oed.cli.spaces import surroundings_from
         from oed.reports import save_campaign_report
         from robots.common.errors import InputError
         from robots.common.files import ResultFolder
@@ -151,6 +160,7 @@ def campaign(
             cooling=cooling,
             power_on=power_on,
         )
+        around = surroundings_from(floor, no_floor, keep_out)
         described = robot_from(robot, tip, joints, lock, unlimited=unlimited)
         place = None
         if run is not None:
@@ -175,6 +185,7 @@ def campaign(
                     "torque_margin": torque_margin,
                     "velocity_fraction": velocity_fraction,
                     "collision": collision,
+                    **around.settings(),
                     "seed": seed,
                     "design": None if design is None else os.path.abspath(design),
                 },
@@ -189,6 +200,7 @@ def campaign(
                     velocity_fraction=velocity_fraction,
                     torque_margin=torque_margin,
                     collision=collision,
+                    surroundings=around,
                     ambient=ambient,
                     cold_friction=cold_friction,
                     seed=seed,

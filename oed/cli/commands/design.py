@@ -15,12 +15,15 @@ from oed.cli.options import (
     ClusterOption,
     CollisionOption,
     FamilyOption,
+    FloorOption,
     ForceOption,
     FrictionOption,
     HarmonicsOption,
     JointsOption,
     JsonOption,
+    KeepOutOption,
     LockOption,
+    NoFloorOption,
     OutOption,
     PngOption,
     QuietOption,
@@ -65,14 +68,17 @@ def design(
     home: Annotated[
         str | None, typer.Option(help="Pose at start and end [rad or m], comma-separated.", show_default=False)
     ] = None,
-    velocity_fraction: VelocityFractionOption = 1.0,
+    velocity_fraction: VelocityFractionOption = None,
     torque: Annotated[
         bool, typer.Option(help="Respect the torque limits, computed with the robot's nominal dynamics.")
     ] = True,
     torque_margin: TorqueMarginOption = 0.1,
     payload: CarriedOption = None,
-    collision: CollisionOption = False,
-    clearance: Annotated[float, typer.Option(help="Minimum clearance for --collision [m].")] = 0.01,
+    collision: CollisionOption = True,
+    clearance: Annotated[float, typer.Option(help="Minimum clearance of bodies and obstacles [m].")] = 0.01,
+    floor: FloorOption = None,
+    no_floor: NoFloorOption = False,
+    keep_out: KeepOutOption = None,
     tool_box: Annotated[
         str | None,
         typer.Option(
@@ -159,6 +165,8 @@ def design(
     """
     console = Console(json=json, quiet=quiet, introduces=True)
     with console.working() as progress:
+        from oed.cli.spaces import spaces_from, surroundings_from
+
         if discriminate is not None:
             from oed.cli.discriminating import design_discriminating, refuse_others
 
@@ -170,6 +178,8 @@ def design(
                 friction=friction,
                 home=numbers("--home", home),
                 velocity_fraction=velocity_fraction,
+                collision=collision,
+                surroundings=surroundings_from(floor, no_floor, keep_out),
                 seed=seed,
                 out=out,
                 png=png,
@@ -180,7 +190,6 @@ def design(
             return
         from estimation.payloads.body import read_body
         from oed.cli.priors import prior_from
-        from oed.cli.spaces import spaces_from
         from oed.experiments import LimitOptions, ModelOptions, SearchOptions, TrajectoryOptions, WeightOptions
         from oed.experiments import design as run
         from oed.exports import read_trajectory
@@ -217,6 +226,7 @@ def design(
                     torque_margin=torque_margin,
                     collision=collision,
                     clearance=clearance,
+                    surroundings=surroundings_from(floor, no_floor, keep_out),
                     space=spaces_from(tool_box, singularity),
                     effects=effects,
                     payload=None if payload is None else read_body(payload).parameters,

@@ -86,6 +86,7 @@ def export(
             write_trajectory,
         )
         from oed.exports.forms.sampling import at_period
+        from oed.exports.trajectory_checks import UNKNOWN_COLLISIONS
         from robots.common.errors import AssumedValueWarning, InputError
 
         if to not in FORMS:
@@ -95,6 +96,9 @@ def export(
         suffix = ".csv" if to == "csv" else CONTROLLER_FORMS[to].suffixes[0]
         target = out or trajectory.with_name(f"{trajectory.stem}-{to}{suffix}")
         motion, metadata = read_trajectory(trajectory)
+        collisions = str(metadata.get("collisions") or UNKNOWN_COLLISIONS)
+        if not collisions.startswith("No "):
+            warnings.warn(f"{trajectory}: {collisions} Do not play it.", AssumedValueWarning, stacklevel=1)
         # Only the trajectory file itself can be written without knowing whose joints move.
         unknown = to == "csv" and not robot and not metadata.get("robot")
         described = None if unknown else robot_of_file(robot, metadata, trajectory, tip, joints, lock)
@@ -145,6 +149,7 @@ def export(
         "samples": len(motion) if has_samples else None,
         "joints": motion.n,
         "period": motion.period if has_samples else None,
+        "collisions": collisions,
     }
     content = f"{len(motion)} samples" if has_samples else "limits of velocity, acceleration and jerk"
     console.result(f"{content} of {motion.n} joints written to {target}", data)

@@ -28,11 +28,15 @@ from oed.cli.links import (
 )
 from oed.cli.options import (
     ClusterOption,
+    CollisionOption,
     FittedFrictionOption,
+    FloorOption,
     ForceOption,
     JointsOption,
     JsonOption,
+    KeepOutOption,
     LockOption,
+    NoFloorOption,
     OutOption,
     PngOption,
     QuietOption,
@@ -75,8 +79,11 @@ def loop(
         "standard"
     ),
     friction: FittedFrictionOption = "auto",
-    velocity_fraction: VelocityFractionOption = 1.0,
-    collision: Annotated[bool, typer.Option(help="Avoid self-collisions and the obstacles in the robot file.")] = True,
+    velocity_fraction: VelocityFractionOption = None,
+    collision: CollisionOption = True,
+    floor: FloorOption = None,
+    no_floor: NoFloorOption = False,
+    keep_out: KeepOutOption = None,
     seed: SeedOption = 0,
     workers: WorkersOption = None,
     cluster: ClusterOption = None,
@@ -112,6 +119,7 @@ def loop(
     console = Console(json=json, quiet=quiet)
     with console.working() as progress:
         from oed.campaigns.loops import LoopOptions, run_loop
+        from oed.cli.spaces import surroundings_from
         from oed.controllers import StreamOptions
         from oed.controllers.interrupts import terminate_as_interrupt
         from oed.reports import save_diagnosis_report, save_loop_report
@@ -134,6 +142,7 @@ def loop(
                         velocity_fraction=velocity_fraction,
                         effort=effort,
                         collision=collision,
+                        surroundings=surroundings_from(floor, no_floor, keep_out),
                         seed=seed,
                     ),
                     stream_options=StreamOptions(

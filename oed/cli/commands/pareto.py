@@ -13,10 +13,13 @@ from oed.cli.options import (
     ClusterOption,
     CollisionOption,
     FamilyOption,
+    FloorOption,
     ForceOption,
     FrictionOption,
     HarmonicsOption,
     JsonOption,
+    KeepOutOption,
+    NoFloorOption,
     OutOption,
     PngOption,
     QuietOption,
@@ -37,7 +40,10 @@ def pareto(
     family: FamilyOption = "fourier",
     harmonics: HarmonicsOption = 5,
     base_frequency: BaseFrequencyOption = 0.1,
-    collision: CollisionOption = False,
+    collision: CollisionOption = True,
+    floor: FloorOption = None,
+    no_floor: NoFloorOption = False,
+    keep_out: KeepOutOption = None,
     scaling: Annotated[
         str, typer.Option(help="Column scaling of the regressor in the criteria: none, nominal or unit.")
     ] = "none",
@@ -58,6 +64,7 @@ def pareto(
     """
     console = Console(json=json, quiet=quiet)
     with console.working() as progress:
+        from oed.cli.spaces import surroundings_from
         from oed.experiments import LimitOptions, ModelOptions, SearchOptions, TrajectoryOptions, WeightOptions
         from oed.experiments import pareto as run
         from oed.reports import save_pareto_report
@@ -76,7 +83,7 @@ def pareto(
                 trajectory=TrajectoryOptions(
                     family=choose_family(family, harmonics=harmonics, base_frequency=base_frequency)
                 ),
-                limits=LimitOptions(collision=collision),
+                limits=LimitOptions(collision=collision, surroundings=surroundings_from(floor, no_floor, keep_out)),
                 weights=WeightOptions(scaling=scaling),
                 search=SearchOptions(effort=effort, seed=seed, workers=workers, executor=executor),
                 progress=progress,

@@ -10,9 +10,13 @@ import typer
 from oed.cli.console import Console
 from oed.cli.options import (
     ROBOT,
+    CollisionOption,
+    FloorOption,
     ForceOption,
     FrictionOption,
     JsonOption,
+    KeepOutOption,
+    NoFloorOption,
     OutOption,
     PngOption,
     QuietOption,
@@ -48,6 +52,10 @@ def retime(
     tolerance: Annotated[
         float, typer.Option(help="Largest allowed deviation of ruckig's straight lines from the path [rad].")
     ] = 0.01,
+    collision: CollisionOption = True,
+    floor: FloorOption = None,
+    no_floor: NoFloorOption = False,
+    keep_out: KeepOutOption = None,
     out: OutOption = Path("retimed"),
     png: PngOption = False,
     force: ForceOption = False,
@@ -60,6 +68,7 @@ def retime(
     """
     console = Console(json=json, quiet=quiet)
     with console.working() as progress:
+        from oed.cli.spaces import surroundings_from
         from oed.experiments import retime as run
         from oed.experiments.retiming import move_with_stops
         from oed.exports import read_trajectory, read_waypoints
@@ -86,6 +95,8 @@ def retime(
                 criterion=criterion,
                 friction=friction,
                 tolerance=tolerance,
+                collision=collision,
+                surroundings=surroundings_from(floor, no_floor, keep_out),
             )
             result.save(folder.path("trajectory.csv").parent)
             save_retime_report(result, motion, folder, png=png)

@@ -16,6 +16,7 @@ from oed.experiments.quality import Quality
 from oed.experiments.results.design_file import DESIGN, TRAJECTORY, read_design
 from oed.experiments.results.outcome import Outcome
 from oed.experiments.results.views import motion_frame, plot_velocities
+from oed.experiments.safety_checks.freedom import freedom_text, is_free
 from oed.experiments.safety_checks.margins import assumed_values, margin_data, measured_margins
 from oed.experiments.safety_checks.spatial_check import SpatialMargin
 from oed.experiments.searches.search import INTERRUPTED
@@ -53,8 +54,7 @@ class Design:
         home: pose (n,) at both ends.
         home_moved: whether that is the nearest pose that keeps the limits in space, for the usual one does not.
         space: the closest approach to each further limit in space.
-        freedom: of collisions: the smallest clearance [m], between what, when, and whether it is proved for all times;
-            None where it was not asked for.
+        freedom: of collisions, as `collision_data` writes it; None where they were not checked.
         strokes_left_out: joints without a stroke, for on it the arm would collide or break another limit in space.
     """
 
@@ -107,7 +107,7 @@ class Design:
     @property
     def success(self) -> bool:
         """Whether all limits hold and all parameters are excited."""
-        free = self.freedom is None or bool(self.freedom["certified"])
+        free = self.freedom is None or is_free(self.freedom)
         free = free and not any(margin.violated for margin in self.space)
         return free and not self.violated and self.optimised.to_dict()["cond_Y"] is not None
 
@@ -158,12 +158,11 @@ class Design:
                 f"  tightest limit: {tightest.quantity} of joint {tightest.joint}, "
                 f"{100 * tightest.slack_fraction:.2f} % left at {tightest.time:.3f} s"
             )
+        share = self.settings.get("velocity_fraction", 1.0)
+        if share < 1.0:
+            lines.append(f"  speed: at most {100 * share:g} % of the velocity limits; --velocity-fraction 1 uses all")
         lines += self._effect_lines()
-        if self.freedom is not None:
-            lines.append(
-                f"  closest bodies: {self.freedom['pair']}, {1e3 * self.freedom['clearance']:.0f} mm at "
-                f"{self.freedom['time']:.2f} s, {'proved' if self.freedom['certified'] else 'NOT proved'} at all times"
-            )
+        lines.append(f"  {freedom_text(self.freedom)}")
         for near in self.space:
             unit = f" {near.unit}" if near.unit else ""
             lines.append(f"  {near.limit}: {near.value:.4g}{unit} left at {near.time:.2f} s")
@@ -286,5 +285,6 @@ class Design:
             "robot": self.robot.origin or self.robot.name,
             "period": self.robot.period,
             "criterion": self.criterion.name,
+            "collisions": freedom_text(self.freedom),
             "tool": f"robot-oed {VERSION}",
         }

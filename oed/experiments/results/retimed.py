@@ -15,6 +15,7 @@ from oed.criteria import CRITERIA
 from oed.experiments.quality import Quality, design_model
 from oed.experiments.results.design_file import DESIGN, TRAJECTORY
 from oed.experiments.results.views import motion_frame, plot_velocities
+from oed.experiments.safety_checks.freedom import collides, freedom_text
 from oed.experiments.safety_checks.margins import assumed_values, margin_data, margin_from, measured_margins
 from oed.exports import read_trajectory, write_trajectory
 from oed.retiming import Retimed
@@ -72,6 +73,7 @@ class RetimedExperiment:
         torque_after: of the new one.
         margins: of the new motion to each limit.
         settings: of the model.
+        freedom: of collisions, as `collision_data` writes it; None where they were not checked.
     """
 
     robot: Robot
@@ -84,6 +86,7 @@ class RetimedExperiment:
     torque_after: TorqueUse | None
     margins: tuple[Margin, ...]
     settings: Mapping[str, Any]
+    freedom: Mapping[str, Any] | None = None
 
     @property
     def motion(self) -> Motion:
@@ -92,8 +95,8 @@ class RetimedExperiment:
 
     @property
     def success(self) -> bool:
-        """Whether all limits hold."""
-        return not any(margin.violated for margin in self.margins)
+        """Whether all limits hold, and no collision was found."""
+        return not any(margin.violated for margin in self.margins) and not collides(self.freedom)
 
     def summary(self) -> str:
         """Compares the experiment before and after retiming."""
@@ -104,6 +107,7 @@ class RetimedExperiment:
             for name in ("peak", "rms"):
                 values = (_list(getattr(use, name)) for use in (self.torque_before, self.torque_after))
                 lines.append("  {} torque per joint: {} before, {} after".format(name.replace("rms", "RMS"), *values))
+        lines.append(f"  {freedom_text(self.freedom)}")
         for margin in self.margins:
             if margin.violated:
                 lines.append(
@@ -161,6 +165,7 @@ class RetimedExperiment:
                 "torque_after": None if self.torque_after is None else self.torque_after.to_dict(),
             },
             "settings": dict(self.settings),
+            "collision": None if self.freedom is None else dict(self.freedom),
             "segments": [{"kind": "move", "start": 0.0, "end": self.motion.duration, "joint": None}],
             "duration": self.motion.duration,
             "period": self.robot.period,
@@ -180,6 +185,7 @@ class RetimedExperiment:
         metadata = {
             "robot": self.robot.origin or self.robot.name,
             "period": self.robot.period,
+            "collisions": freedom_text(self.freedom),
             "tool": f"robot-oed {VERSION}",
         }
         write_trajectory(Path(folder) / TRAJECTORY, self.motion, metadata, kinds=self.robot.chain.kinds, force=force)
@@ -232,6 +238,7 @@ class RetimedExperiment:
                 torque_after=TorqueUse.from_dict(retiming["torque_after"]),
                 margins=tuple(margin_from(margin) for margin in data["smallest_margins"]),
                 settings=data["settings"],
+                freedom=data["collision"],
             )
         except (OSError, UnicodeDecodeError, json.JSONDecodeError, KeyError, TypeError, ValueError) as error:
             raise InputError(

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from oed.constraints import PointwiseLimit, StateLimits, TorqueLimit, TorqueRms
-from oed.constraints.feasibility import check_feasible, nearest_feasible
+from oed.constraints.feasibility import check_feasible, roomy_pose
 from oed.constraints.geometric import CollisionLimit, GeometricLimits
 from oed.experiments.assembly import assemble
 from oed.experiments.options import LimitOptions
@@ -16,7 +16,7 @@ from oed.experiments.safety_checks.spatial_check import SpatialCheck
 from oed.trajectories import Sequence as Experiment
 from oed.trajectories import Trajectory
 from robots.base_parameters import BaseParameters
-from robots.collision import CollisionModel, CollisionReport, check_motion, collision_model
+from robots.collision import CollisionModel, CollisionReport, check_motion
 from robots.common.errors import InfeasibleError
 from robots.limits import Limits
 from robots.robot import Robot
@@ -26,8 +26,6 @@ Array = NDArray[np.float64]
 
 # Shares of the limits of speed and its derivatives that strokes and moves try in turn to keep the torque limits.
 SLOWER = (1.0, 0.85, 0.7, 0.5, 0.35, 0.2)
-# From each bound in space [m], of a home pose that had to be moved.
-HOME_ROOM = 0.008
 # Fraction of an RMS limit that the optimised part may use; the moves to and from it need the rest.
 MOVES = 0.98
 
@@ -45,6 +43,7 @@ class Safety:
         motion: further limits of position, velocity and acceleration; None where there are none.
         home: pose (n,) at both ends.
         moved: whether that is not the pose that was asked for, because it breaks a limit in space.
+        movable: whether another home pose may be used.
     """
 
     home: Array
@@ -55,6 +54,7 @@ class Safety:
     check: SpatialCheck | None = None
     motion: StateLimits | None = None
     moved: bool = False
+    movable: bool = False
 
     @property
     def pointwise(self) -> tuple[PointwiseLimit, ...]:
@@ -75,18 +75,31 @@ class Safety:
 
     def assembled(
         self, excitation: Trajectory, kind: str, limits: Limits, period: float, strokes: bool
-    ) -> tuple[Experiment, CollisionReport | None, tuple[int, ...]]:
+    ) -> tuple[Experiment, CollisionReport | None, tuple[int, ...], Safety]:
         """Assembles an experiment that keeps these limits.
 
         Strokes and moves become slower until they keep the limits of torque and motion; strokes on which the arm would
-        collide or break another limit in space are left out.
+        collide or break another limit in space are left out. Where the way from home to the optimised part is blocked,
+        and home may move, the experiment begins and ends where that part does.
 
         Returns:
-            The experiment, the proof of its clearance, and the joints whose stroke was left out.
+            The experiment, the proof of its clearance, the joints whose stroke was left out, and these limits with the
+            home pose that was taken.
 
         Raises:
             InfeasibleError: moves that pass a limit of torque or motion however slow, or collide.
         """
+        try:
+            return (*self._assembled(excitation, kind, limits, period, strokes), self)
+        except InfeasibleError:
+            if not self.movable:
+                raise
+        here = replace(self, home=excitation.sample(np.zeros(1)).q[0], moved=True)
+        return (*here._assembled(excitation, kind, limits, period, strokes), here)
+
+    def _assembled(
+        self, excitation: Trajectory, kind: str, limits: Limits, period: float, strokes: bool
+    ) -> tuple[Experiment, CollisionReport | None, tuple[int, ...]]:
         joints = tuple(range(1, limits.n + 1)) if strokes else ()
         left_out: tuple[int, ...] = ()
         for factor in SLOWER:
@@ -97,8 +110,8 @@ class Safety:
                 motion = sequence.motion()
                 report = self.report(motion)
                 wrong = self._broken(motion, report)
-                if wrong is None:
-                    break
+                if wrong is None or _segment_at(sequence, wrong[0])["kind"] == kind:
+                    break  # Another stroke or move does not help the optimised part: the report says what it does.
                 left_out += (_culprit(sequence, *wrong),)
             if self._strong_enough(motion):
                 return sequence, report, left_out
@@ -115,6 +128,9 @@ class Safety:
     def _broken(self, motion: Motion, report: CollisionReport | None) -> tuple[float, str] | None:
         """The time and the kind of the largest workspace violation; None without any."""
         if report is not None and report.collides:
+            if report.meetings:
+                pair, time = report.meetings[0]
+                return time, f"collides: {pair}, by their drawn shapes"
             worst = report.worst
             assert worst is not None
             depth = -1e3 * report.clearance[worst]
@@ -122,21 +138,14 @@ class Safety:
         return None if self.check is None else self.check.broken(motion)
 
 
-def collision_data(report: CollisionReport) -> dict[str, object]:
-    """Writes what comes closest when, and whether that is proved, as plain data."""
-    worst = report.worst
-    return {
-        "clearance": float(report.clearance[worst]) if worst is not None else None,
-        "pair": report.names[worst] if worst is not None else None,
-        "time": float(report.time[worst]) if worst is not None else None,
-        "certified": report.certified,
-    }
+def _segment_at(sequence: Experiment, time: float) -> dict[str, object]:
+    return next(s for s in sequence.table() if time <= float(s["end"]) + 1e-9)  # type: ignore[arg-type]
 
 
 def _culprit(sequence: Experiment, time: float, what: str) -> int:
     """The joint whose stroke, or the move before or after it, causes the violation."""
     table = sequence.table()
-    here = next(i for i, s in enumerate(table) if time <= float(s["end"]) + 1e-9)  # type: ignore[arg-type]
+    here = table.index(_segment_at(sequence, time))
     for neighbour in (here, here + 1, here - 1):
         if 0 <= neighbour < len(table) and table[neighbour]["kind"] == "sinusoid":
             return int(table[neighbour]["joint"])  # type: ignore[call-overload]
@@ -160,8 +169,8 @@ def choose_safety(robot: Robot, base: BaseParameters, home: Array, limits: Limit
         InfeasibleError: a home pose that cannot be held, is in collision or breaks another limit; a tool box that the
             robot cannot enter.
     """
-    model = collision_model(robot) if limits.collision else None
-    bodies = () if model is None else (CollisionLimit(model=model, margin=limits.clearance),)
+    model = limits.collision_model(robot)
+    bodies = () if model is None or not model.pairs else (CollisionLimit(model=model, margin=limits.clearance),)
     space = tuple(limits.space)
     spatial, moved = None, False
     if bodies or space:
@@ -169,11 +178,10 @@ def choose_safety(robot: Robot, base: BaseParameters, home: Array, limits: Limit
         try:
             check_feasible(robot, spatial, home)
         except InfeasibleError:
-            # The solver keeps a little from each bound, and so must the pose to which it may have to shrink a motion.
-            nearest = nearest_feasible(spatial, home, room=HOME_ROOM) if movable else None
-            if nearest is None:
+            pose = roomy_pose(spatial, home) if movable else None
+            if pose is None:
                 raise
-            home, moved = nearest, True
+            home, moved = pose, True
     torque, torque_rms = _torque_limits(robot, base, home, limits)
     motion = StateLimits(robot=robot, limits=tuple(limits.motion)) if limits.motion else None
     if motion is not None:
@@ -187,6 +195,7 @@ def choose_safety(robot: Robot, base: BaseParameters, home: Array, limits: Limit
         check=SpatialCheck(GeometricLimits(robot=robot, limits=space)) if space else None,
         motion=motion,
         moved=moved,
+        movable=movable,
     )
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Mapping
 from typing import ClassVar
 
 import numpy as np
@@ -22,6 +23,7 @@ class Abb(Form):
 
     name: ClassVar[str] = "abb"
     suffixes: ClassVar[tuple[str, ...]] = (".mod",)
+    comment: ClassVar[Mapping[str, str]] = {".mod": "!"}
 
     def write(self, motion: Motion, robot: Robot, options: ExportOptions, suffix: str) -> bytes:
         """See `Form.write`."""

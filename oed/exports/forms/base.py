@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import ClassVar
 
@@ -23,10 +24,12 @@ class ExportOptions:
     Attributes:
         start_tolerance: of a guard on the start pose [rad or m].
         name: of the program or module.
+        remark: a line for the people who open the file, where the form has comments.
     """
 
     start_tolerance: float = 0.01
     name: str = "trajectory"
+    remark: str = ""
 
     def __post_init__(self) -> None:
         """Checks the choices.
@@ -48,12 +51,22 @@ class Form(ABC):
         suffixes: of the file, the usual one first.
         period: sample period that the controller needs [s]; None for that of the trajectory.
         has_samples: whether the file holds the trajectory, and not only limits of its robot.
+        comment: what begins a comment in files of each suffix that has comments.
     """
 
     name: ClassVar[str]
     suffixes: ClassVar[tuple[str, ...]]
     period: ClassVar[float | None] = None
     has_samples: ClassVar[bool] = True
+    comment: ClassVar[Mapping[str, str]] = {}
+
+    def content(self, motion: Motion, robot: Robot, options: ExportOptions, suffix: str) -> bytes:
+        """Gives the content of the file, with the remark as a comment below its first line; see `write`."""
+        whole, begin = self.write(motion, robot, options, suffix), self.comment.get(suffix)
+        if not (begin and options.remark):
+            return whole
+        first, _, rest = whole.partition(b"\n")
+        return b"\n".join([first, f"{begin} {options.remark}".encode("ascii", "replace"), rest])
 
     @abstractmethod
     def write(self, motion: Motion, robot: Robot, options: ExportOptions, suffix: str) -> bytes:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Mapping
 from typing import ClassVar
 
 import numpy as np
@@ -21,6 +22,7 @@ class Kuka(Form):
 
     name: ClassVar[str] = "kuka"
     suffixes: ClassVar[tuple[str, ...]] = (".dat",)
+    comment: ClassVar[Mapping[str, str]] = {".dat": ";"}
 
     def write(self, motion: Motion, robot: Robot, options: ExportOptions, suffix: str) -> bytes:
         """See `Form.write`."""

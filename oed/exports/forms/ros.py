@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Mapping
 from typing import Any, ClassVar
 
 import numpy as np
@@ -21,6 +22,7 @@ class Ros(Form):
 
     name: ClassVar[str] = "ros"
     suffixes: ClassVar[tuple[str, ...]] = (".yaml", ".json")
+    comment: ClassVar[Mapping[str, str]] = {".yaml": "#"}
 
     def write(self, motion: Motion, robot: Robot, options: ExportOptions, suffix: str) -> bytes:
         """See `Form.write`."""
@@ -36,6 +38,7 @@ class RosGoal(Form):
 
     name: ClassVar[str] = "ros-goal"
     suffixes: ClassVar[tuple[str, ...]] = (".yaml", ".json")
+    comment: ClassVar[Mapping[str, str]] = {".yaml": "#"}
 
     def write(self, motion: Motion, robot: Robot, options: ExportOptions, suffix: str) -> bytes:
         """See `Form.write`."""

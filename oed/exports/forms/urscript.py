@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Mapping
 from typing import ClassVar
 
 import numpy as np
@@ -21,6 +22,7 @@ class UrScript(Form):
 
     name: ClassVar[str] = "urscript"
     suffixes: ClassVar[tuple[str, ...]] = (".script",)
+    comment: ClassVar[Mapping[str, str]] = {".script": "#"}
     period: ClassVar[float | None] = 0.002
 
     def write(self, motion: Motion, robot: Robot, options: ExportOptions, suffix: str) -> bytes:

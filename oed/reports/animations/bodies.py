@@ -18,7 +18,7 @@ from oed.reports.animations.surfaces import (
     cylinder_surface,
     decimated,
 )
-from robots.collision import Box, Capsule, Plane, collision_model, reach, segment_capsules
+from robots.collision import Box, Capsule, CollisionModel, Plane, Surroundings, reach, segment_capsules
 from robots.collision.boxes import stated_scene
 from robots.collision.drawn.fitting import load_mesh
 from robots.collision.loading import RADIUS_FRACTION, stated_collision
@@ -50,14 +50,15 @@ class Body:
     surface: Surface
 
 
-def bodies_of(robot: Robot) -> tuple[Body, ...]:
-    """Collects what is drawn of a robot and of the obstacles in its file.
+def bodies_of(robot: Robot, surroundings: Surroundings | None = None) -> tuple[Body, ...]:
+    """Collects what is drawn of a robot, of its floor and of the obstacles in its file.
 
     A link is drawn with the visual shapes of its URDF, else with the collision shapes, else with the capsules of its
     collision model.
 
     Args:
         robot: the robot.
+        surroundings: the floor, and further boxes.
 
     Warns:
         AssumedValueWarning: for each mesh that is not found or cannot be read, and for a robot's file that has moved;
@@ -65,7 +66,9 @@ def bodies_of(robot: Robot) -> tuple[Body, ...]:
     """
     drawn = _drawn(robot)
     without = set(range(robot.n + 1)) - {body.link for body in drawn}
-    capsules = _capsules(robot) if without - {0} or not drawn else ()
+    around = surroundings or Surroundings()
+    model = _model(robot, around)
+    capsules = model.capsules if model is not None else _capsules(robot)
     return (
         *drawn,
         *(
@@ -78,19 +81,23 @@ def bodies_of(robot: Robot) -> tuple[Body, ...]:
             for capsule in capsules
             if capsule.link in without
         ),
-        *_obstacles(robot),
+        *_obstacles(robot, model, around),
     )
 
 
-def _capsules(robot: Robot) -> tuple[Capsule, ...]:
-    """Capsules of the collision model; along the links where the robot's file gives none that fit."""
-    with warnings.catch_warnings():
+def _model(robot: Robot, surroundings: Surroundings) -> CollisionModel | None:
+    """The collision model; None where the robot's file gives none that fits."""
+    with warnings.catch_warnings(), suppress(InputError):
         # Whether a shape is assumed matters for distances, which a picture does not state.
         warnings.simplefilter("ignore", AssumedValueWarning)
-        with suppress(InputError):
-            return collision_model(robot).capsules
-        with suppress(InputError):  # of an arm without extent, which has no link to draw
-            return segment_capsules(robot.chain, RADIUS_FRACTION)
+        return surroundings.model(robot)
+    return None
+
+
+def _capsules(robot: Robot) -> tuple[Capsule, ...]:
+    """Capsules along the links; none of an arm without extent, which has no link to draw."""
+    with suppress(InputError):
+        return segment_capsules(robot.chain, RADIUS_FRACTION)
     return ()
 
 
@@ -138,14 +145,15 @@ def _surface(shape: UrdfShape, source: str | Path, most: int) -> Surface:
     return capsule_surface(-half, half, shape.size[0])
 
 
-def _obstacles(robot: Robot) -> tuple[Body, ...]:
+def _obstacles(robot: Robot, model: CollisionModel | None, surroundings: Surroundings) -> tuple[Body, ...]:
     try:
         stated, _ = stated_collision(robot)
     except InputError as error:
         warnings.warn(f"{robot.name}: {error}; obstacles are not drawn", AssumedValueWarning, stacklevel=4)
         return ()
     bodies = []
-    for obstacle in stated_scene(stated).obstacles:
+    planes = [] if model is None else [obstacle for obstacle in model.obstacles if isinstance(obstacle, Plane)]
+    for obstacle in (*planes, *stated_scene(stated).obstacles, *surroundings.keep_out):
         if isinstance(obstacle, Plane):
             surface, kind = _plane_surface(obstacle, 1.2 * reach(robot.chain)), "plane"
         elif isinstance(obstacle, Box):

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from estimation.preprocessing import LowPass, resample, smooth
 from oed.reports.animations.animation import Animation
 from oed.reports.animations.bodies import bodies_of
+from robots.collision import Surroundings
 from robots.common.errors import InputError
 from robots.limits import Margin, symmetric_margins
 from robots.regressor import default_model
@@ -36,6 +37,7 @@ def animate(
     margins: Sequence[Margin] | None = None,
     marks: Mapping[int, str] | None = None,
     source: str = "",
+    surroundings: Surroundings | None = None,
 ) -> Animation:
     """Makes the animation of a motion, or of the motion in a log.
 
@@ -50,6 +52,7 @@ def animate(
             logs.
         marks: what is wrong with a joint, by its number from 1.
         source: what is played, in words; "motion" or "log" by default.
+        surroundings: the floor, and boxes around the robot.
 
     Raises:
         InputError: another number of joints than the robot has, or a log of fewer than 20 rows.
@@ -74,7 +77,7 @@ def animate(
         robot=robot.title or robot.name,
         chain=robot.chain,
         limits=robot.limits,
-        bodies=bodies_of(robot),
+        bodies=bodies_of(robot, surroundings),
         t=motion.t[rows],
         q=q,
         shares=_shares(robot, motion, torque, rows),

@@ -104,11 +104,15 @@ def _findings(campaign: Campaign) -> tuple[Finding, ...]:
         with catch_warnings():
             # The first screen has assumed values as a finding.
             simplefilter("ignore", AssumedValueWarning)
-            closest = closest_bodies(campaign.robot, stage.motion)
+            closest = closest_bodies(campaign.surroundings.model(campaign.robot), stage.motion)
         if closest is not None and closest[1] < 0.0:
             pair, clearance, time = closest
             text = f"in the collision model {pair} overlap by {-1e3 * clearance:.0f} mm at {time:.1f} s."
-            action = "Design it again with oed design --collision." if stage.kind == "excitation" else "Check it first."
+            action = (
+                "Design it again with oed design, which avoids collisions."
+                if stage.kind == "excitation"
+                else "Check it first."
+            )
             found.append(Finding(code="collision.found", subject=f"{stage.name}:", text=text, action=action))
             colliding.append(stage.name)
     if campaign.success:

@@ -9,15 +9,18 @@ from numpy.typing import NDArray
 
 from oed.experiments import Design
 from oed.experiments.quality import Quality
+from oed.experiments.safety_checks.freedom import freedom_text
 from oed.experiments.safety_checks.margins import nominal_torque
 from oed.reports.animations.building import animate
 from oed.reports.pages.motions.assumption_findings import assumption_findings
+from oed.reports.pages.motions.freedom_findings import freedom_findings
 from oed.reports.pages.motions.motion_report import animation_section, approach_text, tightest_fact
 from oed.reports.pictures.trajectory_pictures import margins_picture, spectrum_picture, trajectory_picture
 from oed.reports.rendering.page import Cell, Fact, Finding, Page, Section, Table, findings_of
 from oed.reports.rendering.provenance import footer
 from oed.reports.rendering.saving import save_page
 from oed.reports.rendering.significant import significant
+from robots.collision import Surroundings
 from robots.common.files import ResultFolder
 from robots.limits import Margin
 
@@ -80,8 +83,16 @@ def _animation(design: Design) -> Section:
     """The robot that plays the motion, with the limits as the design checked them."""
     static = [effect for effect in design.effects if effect.static]
     torque = nominal_torque(design.base, design.motion, static)
+    around = Surroundings.from_settings(design.settings)
     return animation_section(
-        animate(design.robot, design.motion, torque=torque, margins=design.margins, source="designed motion")
+        animate(
+            design.robot,
+            design.motion,
+            torque=torque,
+            margins=design.margins,
+            source="designed motion",
+            surroundings=around,
+        )
     )
 
 
@@ -173,11 +184,13 @@ def _verdict(design: Design, findings: tuple[Finding, ...]) -> str:
     codes = {finding.code for finding in findings}
     if "limit.exceeded" in codes:
         return f"Do not play this motion: it exceeds the limit of {approach_text(design.violated[0])}."
+    if codes & {"collision.found", "collision.unchecked"}:
+        return f"Do not play this motion. {freedom_text(design.freedom)}"
     if codes & {"excitation.incomplete", "excitation.weak"}:
         return "Design the experiment again: this motion does not determine all parameters."
     return (
         f"Play trajectory.csv on the robot: in {design.motion.duration:.0f} s it determines all {design.base.size} "
-        "base parameters within all limits."
+        f"base parameters within all limits. {freedom_text(design.freedom)}"
     )
 
 
@@ -197,12 +210,7 @@ def _findings(design: Design) -> tuple[Finding, ...]:
     if not any(margin.quantity == "torque" for margin in design.margins):
         text = "Torque limits were not checked: the robot's description lacks nominal dynamics or torque limits."
         found += findings_of("torque.unchecked", [text])
-    if design.freedom is None:
-        text = "Collisions were not checked. Use --collision with a robot that has collision bodies."
-        found += findings_of("collision.unchecked", [text])
-    elif not design.freedom["certified"]:
-        text = "Absence of collisions was checked at the samples only; between samples it is not proved."
-        found += findings_of("collision.sampled", [text])
+    found += freedom_findings(design.freedom)
     if design.strokes_left_out:
         joints = ", ".join(str(joint) for joint in design.strokes_left_out)
         found += findings_of("stroke.left_out", [f"No velocity stroke for joints {joints}: the arm would collide."])

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 from oed.campaigns.discriminations.discrimination import Discrimination
+from oed.experiments.safety_checks.freedom import freedom_text, is_free
 from oed.reports.pages.design_report import margins_section
+from oed.reports.pages.motions.freedom_findings import freedom_findings
 from oed.reports.pictures.trajectory_pictures import trajectory_picture
 from oed.reports.rendering.page import Fact, Page, Section, Table, findings_of
 from oed.reports.rendering.provenance import footer
@@ -44,11 +46,13 @@ def discrimination_page(result: Discrimination) -> Page:
         )
         for judged in result.ranking
     )
+    warning = "" if is_free(result.freedom) else "Do not play these motions. "
     return Page(
         title="Experiment to distinguish two causes",
         robot=robot.title or robot.name,
-        verdict=f"{result.why}.",
+        verdict=f"{warning}{result.why}. {freedom_text(result.freedom)}",
         findings=(
+            *freedom_findings(result.freedom),
             *findings_of("experiment.note", result.warnings),
             *findings_of("experiment.unsure", _unsure(result)),
         ),

@@ -6,10 +6,12 @@ import numpy as np
 
 from oed.criteria import CRITERIA
 from oed.experiments import RetimedExperiment
+from oed.experiments.safety_checks.freedom import freedom_text, is_free
 from oed.experiments.safety_checks.margins import nominal_torque
 from oed.reports.animations.building import animate
 from oed.reports.pages.design_report import excitation_findings, margins_section, parameters_section, quality_section
 from oed.reports.pages.motions.assumption_findings import assumption_findings
+from oed.reports.pages.motions.freedom_findings import freedom_findings
 from oed.reports.pages.motions.motion_report import animation_section
 from oed.reports.pictures.trajectory_pictures import trajectory_picture
 from oed.reports.rendering.page import Cell, Fact, Finding, Page, Section, Table, findings_of
@@ -50,14 +52,17 @@ def retime_page(result: RetimedExperiment, given: Motion) -> Page:
         )
     if retimed.slower:
         findings += findings_of("timing.slower", [retimed.verdict()])
+    findings += freedom_findings(result.freedom)
     findings += assumption_findings(robot)
+    timing = (
+        f"{retimed.method} runs the path in {retimed.duration_after:.1f} s instead of {retimed.duration_before:.1f} s, "
+        f"using {100 * share:.1f} % of the {name} limit of joint {joint}."
+    )
+    unsafe = not result.success or not is_free(result.freedom)
     return Page(
         title="Retimed path",
         robot=robot.title or robot.name,
-        verdict=(
-            f"{retimed.method} runs the path in {retimed.duration_after:.1f} s instead of "
-            f"{retimed.duration_before:.1f} s, using {100 * share:.1f} % of the {name} limit of joint {joint}."
-        ),
+        verdict=f"{'Do not play this motion. ' if unsafe else ''}{timing} {freedom_text(result.freedom)}",
         findings=tuple(findings),
         facts=(
             Fact(label=f"{CRITERIA['cond']().label} before", value=before if before is not None else "not all excited"),

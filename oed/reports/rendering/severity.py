@@ -45,7 +45,7 @@ LEVELS: dict[str, Level] = {
     "value.assumed": "note",
     "torque.unchecked": "note",
     "collision.found": "act",
-    "collision.unchecked": "note",
+    "collision.unchecked": "act",
     "collision.sampled": "note",
     "stroke.left_out": "note",
     "excitation.incomplete": "act",

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import contextlib
 from dataclasses import dataclass
-from importlib import import_module
 from pathlib import Path
 from typing import Any
 
@@ -13,6 +12,7 @@ from numpy.typing import NDArray
 from scipy.optimize import minimize
 from scipy.spatial import ConvexHull, QhullError
 
+from robots.collision.drawn.shapes import mesh_tree
 from robots.common.errors import InputError
 from robots.geometry.urdf_shapes import UrdfShape, mesh_file
 
@@ -102,19 +102,13 @@ def load_mesh(shape: UrdfShape, source: str | Path) -> tuple[Array, NDArray[np.i
     Raises:
         InputError: a mesh that is not found or cannot be read, or coal is not installed.
     """
-    path = mesh_file(shape, source)
-    try:
-        coal: Any = import_module("coal")
-    except ImportError as error:
-        raise InputError("the package coal is not installed", remedy="pip install coal (it comes with pin)") from error
-    try:
-        mesh = coal.MeshLoader().load(str(path), np.asarray(shape.scale))
-    except (ValueError, RuntimeError) as error:
-        raise InputError(f"the mesh of link {shape.link!r} cannot be read", file=path) from error
+    mesh = mesh_tree(shape, source)
     triangles = np.array([[mesh.tri_indices(i)[j] for j in range(3)] for i in range(mesh.num_tris)], dtype=np.int64)
     vertices = np.array(mesh.vertices(), dtype=np.float64)
-    if not len(triangles) or not np.isfinite(vertices).all():
-        raise InputError(f"the mesh of link {shape.link!r} has no surface", file=path)
+    if not np.isfinite(vertices).all():
+        raise InputError(
+            f"the mesh of link {shape.link!r} has a vertex that is not finite", file=mesh_file(shape, source)
+        )
     return vertices, triangles
 
 

@@ -1,4 +1,4 @@
-"""Collision bodies of a robot from the ``<collision>`` shapes of its URDF."""
+"""Collision bodies of a robot from the shapes of its URDF."""
 
 from __future__ import annotations
 
@@ -9,18 +9,21 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
-from robots.collision.boxes import Box, Obstacle
+from robots.collision.boxes import Box
 from robots.collision.capsules import Capsule, numbered
 from robots.collision.drawn.fitting import Balls, fit_capsule, shape_balls
-from robots.collision.pairs import POSES, Pair, poses_of, random_poses, reference_pose
+from robots.collision.drawn.shapes import BodyPair, DrawnBodies, shapes_of
+from robots.collision.pairs import POSES, always_touching, body_clearance, distinct_rows, poses_of, random_poses
 from robots.common.errors import AssumedValueWarning, InputError
-from robots.geometry.urdf_shapes import UrdfShape, collision_shapes
+from robots.geometry.urdf_shapes import UrdfShape
 from robots.robot import Robot
 
 Array = NDArray[np.float64]
 
 MOST = 4  # capsules of a body; more shapes are joined
 JOIN = 1.1  # two are joined where one capsule about both is at most so much larger
+CELL = 0.2  # poses that differ by less in the joints between two bodies count once [rad or m]
+BUILT = 0.9  # of all poses; bodies whose shapes meet in more of them touch by construction
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -32,21 +35,29 @@ class DrawnLinks:
         boxes: those of the base, as they are.
         ignored: links and boxes of the base that touch by construction.
         without: links, 0 for the base, of which a shape is missing or cannot be read.
+        bodies: the shapes themselves.
+        joined: pairs of links whose shapes meet in nearly every pose.
+        apart: pairs of links whose shapes were not seen to meet in any of many poses.
+        span: lowest and highest point of the base along z of its frame [m]; None where nothing of it is drawn.
     """
 
     capsules: tuple[Capsule, ...]
     boxes: tuple[Box, ...]
     ignored: tuple[frozenset[int | str], ...]
     without: tuple[int, ...]
+    bodies: DrawnBodies
+    joined: frozenset[BodyPair]
+    apart: frozenset[BodyPair]
+    span: tuple[float, float] | None
 
 
 # A design, its check and its campaign ask for the same robot; meshes take their time.
 @lru_cache(maxsize=8)
 def drawn_links(robot: Robot) -> DrawnLinks | None:
-    """Fits capsules to the collision shapes of a robot's URDF.
+    """Fits capsules to the shapes of a robot's URDF: of each link those for collisions, else the visual ones.
 
     Args:
-        robot: a robot; one that is not from a URDF, or whose URDF has no collision shapes, gives None.
+        robot: a robot; one that is not from a URDF, or whose URDF draws nothing, gives None.
 
     Raises:
         InputError: naming the link, on a shape that is not possible.
@@ -54,36 +65,61 @@ def drawn_links(robot: Robot) -> DrawnLinks | None:
     Warns:
         AssumedValueWarning: naming meshes that are not found or cannot be read.
     """
-    shapes = collision_shapes(robot.urdf) if robot.urdf and robot.links else {}
-    if not any(place.name in shapes for place in robot.links):
+    shapes = shapes_of(robot)
+    if not shapes:
         return None
     parts: dict[int, list[tuple[str, Balls]]] = {}
     boxes: list[Box] = []
     unread: list[tuple[int, str]] = []
-    drawn: set[int] = set()
-    for place in robot.links:
-        for shape in shapes.get(place.name, ()):
-            if place.body == 0 and shape.kind == "box":
-                boxes.append(_box(shape, place.pose, len(boxes)))
-                drawn.add(0)
-                continue
-            try:
-                balls = shape_balls(shape, robot.urdf)
-            except InputError as error:
-                unread.append((place.body, str(error)))
-                continue
-            drawn.add(place.body)
-            parts.setdefault(place.body, []).extend((place.name, part.moved(place.pose)) for part in balls)
+    heights: list[float] = []
+    for drawn in shapes:
+        name = drawn.shape.link
+        try:
+            balls = [part.moved(drawn.pose) for part in shape_balls(drawn.shape, robot.urdf)]
+        except InputError as error:
+            unread.append((drawn.body, str(error)))
+            continue
+        if drawn.body == 0:
+            heights += [z for part in balls for z in (part.centres[:, 2] + np.outer((-1, 1), part.radii)).flat]
+        if drawn.body == 0 and drawn.shape.kind == "box":
+            boxes.append(_box(drawn.shape, drawn.pose, len(boxes)))
+        else:
+            parts.setdefault(drawn.body, []).extend((name, part) for part in balls)
     for _, text in dict.fromkeys(unread):
         warnings.warn(f"{robot.name}: {text}", AssumedValueWarning, stacklevel=4)
     capsules = numbered([c for body in sorted(parts) for c in _capsules(body, parts[body])])
-    missing = {body for body in range(robot.n + 1) if body not in drawn} | {body for body, _ in unread}
+    known = {*parts, *(0 for _ in boxes)}
+    without = ({*range(robot.n + 1)} - known) | {body for body, _ in unread}
+    bodies = DrawnBodies(shapes, robot.urdf)
+    q = random_poses(robot.limits, POSES)
+    poses = poses_of(robot.chain, q)
+    joined, apart = _met(bodies, capsules, q, poses, sorted(known - without))
     return DrawnLinks(
         capsules=capsules,
         boxes=tuple(boxes),
-        ignored=_touching(robot, capsules, boxes),
-        without=tuple(sorted(missing)),
+        ignored=_touching(poses, capsules, boxes),
+        without=tuple(sorted(without)),
+        bodies=bodies,
+        joined=joined,
+        apart=apart,
+        span=(float(min(heights)), float(max(heights))) if heights else None,
     )
+
+
+def _met(
+    bodies: DrawnBodies, capsules: tuple[Capsule, ...], q: Array, poses: Array, known: list[int]
+) -> tuple[frozenset[BodyPair], frozenset[BodyPair]]:
+    """Pairs of bodies whose shapes meet in nearly every pose, and those whose shapes meet in none."""
+    joined, apart = set(), set()
+    for pair in (frozenset((i, j)) for j in known for i in known if i < j):
+        rows = distinct_rows(q, pair, CELL)
+        near = body_clearance(capsules, pair, poses[rows]) < 0.0  # Capsules enclose the shapes.
+        share = bodies.meet(pair, poses[rows][near]).sum() / len(rows)
+        if share > BUILT:
+            joined.add(pair)
+        elif share == 0.0:
+            apart.add(pair)
+    return frozenset(joined), frozenset(apart)
 
 
 def _box(shape: UrdfShape, place: Array, count: int) -> Box:
@@ -112,17 +148,9 @@ def _capsules(body: int, parts: list[tuple[str, Balls]]) -> list[Capsule]:
     ]
 
 
-def _touching(robot: Robot, capsules: tuple[Capsule, ...], boxes: list[Box]) -> tuple[frozenset[int | str], ...]:
-    """The first link and each box of the base, and those that overlap at zero or always, as between links."""
-    q = np.vstack([reference_pose(robot.limits), random_poses(robot.limits, POSES)])
-    poses = poses_of(robot.chain, q)
-    found: set[frozenset[int | str]] = set()
+def _touching(poses: Array, capsules: tuple[Capsule, ...], boxes: list[Box]) -> tuple[frozenset[int | str], ...]:
+    """The first link and each box of the base, and those that always overlap, as between links."""
+    found: set[frozenset[int | str]] = {frozenset((1, box.name)) for box in boxes}
     for box in boxes:
-        obstacle: Obstacle = box
-        found.add(frozenset((1, box.name)))
-        for capsule in capsules:
-            if capsule.link > 1:
-                meets = Pair(first=obstacle, second=capsule).clearance(poses) < 0.0
-                if meets[0] or meets.all():
-                    found.add(frozenset((capsule.link, box.name)))
+        found |= always_touching(box, capsules, poses)
     return tuple(sorted(found, key=str))

@@ -29,6 +29,7 @@ def design(robot: Robot, **options: object) -> Design:
         "effort": EFFORT,
         "solver": SOLVER,
         "strokes": False,
+        "velocity_fraction": 1.0,
         "workers": 1,
     }
     return flat.design(robot, **{**settings, **options})
@@ -114,7 +115,7 @@ def arm(tmp_path_factory: pytest.TempPathFactory) -> Robot:
 
 @pytest.fixture(scope="module")
 def free(arm: Robot) -> Design:
-    return design(arm, home=[0.0, 0.6, 0.9])
+    return design(arm, home=[0.0, 0.6, 0.9], collision=False)
 
 
 def tool(motion_q: np.ndarray) -> np.ndarray:

@@ -83,7 +83,7 @@ def test_a_urdf_gets_capsules_along_its_links():
         warnings.simplefilter("ignore") if loading._warned else None
         model = collision_model(robot)
     assert len(model.capsules) == 7
-    assert "base / link 2" in model.names or ("base / link 2", "overlap in every pose") in model.excluded
+    assert "base / link 2" in model.names or ("base / link 2", "touch in every pose") in model.excluded
     assert "link 2 / link 4" in model.names
 
 

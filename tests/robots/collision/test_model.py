@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import dataclasses
 import pickle
 
 import casadi
@@ -123,8 +124,8 @@ def test_neighbours_and_what_always_touches_are_not_watched():
     assert "floor / flange" in names
     assert all(pair.second.link - pair.first.link > 1 or pair.first.name == "floor" for pair in model.pairs)
     assert "floor / base" not in names
-    assert dict(model.excluded) == {"forearm tube / flange": "overlap in every pose"}
-    for text in ("forearm tube / flange (overlap in every pose)", "25 pairs checked", "radius 80 mm", "assumed"):
+    assert dict(model.excluded) == {"forearm tube / flange": "touch in every pose"}
+    for text in ("forearm tube / flange (touch in every pose)", "25 pairs checked", "radius 80 mm", "assumed"):
         assert text in model.summary()
 
 
@@ -136,16 +137,19 @@ def test_the_choice_of_pairs_is_the_same_every_time():
     assert (first.names, first.excluded) == (second.names, second.excluded)
 
 
-def test_a_pair_that_only_touches_at_zero_is_not_watched_either(limits):
-    """Links that overlap at the pose zero, as a folded arm's do, are left out, and the summary says so."""
+def test_a_pair_that_touches_at_zero_is_watched(limits):
+    """Links that overlap at the pose zero only, as a folded arm's do, are watched: elsewhere they may collide."""
     joints = tuple(Joint(f"j{i}", "revolute", np.eye(3), np.array([0.3, 0, 0])) for i in range(3))
     first = Capsule(name="first", link=1, start=[0, 0, 0], end=[0.5, 0, 0], radius=0.05)
     third = Capsule(name="third", link=3, start=[0, 0, 0], end=[0.3, 0, 0], radius=0.11)
     model = CollisionModel(name="m", chain=Chain(joints), limits=limits(3), capsules=(first, third))
-    assert model.pairs == ()
-    assert model.excluded == (("first / third", "overlap at the pose zero"),)
-    assert model.clearance(np.zeros((4, 3))).shape == (4, 0)
-    assert model.smooth_clearance(np.zeros((4, 3)))[1].shape == (4, 0, 3)
+    assert model.names == ("first / third",)
+    assert model.clearance(np.zeros((1, 3))) < 0.0
+    short = dataclasses.replace(first, end=[0.7, 0, 0], radius=0.2)
+    always = CollisionModel(name="m", chain=Chain(joints), limits=limits(3), capsules=(short, third))
+    assert always.excluded == (("first / third", "touch in every pose"),)
+    assert always.clearance(np.zeros((4, 3))).shape == (4, 0)
+    assert always.smooth_clearance(np.zeros((4, 3)))[1].shape == (4, 0, 3)
 
 
 def test_pairs_may_be_ignored(arm, slider_chain, limits):

@@ -82,7 +82,7 @@ def test_repeated_motions_are_played_as_they_were() -> None:
     motion = played()
     seen = logged(motion)
     mirrored = proposal("mirrored", Stage(motion=seen, pause=5.0), Stage(motion=backwards(seen)))
-    planned = plan_experiment(mirrored, arm(), HOME, [motion], collision=False)
+    planned = plan_experiment(mirrored, arm(), HOME, [motion])
     assert isinstance(planned, PlannedExperiment)
     assert [run.pause for run in planned.runs] == [5.0, 2.0]
     assert planned.runs[0].motion is motion
@@ -99,7 +99,7 @@ def test_changes_by_hand_are_avoided() -> None:
         Proposal(kind=kind, resolves=resolves, duration=60.0)
         for kind, resolves in (("payload", 0.9), ("sweep", 0.7), ("pause", 0.4))
     )
-    planned = plan_experiment(proposal("payload", *stages, others=others), robot, HOME, [motion], collision=False)
+    planned = plan_experiment(proposal("payload", *stages, others=others), robot, HOME, [motion])
     assert isinstance(planned, PlannedExperiment)
     assert (planned.kind, planned.resolves, len(planned.runs)) == ("sweep", 0.7, 1)
     assert "in place of: two causes fit" in planned.why
@@ -107,7 +107,7 @@ def test_changes_by_hand_are_avoided() -> None:
     np.testing.assert_allclose(sweep.q[[0, -1]], np.tile(HOME, (2, 1)), atol=1e-9)
     assert not any(margin.violated for margin in robot.limits.margins(sweep))
     assert np.ptp(sweep.q[:, 1]) > 1.0
-    reason = plan_experiment(proposal("payload", *stages), robot, HOME, [motion], collision=False)
+    reason = plan_experiment(proposal("payload", *stages), robot, HOME, [motion])
     assert isinstance(reason, str)
     assert "a payload of 2 kg must be mounted" in reason
 
@@ -117,6 +117,6 @@ def test_unlikely_experiments_are_not_made() -> None:
     """An experiment below the asked probability is a reason to end, in the diagnosis' words."""
     stage = Stage(motion=logged(played()))
     unlikely = proposal("repeat", stage, resolves=0.3)
-    assert plan_experiment(unlikely, arm(), HOME, [played()], collision=False) == "two causes fit"
-    made = plan_experiment(unlikely, arm(), HOME, [played()], least_probability=0.2, collision=False)
+    assert plan_experiment(unlikely, arm(), HOME, [played()]) == "two causes fit"
+    made = plan_experiment(unlikely, arm(), HOME, [played()], least_probability=0.2)
     assert isinstance(made, PlannedExperiment)

@@ -72,7 +72,8 @@ def test_meshes_are_drawn(tmp_path: Path) -> None:
         visual(MESH) + visual('<box size="1 1 1"/>', "collision"),
         visual('<sphere radius="0.1"/>', "collision"),
     )
-    mesh, ball = bodies_of(load_robot(path))
+    mesh, ball, floor = bodies_of(load_robot(path))
+    assert floor.kind == "plane"
     assert (mesh.kind, mesh.link, ball.kind, ball.link) == ("mesh", 1, "shape", 2)
     assert len(mesh.surface.triangles) == 4
     np.testing.assert_allclose(mesh.surface.vertices.min(axis=0), [0, 0, 0.1], atol=1e-9)

@@ -81,8 +81,20 @@ def test_tells_the_numbers(design: Design, html: str) -> None:
 def test_warns(html: str) -> None:
     """Assumed values, and what was not checked, are said."""
     assert "limits.torque" in html
-    assert "Collisions were not checked." in html
+    assert "The shapes of the links are assumed." in html
     assert "Torque limits were not checked" in html  # for the robot's dynamics are not described
+
+
+def test_only_what_was_checked_is_called_playable(design: Design) -> None:
+    """Without the check, or with bodies that meet, the verdict forbids playing, and the badge asks for action."""
+    hit = {**design.freedom, "clearance": -0.02, "certified": False}
+    met = {**design.freedom, "certified": False, "meetings": [["link 1 / link 2", 1.5]]}
+    for freedom, code in ((None, "collision.unchecked"), (hit, "collision.found"), (met, "collision.found")):
+        page = design_page(replace(design, freedom=freedom))
+        assert page.verdict.startswith("Do not play this motion. ")
+        assert page.level == "act"
+        assert code in {finding.code for finding in page.findings}
+    assert design_page(design).verdict.startswith("Play ")
 
 
 def test_warns_of_assumed_limits() -> None:

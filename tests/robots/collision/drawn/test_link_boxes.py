@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from robots.collision.link_boxes import link_boxes
+from robots.collision.drawn.link_boxes import link_boxes
 from robots.loading import load_robot
 
 URDF = """<robot name="r">
