@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import hashlib
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Literal, get_args
 from xml.etree import ElementTree
@@ -31,12 +31,15 @@ _EXPAND = "expand it first: xacro FILE.xacro > FILE.urdf, or name it .xacro"
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class UrdfLink:
-    """A link: mass [kg], centre of mass [m] and inertia about it [kg m2] in link axes; zeros where not stated."""
+    """A link: mass [kg], centre of mass [m] and inertia about it [kg m2] in link axes.
+
+    A mass of NaN is unknown: the file states none, or zero, as exporters write it for links without material.
+    """
 
     name: str
-    mass: float = 0.0
-    com: Array
-    inertia_at_com: Array
+    mass: float = np.nan
+    com: Array = field(default_factory=lambda: np.zeros(3))
+    inertia_at_com: Array = field(default_factory=lambda: np.zeros((3, 3)))
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -88,7 +91,7 @@ def _link(element: ElementTree.Element, file: str) -> UrdfLink:
     read = UrdfReader(file, f"link {name!r}")
     inertial = read.child(element, "inertial")
     if inertial is None:
-        return UrdfLink(name=name, com=np.zeros(3), inertia_at_com=np.zeros((3, 3)))
+        return UrdfLink(name=name)
     mass_element, inertia_element = read.child(inertial, "mass"), read.child(inertial, "inertia")
     if mass_element is None or inertia_element is None:
         raise read.error(f"<inertial> has no <{'mass' if mass_element is None else 'inertia'}>")
@@ -99,7 +102,7 @@ def _link(element: ElementTree.Element, file: str) -> UrdfLink:
     inertia = rotation @ symmetric(six) @ rotation.T
     if mass < 0.0:
         raise read.error(f"a mass of {mass:g} kg", allowed="zero or more")
-    return UrdfLink(name=name, mass=mass, com=pose[:3, 3], inertia_at_com=inertia)
+    return UrdfLink(name=name, mass=mass or np.nan, com=pose[:3, 3], inertia_at_com=inertia)
 
 
 def _joint(element: ElementTree.Element, file: str) -> UrdfJoint:
