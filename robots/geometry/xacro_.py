@@ -70,16 +70,18 @@ def _expanded(path: Path, arguments: dict[str, str]) -> bytes:
         remedy = "pip install xacro, or expand the file elsewhere: xacro FILE.xacro > FILE.urdf"
         raise InputError("a xacro file needs the package xacro", file=path, remedy=remedy) from error
     heard = io.StringIO()
+    lost: list[InputError] = []
     try:
-        with contextlib.redirect_stderr(heard), _packages_from(path, substitution):
+        with contextlib.redirect_stderr(heard), _packages_from(path, substitution, lost):
             xacro.init_stacks(str(path))
             document = xacro.parse(None, str(path))
             xacro.process_doc(document, mappings=dict(arguments), verbosity=0)
             content: bytes = document.toxml(encoding="utf-8")
-    except InputError:
-        raise
     # Expressions in the file may raise anything.
     except Exception as error:
+        if lost:
+            # xacro wraps it in words of its own.
+            raise lost[0] from error
         at = str(xacro.filestack[-1]) if xacro.filestack else str(path)
         text = " ".join(str(error).split()) or type(error).__name__
         undefined = _UNDEFINED.search(text)
@@ -92,11 +94,15 @@ def _expanded(path: Path, arguments: dict[str, str]) -> bytes:
 
 
 @contextlib.contextmanager
-def _packages_from(path: Path, substitution: Any) -> Iterator[None]:
-    """Lets ``$(find PACKAGE)`` find packages around a file, where ROS is not installed."""
+def _packages_from(path: Path, substitution: Any, lost: list[InputError]) -> Iterator[None]:
+    """Lets ``$(find PACKAGE)`` find packages around a file, where ROS is not installed; others are ``lost``."""
 
     def find(name: str) -> str:
-        return str(find_package(name, path))
+        try:
+            return str(find_package(name, path))
+        except InputError as error:
+            lost.append(error)
+            raise
 
     before = substitution._eval_find, substitution._eval_dict["find"]
     substitution._eval_find = substitution._eval_dict["find"] = find
@@ -109,8 +115,8 @@ def _packages_from(path: Path, substitution: Any) -> Iterator[None]:
 def find_package(name: str, beside: Path) -> Path:
     """Finds the folder of a ROS package.
 
-    It is a folder above the file, one beside such a folder, or one in ``ROS_PACKAGE_PATH`` or ``AMENT_PREFIX_PATH``.
-    Its ``package.xml`` has the name; without one, its folder has it.
+    It is a folder above the file, one beside such a folder, or one below ``ROS_PACKAGE_PATH`` or
+    ``AMENT_PREFIX_PATH``. Its ``package.xml`` has the name, whatever the folder's is; else the folder has it.
 
     Args:
         name: of the package.
@@ -120,27 +126,33 @@ def find_package(name: str, beside: Path) -> Path:
         InputError: it is not found.
     """
     above = beside.resolve().parents
-    folders = [*above, *(folder / name for folder in above)]
+    roots = [folder for folder in above if folder != folder.parent]
     for variable, inner in (("ROS_PACKAGE_PATH", ""), ("AMENT_PREFIX_PATH", "share")):
-        roots = [Path(root) / inner for root in os.environ.get(variable, "").split(os.pathsep) if root]
-        folders += [folder for root in roots for folder in (root, root / name)]
-    found = next((folder for folder in folders if _package_name(folder) == name), None)
+        roots += [Path(root) / inner for root in os.environ.get(variable, "").split(os.pathsep) if root]
+    found = next((folder for root in roots for folder in _packages(root) if _package_name(folder) == name), None)
+    # Many packages are copied to other machines without their package.xml, or state another spelling in it.
+    named = (folder for root in roots for folder in (root, root / name) if folder.name == name and folder.is_dir())
+    found = found or next(named, None)
     if found is None:
         raise InputError(
-            f"the package {name!r} was not found",
+            f"the package {name!r} was not found: no package.xml and no folder around the file has that name",
             file=beside,
-            remedy="put its folder beside this package, or set ROS_PACKAGE_PATH to the folder above it",
+            remedy="put the package beside this one, or set ROS_PACKAGE_PATH to the folder above it",
         )
     return found
 
 
+def _packages(root: Path) -> Iterator[Path]:
+    """A folder, and those one and two levels below it, as a repository in a workspace holds several packages."""
+    yield root
+    for pattern in ("*/package.xml", "*/*/package.xml"):
+        with contextlib.suppress(OSError):
+            yield from sorted(path.parent for path in root.glob(pattern))
+
+
 def _package_name(folder: Path) -> str | None:
     try:
-        text = (folder / "package.xml").read_bytes()
-    except OSError:
-        return folder.name if folder.is_dir() else None
-    try:
-        element = ElementTree.fromstring(text).find("name")
-    except ElementTree.ParseError:
-        return folder.name
-    return folder.name if element is None or not element.text else element.text.strip()
+        element = ElementTree.parse(folder / "package.xml").find("name")
+    except (OSError, ElementTree.ParseError):
+        return None
+    return None if element is None or not element.text else element.text.strip()

@@ -67,11 +67,30 @@ def test_included_files_and_packages_are_found(xacro, tmp_path):
     write(other / "urdf" / "arm.xacro", MACRO)
     body = '<xacro:include filename="$(find parts)/urdf/arm.xacro"/>' + CALL
     top = write(workspace / "my_arm" / "urdf" / "top.xacro", body)
-    with pytest.raises(InputError, match=r"the package 'parts' was not found.*ROS_PACKAGE_PATH"):
-        load_robot(top)
-    other.rename(workspace / "parts")
     assert load_robot(top).joint_names == ("j_a",)
     assert find_package("my_arm", top) == workspace / "my_arm"
+    assert find_package("folder_of_another_name", top) == other
+
+
+def test_a_missing_package_is_named_once(xacro, tmp_path):
+    """The message names the package, what was looked for and what to do, without the library's words around it."""
+    top = write(tmp_path / "my_arm" / "top.xacro", '<xacro:include filename="$(find parts)/urdf/arm.xacro"/>' + CALL)
+    with pytest.raises(InputError, match="the package 'parts' was not found") as caught:
+        load_robot(top)
+    assert str(caught.value) == (
+        f"{top}: the package 'parts' was not found: no package.xml and no folder around the file has that name; "
+        "put the package beside this one, or set ROS_PACKAGE_PATH to the folder above it"
+    )
+
+
+def test_packages_of_other_repositories(tmp_path):
+    """A workspace holds repositories, and these hold packages: one of another repository is found."""
+    file = tmp_path / "src" / "cell" / "cell_description" / "urdf" / "cell.urdf"
+    file.parent.mkdir(parents=True)
+    arms = tmp_path / "src" / "arms" / "small"
+    arms.mkdir(parents=True)
+    (arms / "package.xml").write_text("<package><name>small_arm_description</name></package>")
+    assert find_package("small_arm_description", file) == arms
 
 
 def test_packages_of_the_environment(tmp_path, monkeypatch):
