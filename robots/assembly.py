@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -11,10 +11,11 @@ from numpy.typing import ArrayLike, NDArray
 
 from robots.common.config import read_config
 from robots.common.errors import InputError
-from robots.description import MOTOR_UNITS, Bounds, Geometry, Pose, Range, RobotDescription, Values
+from robots.description import MOTOR_UNITS, Bounds, Pose, Range, RobotDescription, Values
 from robots.description_notes import assumed_in_urdf, assumed_limits, require_stops, unknown_masses, urdf_notes
 from robots.geometry.chain import Chain, LinkPlace, homogeneous, rotation_from_rpy
-from robots.geometry.dh import DhRow, chain_from_dh, dh_frames
+from robots.geometry.dh import Convention, DhRow, chain_from_dh, dh_frames
+from robots.geometry.dh_tables import table_notes, table_rows
 from robots.geometry.inertia import SIZE, check_body, inertial_parameters, symmetric
 from robots.geometry.urdf import read_urdf
 from robots.geometry.urdf_selection import Choice, digest_of
@@ -108,10 +109,11 @@ def robot_from_yaml(
         if chosen:
             problem = "the robot is a Denavit-Hartenberg table, so tip, joints and locked do not apply"
             raise InputError(problem, file=path, remedy="remove tip, joints and locked")
-        chain = _chain(text, text.geometry)
+        convention, rows = text.geometry.convention, table_rows(text.geometry, str(path))
+        chain = _chain(text, rows, convention)
         entries = PerJoint(str(path), chain, chain.names)
         inertia, friction, limits = np.full((chain.n, SIZE), np.nan), None, None
-        frames = dh_frames(_rows(text.geometry), text.geometry.convention)
+        frames, notes = dh_frames(rows, convention), table_notes(rows, convention)
         digest = digest_of(content)
     elif text.mjcf is not None:
         own: Choice = (text.tip, text.joints, text.locked)
@@ -187,18 +189,10 @@ def _pose(pose: Pose | None) -> Array | None:
     return None if pose is None else homogeneous(rotation_from_rpy(pose.rpy), pose.xyz)
 
 
-def _rows(geometry: Geometry) -> list[DhRow]:
-    turn: Callable[[float], float] = (lambda x: float(np.deg2rad(x))) if geometry.angles == "deg" else float
-    return [
-        DhRow(kind=row.kind, alpha=turn(row.alpha), a=row.a, d=row.d, offset=turn(row.offset), name=row.name)
-        for row in geometry.joints
-    ]
-
-
-def _chain(text: RobotDescription, geometry: Geometry) -> Chain:
+def _chain(text: RobotDescription, rows: Sequence[DhRow], convention: Convention) -> Chain:
     return chain_from_dh(
-        _rows(geometry),
-        geometry.convention,
+        rows,
+        convention,
         base=_pose(text.base),
         flange=_pose(text.flange),
         gravity=(0.0, 0.0, -9.81) if text.gravity is None else text.gravity,

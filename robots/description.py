@@ -103,7 +103,7 @@ class Pose(Config):
 
 
 class DhJoint(Sourced):
-    """One row of a Denavit-Hartenberg table: lengths in m, angles in the unit of the geometry."""
+    """One row of a Denavit-Hartenberg table: lengths and angles in the units of the geometry."""
 
     name: str | None = None
     kind: Literal["revolute", "prismatic"] = "revolute"
@@ -114,10 +114,11 @@ class DhJoint(Sourced):
 
 
 class Geometry(Config):
-    """A Denavit-Hartenberg table, its convention and the unit of its angles."""
+    """A Denavit-Hartenberg table, its convention and the units of its angles and lengths."""
 
     convention: Literal["modified", "standard"]
     angles: Literal["deg", "rad"] = "rad"
+    lengths: Literal["m", "mm"] = "m"
     joints: Annotated[list[DhJoint], Field(min_length=1)]
 
 
