@@ -135,6 +135,12 @@ class Robot:
         """Joint names from the base to the flange."""
         return self.chain.names
 
+    @property
+    def endless(self) -> NDArray[np.bool_]:
+        """Which joints turn without end (n,): those that turn and have no position limit."""
+        free = ~(np.isfinite(self.limits.lower) | np.isfinite(self.limits.upper))
+        return np.asarray(free & (np.array(self.chain.kinds) == "revolute"))
+
     def under(self, gravity: ArrayLike | None) -> Robot:
         """Gives the robot on a base that stands otherwise, the same object for the same gravity.
 
