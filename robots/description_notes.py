@@ -15,7 +15,10 @@ from robots.limits import ACCELERATION_PER_VELOCITY, JERK_PER_ACCELERATION, Limi
 
 Array = NDArray[np.float64]
 
-MASSES = "Simulation and torque limits need them: state them under dynamics.links of a robot YAML"
+MASSES = (
+    "Simulation and torque limits need them: state them under dynamics.links of a robot YAML, or take those of a usual "
+    "arm (--assume-masses KG, its rated payload)"
+)
 """What needs masses, and how to state them."""
 
 # Sum of the distances between joints that no arm has [m].

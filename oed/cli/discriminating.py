@@ -24,6 +24,7 @@ APPLY = {
     "joints",
     "lock",
     "unlimited",
+    "assume_masses",
     "png",
     "force",
     "json",

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from robots.common.errors import InputError
+from robots.description_notes import MASSES
 from robots.plants.effects import PlantEffect
 from robots.plants.heat import PlantHeat, Warmth, heat_piece, reference_friction
 from robots.plants.sensors import Sensors
@@ -58,10 +59,13 @@ class Plant:
             raise InputError(f"{parameters.shape} plant parameters", allowed=f"({self.model.size},)")
         if not np.isfinite(parameters).all():
             missing = self.model.columns[int(np.argmin(np.isfinite(parameters)))]
+            masses = missing.term == "rigid_body"
             raise InputError(
                 f"the plant has no value for {missing.name}",
                 joint=missing.joint,
-                remedy="state it in the robot's description or in the plant file",
+                remedy=f"the description states no masses there. {MASSES}"
+                if masses
+                else "state it in the robot's description or in the plant file",
             )
         parameters.flags.writeable = False
         object.__setattr__(self, "parameters", parameters)
@@ -194,4 +198,5 @@ def simulate(plant: Plant, motion: Motion, *, seed: int = 0, warmth: Warmth | No
         temperature=now.at(motion.t) if now is not None and seen == "all" else None,
         ambient=np.full(len(motion), plant.heat.ambient) if plant.heat is not None and seen != "none" else None,
         name=f"virtual {plant.robot.name}",
+        metadata={"assumed": list(plant.robot.assumed)} if plant.robot.assumed else {},
     )

@@ -10,6 +10,7 @@ import typer
 from oed.cli.console import Console
 from oed.cli.options import (
     ROBOT,
+    AssumeMassesOption,
     ForceOption,
     JointsOption,
     JsonOption,
@@ -68,6 +69,7 @@ def simulate(
     tip: TipOption = None,
     joints: JointsOption = None,
     lock: LockOption = None,
+    assume_masses: AssumeMassesOption = None,
     force: ForceOption = False,
     json: JsonOption = False,
     quiet: QuietOption = False,
@@ -97,7 +99,7 @@ def simulate(
             raise typer.BadParameter("--model takes the place of --plant and needs a --trajectory", ctx=context)
         if payload is not None and campaign is not None:
             raise typer.BadParameter("--payload needs a --trajectory", ctx=context)
-        given = robot_from(robot, tip, joints, lock) if robot else None
+        given = robot_from(robot, tip, joints, lock, assume_masses=assume_masses) if robot else None
         if campaign is not None:
             planned = Campaign.load(campaign, given)
             folder = out or Path("logs")
@@ -118,7 +120,7 @@ def simulate(
             target = out or Path("log.csv")
             progress.start("simulating", None)
             named = str(metadata.get("robot") or "")
-            described = given or (robot_from(named, tip, joints, lock) if named else None)
+            described = given or (robot_from(named, tip, joints, lock, assume_masses=assume_masses) if named else None)
             if model is not None:
                 from estimation import load_model
                 from estimation.predictions.virtual_robot import virtual_robot
@@ -135,6 +137,12 @@ def simulate(
                 virtual = replace(virtual, parameters=loaded)
             log = run(virtual, motion, seed=seed)
             write_log(target, log, force=force, kinds=described.chain.kinds)
-            data = {"file": str(target), "samples": len(log), "duration": log.duration, "robot": described.name}
+            data = {
+                "file": str(target),
+                "samples": len(log),
+                "duration": log.duration,
+                "robot": described.name,
+                "assumed": list(described.assumed),
+            }
             size = f"{len(log)} samples, {log.duration:.1f} s"
     console.result(f"{size} of a virtual {data['robot']} written to {target}", data)
