@@ -78,9 +78,6 @@ class UrdfTree:
             if name not in self.links:
                 problem = f"the {role} link {name!r} does not exist"
                 raise InputError(problem, file=self.file, joint=joint.name, remedy=nearest(name, self.links))
-        if joint.mimic is not None and joint.mimic[0] not in self.joints:
-            problem = f"it mimics the joint {joint.mimic[0]!r}, which does not exist"
-            raise InputError(problem, file=self.file, joint=joint.name, remedy=nearest(joint.mimic[0], self.joints))
         first = self.parent_joint.get(joint.child)
         if first is not None:
             raise InputError(
@@ -196,9 +193,11 @@ class UrdfTree:
             *self._body_notes(chain, lumped),
             *self._held_notes(held),
             *(
-                f"joint {joint.name} mimics the moving joint {joint.mimic[0]}; it is treated as locked"
+                f"joint {joint.name} mimics {'the moving joint' if joint.mimic[0] in moving else 'the unknown joint'} "
+                f"{joint.mimic[0]}; it is treated as locked"
                 for joint in self.joints.values()
-                if joint.mimic is not None and joint.mimic[0] in moving and joint.name not in selection.locked
+                if joint.mimic is not None and joint.name not in selection.locked
+                if joint.mimic[0] in moving or joint.mimic[0] not in self.joints
             ),
         ]
         return UrdfChain(chain, limits_of(bounds), inertia, chain.names, unlimited, tuple(notes), tuple(places))
@@ -223,7 +222,7 @@ class UrdfTree:
         leader, multiplier, offset = joint.mimic
         if leader in seen or leader == joint.name:
             raise InputError("it mimics itself, directly or through other joints", file=self.file, joint=joint.name)
-        if any(leader == moving.name for moving in selection.moving):
+        if leader not in self.joints or any(leader == moving.name for moving in selection.moving):
             return offset
         return multiplier * self._locked_value(self.joints[leader], selection, (*seen, joint.name)) + offset
 

@@ -93,10 +93,10 @@ def _link(element: ElementTree.Element, file: str) -> UrdfLink:
     if inertial is None:
         return UrdfLink(name=name)
     mass_element, inertia_element = read.child(inertial, "mass"), read.child(inertial, "inertia")
-    if mass_element is None or inertia_element is None:
-        raise read.error(f"<inertial> has no <{'mass' if mass_element is None else 'inertia'}>")
-    mass = read.number(mass_element, "value")
-    six = [read.number(inertia_element, key) for key in ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")]
+    mass = np.nan if mass_element is None else read.number(mass_element, "value")
+    # Without <inertia> it is a point mass: cameras and fingers often have only a mass.
+    keys = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
+    six = [0.0 if inertia_element is None else read.number(inertia_element, key) for key in keys]
     pose = read.placement(inertial)
     rotation = pose[:3, :3]
     inertia = rotation @ symmetric(six) @ rotation.T

@@ -20,6 +20,8 @@ SUFFIXES = (".urdf", ".xacro")
 
 _ARGUMENTS = re.compile(r"(?:\s+[A-Za-z_]\w*:=\S*)+\s*$")
 _UNDEFINED = re.compile(r"Undefined substitution argument (\w+)")
+_PREFIX = re.compile(rb"[<\s]([A-Za-z_][\w.-]*):[A-Za-z_]")
+_ROOT = re.compile(rb"<robot\b")
 _COLOUR = re.compile(r"\x1b\[[0-9;]*m")
 
 
@@ -59,7 +61,19 @@ def urdf_bytes(source: str | Path) -> bytes:
         return _expanded(existing_file(path), arguments)
     if arguments:
         raise InputError(f"arguments {', '.join(arguments)} of a file that is no xacro", file=path, allowed=".xacro")
-    return existing_file(path).read_bytes()
+    return _with_declared_prefixes(existing_file(path).read_bytes())
+
+
+def _with_declared_prefixes(content: bytes) -> bytes:
+    """Declares prefixes that a file uses and does not declare: the parser of ROS knows no name spaces."""
+    try:
+        ElementTree.fromstring(content)
+    except ElementTree.ParseError as error:
+        if "unbound prefix" in str(error):
+            lacking = {name for name in _PREFIX.findall(content) if b"xmlns:" + name + b"=" not in content}
+            declared = b"".join(b" xmlns:" + name + b'="' + name + b'"' for name in sorted(lacking - {b"xacro"}))
+            return _ROOT.sub(lambda match: match[0] + declared, content, count=1)
+    return content
 
 
 def _expanded(path: Path, arguments: dict[str, str]) -> bytes:
@@ -137,7 +151,8 @@ def find_package(name: str, beside: Path) -> Path:
         raise InputError(
             f"the package {name!r} was not found: no package.xml and no folder around the file has that name",
             file=beside,
-            remedy="put the package beside this one, or set ROS_PACKAGE_PATH to the folder above it",
+            remedy="put it beside this package, with its package.xml or in a folder of that name, or set "
+            "ROS_PACKAGE_PATH to the folder above it",
         )
     return found
 

@@ -79,7 +79,8 @@ def test_a_missing_package_is_named_once(xacro, tmp_path):
         load_robot(top)
     assert str(caught.value) == (
         f"{top}: the package 'parts' was not found: no package.xml and no folder around the file has that name; "
-        "put the package beside this one, or set ROS_PACKAGE_PATH to the folder above it"
+        "put it beside this package, with its package.xml or in a folder of that name, or set ROS_PACKAGE_PATH to the "
+        "folder above it"
     )
 
 
