@@ -12,14 +12,9 @@ from robots.common.errors import InputError
 from robots.geometry.chain import Kind
 from robots.geometry.urdf import UrdfChain
 from robots.limits import ACCELERATION_PER_VELOCITY, JERK_PER_ACCELERATION, Limits
+from robots.robot import MASSES_REMEDY
 
 Array = NDArray[np.float64]
-
-MASSES = (
-    "Simulation and torque limits need them: state them under dynamics.links of a robot YAML, or take those of a usual "
-    "arm (--assume-masses KG, its rated payload)"
-)
-"""What needs masses, and how to state them."""
 
 # Sum of the distances between joints that no arm has [m].
 FAR = 50.0
@@ -117,7 +112,7 @@ def unknown_masses(inertia: Array, names: Sequence[str]) -> tuple[str, ...]:
     which = "all links" if len(joints) == len(names) else f"the links that {', '.join(joints)} move"
     return (
         f"the masses of {which} are not stated, so they are unknown; design, check, identify, payload and diagnose "
-        f"need none. {MASSES}",
+        f"need none. Simulation and torque limits need them: {MASSES_REMEDY}",
     )
 
 

@@ -14,6 +14,9 @@ from robots.limits import Limits
 
 Array = NDArray[np.float64]
 
+MASSES_REMEDY = "state them under dynamics.links of a robot YAML, or assume usual ones (--assume-masses KG of payload)"
+"""What to do where masses are unknown."""
+
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Robot:

@@ -126,7 +126,7 @@ def _dynamics(
 ) -> tuple[Callable[[Array, Array, Array], Array] | None, Callable[[Array], Array] | None]:
     """The nominal torque without and of friction, or nothing where the robot's description does not give it."""
     robot = model.robot
-    if not (np.isfinite(model.nominal).all() and np.isfinite(robot.limits.torque).any()):
+    if not (model.described and np.isfinite(robot.limits.torque).any()):
         return None, None
     smooth = TorqueModel(robot, tuple(term for term in model.terms if not isinstance(term, FrictionTerm)))
     friction = TorqueModel(robot, tuple(term for term in model.terms if isinstance(term, FrictionTerm)))

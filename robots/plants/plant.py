@@ -11,7 +11,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from robots.common.errors import InputError
-from robots.description_notes import MASSES
 from robots.plants.effects import PlantEffect
 from robots.plants.heat import PlantHeat, Warmth, heat_piece, reference_friction
 from robots.plants.sensors import Sensors
@@ -59,13 +58,10 @@ class Plant:
             raise InputError(f"{parameters.shape} plant parameters", allowed=f"({self.model.size},)")
         if not np.isfinite(parameters).all():
             missing = self.model.columns[int(np.argmin(np.isfinite(parameters)))]
-            masses = missing.term == "rigid_body"
             raise InputError(
                 f"the plant has no value for {missing.name}",
                 joint=missing.joint,
-                remedy=f"the description states no masses there. {MASSES}"
-                if masses
-                else "state it in the robot's description or in the plant file",
+                remedy="state it in the robot's description or in the plant file",
             )
         parameters.flags.writeable = False
         object.__setattr__(self, "parameters", parameters)
@@ -157,6 +153,8 @@ def nominal_plant(
                 allowed=f"such as {', '.join(near or model.names[:3])}",
             )
         parameters[model.names.index(name)] = value
+    if not np.isfinite(parameters).all():
+        model.require_description("a virtual robot")
     return Plant(model=model, parameters=parameters, sensors=sensors or Sensors(), effects=effects)
 
 

@@ -58,7 +58,7 @@ def test_an_arm_without_masses_is_designed_for_and_identified(run, tmp_path):
         "simulate", "--robot", path, "--trajectory", tmp_path / "d" / "trajectory.csv", "--out", tmp_path / "s.csv"
     )
     assert done.code == 2
-    assert "the description states no masses there" in done.err
+    assert "joint 1: a virtual robot needs masses, which the description of nomass does not state" in done.err
     assert "--assume-masses KG" in done.err
 
 
