@@ -20,6 +20,8 @@ from robots.limits import Limits
 
 Array = NDArray[np.float64]
 
+_FEW = 3  # links of equal mass are common in pendulums, and in no arm
+
 
 class UrdfChain(NamedTuple):
     """A chain taken from a URDF: ``inertia`` is (n, 10) about the link frames, everything locked lumped in.
@@ -255,6 +257,9 @@ class UrdfTree:
         if massless:
             has = "link {} has" if len(massless) == 1 else "links {} have"
             notes.append(f"{has.format(', '.join(massless))} an inertia but no mass: it is not used")
+        masses = [link.mass for link in links if link.mass > 0]
+        if len(masses) > _FEW and len(set(masses)) == 1:
+            notes.append(f"all {len(masses)} links with a mass have {masses[0]:g} kg: it may stand for unknown masses")
         return notes + [
             f"link {link.name} has {doubt}"
             for link in links

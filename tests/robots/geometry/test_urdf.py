@@ -90,6 +90,16 @@ def test_a_finger_that_mimics_an_unknown_joint_is_locked(write_urdf):
     assert "joint f2 mimics the unknown joint j9; it is treated as locked" in taken.notes
 
 
+@pytest.mark.parametrize(("count", "named"), [(3, False), (4, True)])
+def test_equal_masses_of_all_links_are_doubted(count, named, write_urdf):
+    """Four links or more of one mass, as exporters fill them in, have a note; the masses count all the same."""
+    body = link("l0") + "".join(link(f"l{i}") + joint(f"j{i}", f"l{i - 1}", f"l{i}") for i in range(1, count + 1))
+    taken = read_urdf(write_urdf(body)).chain()
+    note = f"all {count} links with a mass have 1 kg: it may stand for unknown masses"
+    assert (note in taken.notes) == named
+    np.testing.assert_array_equal(taken.inertia[:, 0], np.ones(count))
+
+
 def test_undeclared_prefixes_are_read_past(write_urdf):
     """Elements with a prefix that is nowhere declared, which ROS accepts, are not used; the arm is read."""
     plain = read_urdf(write_urdf(ARM)).chain()
