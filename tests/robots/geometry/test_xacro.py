@@ -9,6 +9,7 @@ import pytest
 
 from robots.common.errors import InputError
 from robots.geometry.urdf import read_urdf
+from robots.geometry.urdf_shapes import UrdfShape, mesh_file
 from robots.geometry.xacro_ import find_package, split_arguments
 from robots.loading import load_robot
 
@@ -160,3 +161,31 @@ def test_arguments_are_distinguished_from_the_path():
         {"a": "1", "b_c": "x/y"},
     )
     assert split_arguments("C:\\arms\\a.urdf")[1] == {}
+
+
+@pytest.mark.parametrize(
+    ("file", "found"),
+    [
+        ("package://vendor_arm/meshes/a.stl", True),  # by the name in package.xml
+        ("package:///vendor_arm/meshes/a.stl", True),
+        ("model://vendor_arm/meshes/a.stl", True),
+        ("package://copy_of_the_arm/meshes/a.stl", True),  # by the folder's name
+        ("package://lost_arm/meshes/a.stl", True),  # the folder above the URDF has the rest of the path
+        ("package://lost_arm/meshes/b.stl", False),
+        ("../meshes/a.stl", True),
+    ],
+)
+def test_meshes_are_found(file, found, tmp_path):
+    """A mesh is found by its package's name, in package.xml or of the folder, or beside the URDF."""
+    package = tmp_path / "copy_of_the_arm"
+    for folder in ("urdf", "meshes"):
+        (package / folder).mkdir(parents=True)
+    (package / "package.xml").write_text("<package><name>vendor_arm</name></package>")
+    mesh, urdf = package / "meshes" / "a.stl", package / "urdf" / "arm.urdf"
+    mesh.touch()
+    shape = UrdfShape(link="l", kind="mesh", pose=np.eye(4), file=file)
+    if found:
+        assert mesh_file(shape, urdf).resolve() == mesh.resolve()
+    else:
+        with pytest.raises(InputError, match="the package 'lost_arm' was not found"):
+            mesh_file(shape, urdf)
