@@ -100,7 +100,6 @@ def mesh_file(shape: UrdfShape, source: str | Path) -> Path:
 
     Args:
         shape: a mesh; ``package://PACKAGE/...``, ``model://MODEL/...``, ``file://...``, or a path relative to the URDF.
-            A package that is not found is the folder above the URDF that has the rest of the path.
         source: the URDF or xacro file.
 
     Raises:
@@ -110,14 +109,7 @@ def mesh_file(shape: UrdfShape, source: str | Path) -> Path:
     scheme, found, place = shape.file.partition("://")
     if found and scheme in ("package", "model"):
         package, _, inner = place.lstrip("/").partition("/")
-        own = next((folder / inner for folder in urdf.resolve().parents if (folder / inner).is_file()), None)
-        try:
-            path = find_package(package, urdf) / inner
-        except InputError:
-            if own is None:
-                raise
-            # Copies of a vendor's package have other names.
-            path = own
+        path = find_package(package, urdf, inner) / inner
     else:
         path = urdf.parent / shape.file.removeprefix("file://")
     if not path.is_file():

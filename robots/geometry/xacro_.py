@@ -86,7 +86,7 @@ def _expanded(path: Path, arguments: dict[str, str]) -> bytes:
     heard = io.StringIO()
     lost: list[InputError] = []
     try:
-        with contextlib.redirect_stderr(heard), _packages_from(path, substitution, lost):
+        with contextlib.redirect_stderr(heard), _packages_from(xacro, path, substitution, lost):
             xacro.init_stacks(str(path))
             document = xacro.parse(None, str(path))
             xacro.process_doc(document, mappings=dict(arguments), verbosity=0)
@@ -108,12 +108,14 @@ def _expanded(path: Path, arguments: dict[str, str]) -> bytes:
 
 
 @contextlib.contextmanager
-def _packages_from(path: Path, substitution: Any, lost: list[InputError]) -> Iterator[None]:
+def _packages_from(xacro: Any, path: Path, substitution: Any, lost: list[InputError]) -> Iterator[None]:
     """Lets ``$(find PACKAGE)`` find packages around a file, where ROS is not installed; others are ``lost``."""
 
     def find(name: str) -> str:
+        current = Path(xacro.filestack[-1]) if xacro.filestack else path
+        wanted = re.search(rf"\$\(find\s+{re.escape(name)}\)/([^\"'$<>]+)", current.read_text("utf-8", "replace"))
         try:
-            return str(find_package(name, path))
+            return str(find_package(name, path, wanted[1] if wanted else None))
         except InputError as error:
             lost.append(error)
             raise
@@ -126,27 +128,30 @@ def _packages_from(path: Path, substitution: Any, lost: list[InputError]) -> Ite
         substitution._eval_find, substitution._eval_dict["find"] = before
 
 
-def find_package(name: str, beside: Path) -> Path:
+def find_package(name: str, beside: Path, inner: str | None = None) -> Path:
     """Finds the folder of a ROS package.
 
     It is a folder above the file, one beside such a folder, or one below ``ROS_PACKAGE_PATH`` or
-    ``AMENT_PREFIX_PATH``. Its ``package.xml`` has the name, whatever the folder's is; else the folder has it.
+    ``AMENT_PREFIX_PATH``. Its ``package.xml`` has the name, whatever the folder's is; else the folder has it. Else it
+    is the folder above the file that holds what is wanted of the package: copies of packages have other names.
 
     Args:
         name: of the package.
         beside: a file in the same workspace.
+        inner: path of the file that is wanted, in the package.
 
     Raises:
         InputError: it is not found.
     """
     above = beside.resolve().parents
     roots = [folder for folder in above if folder != folder.parent]
-    for variable, inner in (("ROS_PACKAGE_PATH", ""), ("AMENT_PREFIX_PATH", "share")):
-        roots += [Path(root) / inner for root in os.environ.get(variable, "").split(os.pathsep) if root]
+    for variable, share in (("ROS_PACKAGE_PATH", ""), ("AMENT_PREFIX_PATH", "share")):
+        roots += [Path(root) / share for root in os.environ.get(variable, "").split(os.pathsep) if root]
     found = next((folder for root in roots for folder in _packages(root) if _package_name(folder) == name), None)
     # Many packages are copied to other machines without their package.xml, or state another spelling in it.
     named = (folder for root in roots for folder in (root, root / name) if folder.name == name and folder.is_dir())
-    found = found or next(named, None)
+    held = (folder for folder in above if inner and (folder / inner).is_file())
+    found = found or next(named, None) or next(held, None)
     if found is None:
         raise InputError(
             f"the package {name!r} was not found: no package.xml and no folder around the file has that name",

@@ -85,6 +85,13 @@ def test_a_missing_package_is_named_once(xacro, tmp_path):
     )
 
 
+def test_a_copied_package_is_the_one_around_the_file(xacro, tmp_path):
+    """Vendors' packages are copied under other names, without package.xml: its own parts are found all the same."""
+    write(tmp_path / "kr10" / "urdf" / "arm_macro.xacro", MACRO)
+    body = '<xacro:include filename="$(find vendor_kr10_support)/urdf/arm_macro.xacro"/>' + CALL
+    assert load_robot(write(tmp_path / "kr10" / "urdf" / "arm.xacro", body)).joint_names == ("j_a",)
+
+
 def test_packages_of_other_repositories(tmp_path):
     """A workspace holds repositories, and these hold packages: one of another repository is found."""
     file = tmp_path / "src" / "cell" / "cell_description" / "urdf" / "cell.urdf"
