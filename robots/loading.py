@@ -55,7 +55,8 @@ def load_robot(
         unlimited: of a URDF, whether revolute and prismatic joints may lack position limits. They are 0 by default in
             a URDF, which no experiment can be designed for.
         assume_masses: rated payload [kg]. Links whose masses are not known get those of a usual arm of this payload and
-            the robot's size (`usual_masses`); `Robot.assumed` says so.
+            the robot's size (`usual_masses`); `Robot.assumed` says so. They are for simulations and designs: identify
+            with the robot as it is described.
 
     Returns:
         The robot.

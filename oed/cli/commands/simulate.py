@@ -89,6 +89,7 @@ def simulate(
         from oed.campaigns import Campaign, record
         from oed.exports import read_trajectory
         from robots.common.errors import InputError
+        from robots.loading import load_robot
         from robots.plants import load_plant, nominal_plant
         from robots.plants import simulate as run
         from robots.terms.situations.flange_body import with_body
@@ -102,6 +103,8 @@ def simulate(
         given = robot_from(robot, tip, joints, lock, assume_masses=assume_masses) if robot else None
         if campaign is not None:
             planned = Campaign.load(campaign, given)
+            if given is None and assume_masses is not None:
+                planned = replace(planned, robot=load_robot(planned.robot, assume_masses=assume_masses))
             folder = out or Path("logs")
             played = load_plant(plant, planned.robot) if plant else None
             files = record(planned, folder, plant=played, seed=seed, force=force, progress=progress)
@@ -111,6 +114,7 @@ def simulate(
                 "samples": planned.samples,
                 "duration": planned.duration,
                 "robot": planned.robot.name,
+                "assumed": list(planned.robot.assumed),
             }
             size = f"{len(files)} logs, {planned.samples} samples, {planned.duration / 60:.1f} min"
             target = folder
