@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import hashlib
-import json
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -13,19 +11,20 @@ from numpy.typing import ArrayLike, NDArray
 
 from robots.common.config import read_config
 from robots.common.errors import InputError
-from robots.description import MOTOR_UNITS, Bounds, Geometry, Pose, Range, RobotDescription, Values
-from robots.description_notes import assumed_in_urdf, assumed_limits, require_stops, urdf_notes
+from robots.description import MOTOR_UNITS, Bounds, Pose, Range, RobotDescription, Values
+from robots.description_notes import assumed_in_urdf, assumed_limits, require_stops, unknown_masses, urdf_notes
 from robots.geometry.chain import Chain, LinkPlace, homogeneous, rotation_from_rpy
-from robots.geometry.dh import DhRow, chain_from_dh, dh_frames
+from robots.geometry.dh import Convention, DhRow, chain_from_dh, dh_frames
+from robots.geometry.dh_tables import table_notes, table_rows
 from robots.geometry.inertia import SIZE, check_body, inertial_parameters, symmetric
 from robots.geometry.urdf import read_urdf
+from robots.geometry.urdf_selection import Choice, digest_of
 from robots.limits import Limits
 from robots.mujoco_models import robot_from_mjcf
 from robots.per_joint import PerJoint
 from robots.robot import Robot
 
 Array = NDArray[np.float64]
-Choice = tuple[str | None, Sequence[str] | None, Mapping[str, float] | None]  # tip, joints, locked
 
 
 def robot_from_urdf(
@@ -61,12 +60,16 @@ def robot_from_urdf(
         limits=taken.limits,
         inertia=taken.inertia,
         friction=friction,
-        notes=(*urdf_notes(taken, tree.unused), *assumed_in_urdf(taken, friction, tree.root)),
+        notes=(
+            *urdf_notes(taken, tree.unused),
+            *unknown_masses(taken.inertia, taken.names),
+            *assumed_in_urdf(taken, friction, tree.root),
+        ),
         origin=str(path),
         urdf=str(path),
         links=taken.links,
         # A choice of joints makes another robot of the same file; without one the digest is the file's own.
-        digest=_digest(tree.digest, (tip, joints, locked)) if chosen else tree.digest,
+        digest=digest_of(tree.digest, (tip, joints, locked)) if chosen else tree.digest,
     )
 
 
@@ -101,14 +104,17 @@ def robot_from_yaml(
     links: tuple[LinkPlace, ...] = ()
     urdf, mjcf = "", ""
     rotor: Array = np.zeros(())
+    frames: Array | None = None
     if text.geometry is not None:
         if chosen:
             problem = "the robot is a Denavit-Hartenberg table, so tip, joints and locked do not apply"
             raise InputError(problem, file=path, remedy="remove tip, joints and locked")
-        chain = _chain(text, text.geometry)
+        convention, rows = text.geometry.convention, table_rows(text.geometry, str(path))
+        chain = _chain(text, rows, convention)
         entries = PerJoint(str(path), chain, chain.names)
-        inertia, friction, limits = _inertia(text, text.geometry, str(path)), None, None
-        digest = _digest(content)
+        inertia, friction, limits = np.full((chain.n, SIZE), np.nan), None, None
+        frames, notes = dh_frames(rows, convention), table_notes(rows, convention)
+        digest = digest_of(content)
     elif text.mjcf is not None:
         own: Choice = (text.tip, text.joints, text.locked)
         choice = _override(text, tip, joints, locked) if chosen else own
@@ -118,7 +124,7 @@ def robot_from_yaml(
         friction, rotor = found.friction, found.rotor_inertia
         names = robot_from_mjcf(file, *own, free, alone=False).joint_names if chosen else found.joint_names
         entries = PerJoint(str(path), chain, names)
-        notes, links, mjcf, digest = found.notes, found.links, found.mjcf, _digest(content, found.digest)
+        notes, links, mjcf, digest = found.notes, found.links, found.mjcf, digest_of(content, found.digest)
     else:
         tree = read_urdf(path.parent / (text.urdf or ""))
         own = (text.tip, text.joints, text.locked)
@@ -127,13 +133,15 @@ def robot_from_yaml(
         chain, limits, inertia, names = _at_gravity(taken.chain, text), taken.limits, taken.inertia, taken.names
         entries = PerJoint(str(path), chain, tree.chain(*own).names if chosen else names)
         friction = tree.friction(names)
-        digest = _digest(content, tree.digest, *([choice] if chosen else []))
+        digest = digest_of(content, tree.digest, *([choice] if chosen else []))
         known = entries.names if text.limits.position is not None else ()
         taken = taken._replace(unlimited=tuple(name for name in taken.unlimited if name not in known))
         require_stops(taken.unlimited, unlimited, tree.file)
         notes, links, urdf = urdf_notes(taken, tree.unused), taken.links, tree.file
     ratio, rotor, constant, speed = _drives(text, entries, rotor)
     bounds = _limits(text, entries, limits)
+    inertia = _inertia(text, entries, inertia, frames)
+    notes = (*notes, *unknown_masses(inertia, chain.names))
     if assumed := assumed_limits(bounds, chain.kinds):
         notes = (*notes, f"assumed, because the robot file does not state it: {', '.join(assumed)}")
     return Robot(
@@ -160,18 +168,6 @@ def robot_from_yaml(
     )
 
 
-def _digest(*parts: bytes | str | Choice) -> str:
-    sha = hashlib.sha256()
-    for part in parts:
-        if isinstance(part, tuple):
-            tip, joints, locked = part
-            part = json.dumps(
-                [tip, list(joints or []), {k: float(v) for k, v in (locked or {}).items()}], sort_keys=True
-            )
-        sha.update(part if isinstance(part, bytes) else part.encode())
-    return sha.hexdigest()
-
-
 def _override(
     text: RobotDescription, tip: str | None, joints: Sequence[str] | None, locked: Mapping[str, float] | None
 ) -> Choice:
@@ -193,36 +189,32 @@ def _pose(pose: Pose | None) -> Array | None:
     return None if pose is None else homogeneous(rotation_from_rpy(pose.rpy), pose.xyz)
 
 
-def _rows(geometry: Geometry) -> list[DhRow]:
-    turn: Callable[[float], float] = (lambda x: float(np.deg2rad(x))) if geometry.angles == "deg" else float
-    return [
-        DhRow(kind=row.kind, alpha=turn(row.alpha), a=row.a, d=row.d, offset=turn(row.offset), name=row.name)
-        for row in geometry.joints
-    ]
-
-
-def _chain(text: RobotDescription, geometry: Geometry) -> Chain:
+def _chain(text: RobotDescription, rows: Sequence[DhRow], convention: Convention) -> Chain:
     return chain_from_dh(
-        _rows(geometry),
-        geometry.convention,
+        rows,
+        convention,
         base=_pose(text.base),
         flange=_pose(text.flange),
         gravity=(0.0, 0.0, -9.81) if text.gravity is None else text.gravity,
     )
 
 
-def _inertia(text: RobotDescription, geometry: Geometry, file: str) -> Array:
-    links = text.dynamics.links
-    n = len(geometry.joints)
+def _inertia(text: RobotDescription, entries: PerJoint, known: Array, frames: Array | None) -> Array:
+    """Inertial parameters (n, 10): those of the YAML in its frames (n, 4, 4) of the links, else the known ones."""
+    links, n = text.dynamics.links, len(entries.names)
     if links is None:
-        return np.full((n, SIZE), np.nan)
+        return known
     if len(links) != n:
-        raise InputError(f"{len(links)} links", file=file, column="dynamics.links", allowed=f"{n}, one per joint")
-    inertia = np.empty((n, SIZE))
-    for i, (link, frame) in enumerate(zip(links, dh_frames(_rows(geometry), geometry.convention), strict=True)):
+        allowed = f"{n}, one per joint; null where unknown"
+        raise InputError(f"{len(links)} links", file=entries.file, column="dynamics.links", allowed=allowed)
+    inertia = np.array(known)
+    for i, (name, link) in enumerate(zip(entries.names, links, strict=True)):
+        if link is None or name not in entries.chain.names:
+            continue
         about_com = symmetric(link.inertia_at_com)
-        check_body(link.mass, about_com, f"dynamics.links[{i + 1}]", file=file)
-        inertia[i] = inertial_parameters(link.mass, link.com, about_com, frame)
+        check_body(link.mass, about_com, f"dynamics.links[{i + 1}]", file=entries.file)
+        frame = np.eye(4) if frames is None else frames[i]
+        inertia[entries.chain.names.index(name)] = inertial_parameters(link.mass, link.com, about_com, frame)
     return inertia
 
 

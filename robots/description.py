@@ -103,7 +103,7 @@ class Pose(Config):
 
 
 class DhJoint(Sourced):
-    """One row of a Denavit-Hartenberg table: lengths in m, angles in the unit of the geometry."""
+    """One row of a Denavit-Hartenberg table: lengths and angles in the units of the geometry."""
 
     name: str | None = None
     kind: Literal["revolute", "prismatic"] = "revolute"
@@ -114,15 +114,19 @@ class DhJoint(Sourced):
 
 
 class Geometry(Config):
-    """A Denavit-Hartenberg table, its convention and the unit of its angles."""
+    """A Denavit-Hartenberg table, its convention and the units of its angles and lengths."""
 
     convention: Literal["modified", "standard"]
     angles: Literal["deg", "rad"] = "rad"
+    lengths: Literal["m", "mm"] = "m"
     joints: Annotated[list[DhJoint], Field(min_length=1)]
 
 
 class LinkDescription(Sourced):
-    """One link: mass [kg], centre of mass [m] and inertia about it [kg m2] (Ixx Ixy Ixz Iyy Iyz Izz), in DH frame i."""
+    """One link: mass [kg], centre of mass [m] and inertia about it [kg m2] (Ixx Ixy Ixz Iyy Iyz Izz).
+
+    They are in DH frame i, and with a URDF or MJCF in the frame of the joint that moves the link.
+    """
 
     mass: Finite
     com: Three
@@ -148,9 +152,9 @@ class Drives(Config):
 
 
 class Dynamics(Config):
-    """Nominal dynamics."""
+    """Nominal dynamics; a link of null is unknown, or as the URDF or MJCF states it."""
 
-    links: list[LinkDescription] | None = None
+    links: list[LinkDescription | None] | None = None
     drives: Drives = Drives()
     friction: FrictionDescription = FrictionDescription()
 
@@ -243,8 +247,8 @@ class RobotDescription(Config):
             raise ValueError("a robot has one of 'geometry', 'urdf' and 'mjcf'")
         if self.geometry is not None and (self.tip or self.joints or self.locked):
             raise ValueError("'tip', 'joints' and 'locked' select joints of a file; they do not apply to 'geometry'")
-        if self.geometry is None and (self.base or self.flange or self.dynamics.links):
-            raise ValueError("'base', 'flange' and 'dynamics.links' belong to 'geometry'; a URDF or MJCF contains them")
+        if self.geometry is None and (self.base or self.flange):
+            raise ValueError("'base' and 'flange' belong to 'geometry'; a URDF or MJCF contains them")
         return self
 
     def assumed(self) -> Iterator[str]:
@@ -255,7 +259,7 @@ class RobotDescription(Config):
         if self.geometry is not None and any(row.source == "assumed" for row in self.geometry.joints):
             yield "geometry"
         yield from _assumed(self.limits, "limits")
-        if any(link.source == "assumed" for link in self.dynamics.links or ()):
+        if any(link is not None and link.source == "assumed" for link in self.dynamics.links or ()):
             yield "dynamics.links"
         yield from _assumed(self.dynamics.drives, "dynamics.drives")
         yield from _assumed(self.dynamics.friction, "dynamics.friction")

@@ -6,12 +6,13 @@ from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from robots.common.errors import InputError
 from robots.geometry.chain import Kind
 from robots.geometry.urdf import UrdfChain
 from robots.limits import ACCELERATION_PER_VELOCITY, JERK_PER_ACCELERATION, Limits
+from robots.robot import MASSES_REMEDY
 
 Array = NDArray[np.float64]
 
@@ -33,12 +34,13 @@ def require_stops(names: Sequence[str], accepted: bool, file: str | Path) -> Non
     if names and not accepted:
         others = f" (nor do {', '.join(names[1:])})" if len(names) > 1 else ""
         raise InputError(
-            f"<limit> states no position limits{others}: without lower and upper, or with 0, there is no range",
+            f"<limit> states no position limits{others}: without lower and upper, or with equal ones, "
+            "there is no range",
             file=file,
             joint=names[0],
             allowed="lower below upper",
-            remedy="state them there or under limits.position of a robot YAML, make the joint continuous, "
-            "or accept unlimited positions (--unlimited; in Python unlimited=True)",
+            remedy="state them there or under limits.position of a robot YAML, make the joint continuous, lock it "
+            "(--lock), or accept unlimited positions (--unlimited; in Python unlimited=True)",
         )
 
 
@@ -76,11 +78,42 @@ def assumed_in_urdf(taken: UrdfChain, friction: Array, root: str) -> tuple[str, 
         The sentence, alone in a tuple.
     """
     parts = assumed_limits(taken.limits, taken.chain.kinds)
-    still = [name for name, row in zip(taken.names, friction, strict=True) if not row.any()]
-    if still:
-        parts.append("no friction" if len(still) == len(taken.names) else f"no friction at {', '.join(still)}")
+    parts += lacking("velocity limits", ~np.isfinite(taken.limits.velocity), taken.names)
+    parts += lacking("torque limits", ~np.isfinite(taken.limits.torque), taken.names)
+    parts += lacking("friction", ~friction.any(axis=1), taken.names)
     parts += ["no rotor inertia", "a controller period of 4 ms", f"gravity 9.81 m/s2 along -z of link {root}"]
     return (f"assumed, because the URDF does not state it: {', '.join(parts)}",)
+
+
+def lacking(quantity: str, where: ArrayLike, names: Sequence[str]) -> list[str]:
+    """Says which joints lack a quantity, in a few words; nothing where all have it.
+
+    Args:
+        quantity: in words.
+        where: the joints that lack it (n,).
+        names: of the joints.
+    """
+    without = [name for name, lacks in zip(names, np.asarray(where), strict=True) if lacks]
+    if not without:
+        return []
+    return [f"no {quantity}" if len(without) == len(names) else f"no {quantity} at {', '.join(without)}"]
+
+
+def unknown_masses(inertia: Array, names: Sequence[str]) -> tuple[str, ...]:
+    """Says of which links the masses are not known, in one sentence alone in a tuple.
+
+    Args:
+        inertia: (n, 10), a row of NaN where unknown.
+        names: of the joints.
+    """
+    joints = [name for name, row in zip(names, inertia, strict=True) if np.isnan(row).any()]
+    if not joints:
+        return ()
+    which = "all links" if len(joints) == len(names) else f"the links that {', '.join(joints)} move"
+    return (
+        f"the masses of {which} are not stated, so they are unknown; design, check, identify, payload and diagnose "
+        f"need none. Simulation and torque limits need them: {MASSES_REMEDY}",
+    )
 
 
 def assumed_limits(limits: Limits, kinds: Sequence[Kind]) -> list[str]:

@@ -71,7 +71,7 @@ class Margin:
 class Limits:
     """The bounds of n joints; infinite where there is none.
 
-    A velocity of zero can be stated: that no motion fits is for the design to say.
+    A velocity of zero can be stated: that no motion fits is for the design to say. A torque of zero cannot.
 
     Args:
         lower: lowest positions [rad], (n,).
@@ -107,6 +107,8 @@ class Limits:
                 raise InputError(f"{len(array)} values, but lower has {len(self.lower)}", column=name)
             if name not in ("lower", "upper"):
                 _reject(array < 0.0, array, name, "zero or more")
+            if name.startswith("torque"):
+                _reject(array == 0.0, array, name, "above zero, or inf where unknown (.inf in a YAML)")
             array.setflags(write=False)
             object.__setattr__(self, name, array)
         if len(self.kinds) != self.n or not set(self.kinds) <= {"revolute", "prismatic"}:
@@ -118,7 +120,6 @@ class Limits:
                 f"lower {self.lower[joint]:g} is not below upper {self.upper[joint]:g}",
                 joint=joint + 1,
                 allowed="lower < upper",
-                remedy="correct the position limits",
             )
 
     @property

@@ -9,9 +9,14 @@ from dataclasses import replace
 from difflib import get_close_matches
 from pathlib import Path
 
+import numpy as np
+
 from robots.assembly import robot_from_urdf, robot_from_yaml
-from robots.common.errors import DescriptionWarning, InputError
+from robots.common.errors import AssumedValueWarning, DescriptionWarning, InputError
 from robots.common.files import existing_file
+from robots.common.plain import joints_in_words, two_digits
+from robots.description_notes import unknown_masses
+from robots.geometry.usual_arms import usual_masses, working_reach
 from robots.geometry.xacro_ import is_description, split_arguments
 from robots.mujoco_models import is_mjcf, robot_from_mjcf
 from robots.mujoco_models.files import SUFFIXES as MJCF
@@ -37,6 +42,7 @@ def load_robot(
     joints: Sequence[str] | None = None,
     locked: Mapping[str, float] | None = None,
     unlimited: bool = False,
+    assume_masses: float | None = None,
 ) -> Robot:
     """Load a robot.
 
@@ -48,6 +54,9 @@ def load_robot(
         locked: of a URDF or MJCF, positions of locked joints [rad or m].
         unlimited: of a URDF, whether revolute and prismatic joints may lack position limits. They are 0 by default in
             a URDF, which no experiment can be designed for.
+        assume_masses: rated payload [kg]. Links whose masses are not known get those of a usual arm of this payload and
+            the robot's size (`usual_masses`); `Robot.assumed` says so. They are for simulations and designs: identify
+            with the robot as it is described.
 
     Returns:
         The robot.
@@ -59,11 +68,12 @@ def load_robot(
     Warns:
         DescriptionWarning: once per process and robot, when the description holds values that no source backs; for
             each of the robot's `notes`, if it is not of the catalogue.
+        AssumedValueWarning: each time, when masses are assumed, or would be and are all known.
     """
     if isinstance(spec, Robot):
         if tip is not None or joints is not None or locked:
             raise InputError(f"{spec.name} is loaded already", remedy="give tip, joints and locked when loading it")
-        return spec
+        return spec if assume_masses is None else _with_usual_masses(spec, assume_masses)
     if str(spec) in catalogue():
         robot = robot_from_yaml(CATALOG / f"{spec}.yaml", str(spec), tip, joints, locked)
     else:
@@ -75,6 +85,8 @@ def load_robot(
         else:
             robot = robot_from_yaml(path, str(path), tip, joints, locked, unlimited)
     robot = replace(robot, stated=_as_words(robot.origin, tip, joints, locked))
+    if assume_masses is not None:
+        robot = _with_usual_masses(robot, assume_masses)
     if robot.origin not in _warned:
         _warned.add(robot.origin)
         notes = () if robot.origin in catalogue() else robot.notes
@@ -83,6 +95,32 @@ def load_robot(
         for note in notes:
             warnings.warn(DescriptionWarning(f"{robot.name}: {note}", robot.stated), stacklevel=2)
     return robot
+
+
+def _with_usual_masses(robot: Robot, payload: float) -> Robot:
+    """Fills in the masses that are not known, and says so in every list of what is assumed."""
+    if not (np.isfinite(payload) and payload > 0.0):
+        raise InputError(f"masses of an arm rated for {payload} kg", allowed="a positive mass")
+    unknown = np.isnan(robot.inertia[:, 0])
+    if not unknown.any():
+        text = f"{robot.name}: its description states all masses, so none are assumed"
+        warnings.warn(AssumedValueWarning(text), stacklevel=3)
+        return robot
+    usual = usual_masses(robot.chain, robot.limits, payload)
+    inertia = np.where(unknown[:, None], usual, robot.inertia)
+    reach, mass = working_reach(robot.chain, robot.limits), usual[unknown, 0].sum()
+    links = "all links" if unknown.all() else joints_in_words(np.flatnonzero(unknown) + 1).replace("joint", "link")
+    what = f"masses of {links} (usual for {payload:g} kg payload and {two_digits(reach)} m reach)"
+    text = f"{robot.name}: assumed: {what}, {two_digits(mass)} kg in all; real arms have half to twice as much"
+    warnings.warn(AssumedValueWarning(text), stacklevel=3)
+    gone = unknown_masses(robot.inertia, robot.joint_names)
+    return replace(
+        robot,
+        inertia=inertia,
+        assumed=(*robot.assumed, what),
+        notes=tuple(note for note in robot.notes if note not in gone),
+        stated=f"{robot.stated} --assume-masses {payload:g}" if robot.stated else "",
+    )
 
 
 def _as_words(origin: str, tip: str | None, joints: Sequence[str] | None, locked: Mapping[str, float] | None) -> str:

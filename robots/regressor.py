@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from robots.batch import BatchFunction, batch_function, builds_expressions
 from robots.common.errors import InputError
-from robots.robot import Robot
+from robots.robot import MASSES_REMEDY, Robot
 from robots.terms import (
     COULOMB_VISCOUS,
     POLYNOMIAL,
@@ -73,6 +73,30 @@ class TorqueModel:
     def nominal(self) -> Array:
         """The robot description's parameters (p,), NaN where it states none."""
         return np.concatenate([term.nominal(self.robot) for term in self.terms])
+
+    @property
+    def described(self) -> bool:
+        """Whether the robot's description states all parameters."""
+        return bool(np.isfinite(self.nominal).all())
+
+    def require_description(self, purpose: str) -> Array:
+        """Gives the robot description's parameters (p,).
+
+        Args:
+            purpose: what needs them, such as "a simulation".
+
+        Raises:
+            InputError: naming the first joint with a parameter that the description does not state.
+        """
+        if not self.described:
+            column = self.columns[int(np.argmin(np.isfinite(self.nominal)))]
+            missing = "masses" if column.term == "rigid_body" else column.name
+            raise InputError(
+                f"{purpose} needs {missing}, which the description of {self.robot.name} does not state",
+                joint=column.joint,
+                remedy=MASSES_REMEDY if missing == "masses" else "state it under dynamics in a robot YAML",
+            )
+        return self.nominal
 
     def under(self, gravity: ArrayLike | None) -> TorqueModel:
         """Gives the model on a base that stands otherwise, the same object for the same gravity.

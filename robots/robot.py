@@ -14,6 +14,9 @@ from robots.limits import Limits
 
 Array = NDArray[np.float64]
 
+MASSES_REMEDY = "state them under dynamics.links of a robot YAML, or assume usual ones (--assume-masses KG of payload)"
+"""What to do where masses are unknown."""
+
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Robot:
@@ -134,6 +137,12 @@ class Robot:
     def joint_names(self) -> tuple[str, ...]:
         """Joint names from the base to the flange."""
         return self.chain.names
+
+    @property
+    def endless(self) -> NDArray[np.bool_]:
+        """Which joints turn without end (n,): those that turn and have no position limit."""
+        free = ~(np.isfinite(self.limits.lower) | np.isfinite(self.limits.upper))
+        return np.asarray(free & (np.array(self.chain.kinds) == "revolute"))
 
     def under(self, gravity: ArrayLike | None) -> Robot:
         """Gives the robot on a base that stands otherwise, the same object for the same gravity.

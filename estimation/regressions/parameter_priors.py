@@ -65,7 +65,7 @@ def prior_from_description(base: BaseParameters, bodies: Array, torque: Array, l
         The pull, or None where the description lacks inertial parameters.
     """
     model = base.model
-    if not np.isfinite(model.nominal).all() or not np.any(model.robot.inertia):
+    if not model.described or not np.any(model.robot.inertia):
         return None
     spread = np.zeros(model.size)
     links = link_spreads(bodies)

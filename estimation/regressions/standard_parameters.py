@@ -13,6 +13,7 @@ from estimation.regressions.regression_data import RegressionData
 from robots.base_parameters import BaseParameters
 from robots.consistency import inertial_from_pseudo, pseudo_inertia
 from robots.geometry.inertia import SIZE
+from robots.geometry.usual_arms import usual_body
 from robots.regressor import TorqueModel
 from robots.robot import Robot
 
@@ -21,8 +22,6 @@ Array = NDArray[np.float64]
 # Eigenvalues of a described pseudo-inertia below this share of its trace are lifted: thin rods and point masses, and
 # files that breach the triangle inequality, would pull towards bodies that cannot exist.
 THIN = 0.02
-# Radius of gyration of a link without description, as a fraction of its length and of the arm's.
-OWN_SHARE, ARM_SHARE = 0.2, 0.05
 GRAVITY = 9.81
 # A column whose share of those that span it cancels to this part of their squares does not act.
 SPANNED = 1e-12
@@ -117,13 +116,7 @@ def reference_bodies(robot: Robot, mass: float) -> tuple[Array, NDArray[np.bool_
         if described[link]:
             bodies[link] = _corrected_body(inertia[link], 0.01 * arm)
         else:
-            own, centre = mass / robot.n, ends[link] / 2
-            spread = (OWN_SHARE * lengths[link] + ARM_SHARE * arm) ** 2
-            pseudo = np.zeros((4, 4))
-            pseudo[:3, :3] = np.outer(centre, centre) + spread * np.eye(3)
-            pseudo[:3, 3] = pseudo[3, :3] = centre
-            pseudo[3, 3] = 1.0
-            bodies[link] = inertial_from_pseudo(own * pseudo)
+            bodies[link] = usual_body(mass / robot.n, ends[link], arm)
     return bodies, described
 
 

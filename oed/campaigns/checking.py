@@ -41,7 +41,7 @@ class TorqueCheck:
             raise InputError(f"a torque margin of {margin}", allowed="0 to below 1")
         self.margin, self._limit = margin, np.asarray(robot.limits.torque)
         model = default_model(robot, velocity_scale=COULOMB_SCALE)
-        known = bool(np.isfinite(model.nominal).all() and np.isfinite(self._limit).any())
+        known = bool(model.described and np.isfinite(self._limit).any())
         self._model: TorqueModel | None = model if known else None
 
     @property

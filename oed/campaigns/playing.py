@@ -63,6 +63,7 @@ def play(campaign: Campaign, plant: Plant | None = None, seed: int = 0) -> Itera
             cycle=np.full(len(log), float(cycle)),
             name=f"cycle {cycle}",
             metadata={
+                **log.metadata,
                 "robot": campaign.robot.name,
                 "phase": first.phase,
                 "run": first.run,

@@ -29,6 +29,7 @@ APPLY = {
     "joints",
     "lock",
     "unlimited",
+    "assume_masses",
     "png",
     "force",
     "json",

@@ -42,6 +42,16 @@ LockOption = Annotated[
 UnlimitedOption = Annotated[
     bool, typer.Option("--unlimited", help="URDF: accept revolute and prismatic joints without position limits.")
 ]
+AssumeMassesOption = Annotated[
+    float | None,
+    typer.Option(
+        "--assume-masses",
+        metavar="KG",
+        help="For a description without masses: assume those of a usual arm of its size and this rated payload [kg]. "
+        "All results say so.",
+        show_default=False,
+    ),
+]
 LogOption = Annotated[
     list[Path], typer.Option("--log", help="A log, or a folder of logs. Repeatable.", show_default=False)
 ]
@@ -141,6 +151,7 @@ def robot_from(
     lock: list[str] | None = None,
     *,
     unlimited: bool = True,
+    assume_masses: float | None = None,
 ) -> Robot:
     """Loads the robot that the options name.
 
@@ -161,7 +172,9 @@ def robot_from(
                 f"--lock {item}", allowed="name=value with the value in rad or m, such as elbow_joint=1.57"
             ) from None
     names = [name.strip() for name in joints.split(",")] if joints else None
-    return load_robot(spec, tip=tip, joints=names, locked=locked or None, unlimited=unlimited)
+    return load_robot(
+        spec, tip=tip, joints=names, locked=locked or None, unlimited=unlimited, assume_masses=assume_masses
+    )
 
 
 def robot_of_file(

@@ -142,12 +142,7 @@ def nominal_scale(base: BaseParameters) -> Array:
     Raises:
         InputError: the description lacks nominal parameters.
     """
-    nominal = base.model.nominal
-    if not np.isfinite(nominal).all():
-        raise InputError(
-            "nominal scaling needs the robot's nominal dynamics",
-            remedy="add them to the robot file, or use --scaling none or unit",
-        )
+    nominal = base.model.require_description("nominal scaling (--scaling none and unit do not)")
     size = np.abs(base.from_standard(nominal))
     kinds = [(column.unit, column.term) for column in base.columns]
     largest = {kind: max(s for s, k in zip(size, kinds, strict=True) if k == kind) for kind in set(kinds)}

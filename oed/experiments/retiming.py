@@ -15,6 +15,7 @@ from oed.experiments.quality import design_model, measure
 from oed.experiments.results.retimed import RetimedExperiment, torque_use
 from oed.experiments.safety_checks.freedom import collision_data
 from oed.experiments.safety_checks.margins import measured_margins
+from oed.exports import shorter_way
 from oed.retiming import Retimed, retime_with_stops
 from oed.retiming import retime as retime_by_toppra
 from robots.base_parameters import find_base_parameters
@@ -51,7 +52,8 @@ def retime(
 
     Args:
         robot: the robot; its torque limits count where its nominal dynamics are described.
-        motion: the path, with its present timing; or waypoints (W, n) [rad or m].
+        motion: the path, with its present timing; or waypoints (W, n) [rad or m], between which joints without end
+            take the shorter way.
         method: ``toppra`` follows the path; ``ruckig`` moves straight from vertex to vertex and stops at each.
         criterion: what to compare, see `oed.design`.
         friction: the model whose parameters are meant.
@@ -70,6 +72,8 @@ def retime(
     """
     if method not in METHODS:
         raise InputError(f"retiming method {method!r}", allowed=", ".join(METHODS))
+    if not isinstance(motion, Motion):
+        motion = shorter_way(robot, motion)
     stops = None if isinstance(motion, Motion) else _with_stops(robot, motion)
     given = motion if isinstance(motion, Motion) else stops.motion  # type: ignore[union-attr]
     if given.n != robot.n:
@@ -113,7 +117,7 @@ def move_with_stops(robot: Robot, waypoints: ArrayLike) -> Motion:
         InputError: waypoints that are not two or more finite points of the robot's joints.
         InfeasibleError: a waypoint outside the position limits, a zero limit, or waypoints that are all the same.
     """
-    return _with_stops(robot, waypoints).motion
+    return _with_stops(robot, shorter_way(robot, waypoints)).motion
 
 
 def _with_stops(robot: Robot, waypoints: ArrayLike) -> Retimed:
@@ -130,7 +134,7 @@ def _dynamics(
 ) -> tuple[Callable[[Array, Array, Array], Array] | None, Callable[[Array], Array] | None]:
     """The nominal torque without and of friction, or nothing where the robot's description does not give it."""
     robot = model.robot
-    if not (np.isfinite(model.nominal).all() and np.isfinite(robot.limits.torque).any()):
+    if not (model.described and np.isfinite(robot.limits.torque).any()):
         return None, None
     smooth = TorqueModel(robot, tuple(term for term in model.terms if not isinstance(term, FrictionTerm)))
     friction = TorqueModel(robot, tuple(term for term in model.terms if isinstance(term, FrictionTerm)))

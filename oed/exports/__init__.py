@@ -4,7 +4,7 @@ from oed.exports.forms import FORMS as CONTROLLER_FORMS
 from oed.exports.forms import ExportOptions
 from oed.exports.trajectory_checks import check_trajectory, is_made_for
 from oed.exports.trajectory_csv import read_trajectory, write_trajectory
-from oed.exports.waypoints import read_waypoints
+from oed.exports.waypoints import read_waypoints, shorter_way
 from oed.exports.writing import export_trajectory
 
 FORMS = ("csv", *CONTROLLER_FORMS)
@@ -19,5 +19,6 @@ __all__ = [
     "is_made_for",
     "read_trajectory",
     "read_waypoints",
+    "shorter_way",
     "write_trajectory",
 ]

@@ -105,7 +105,7 @@ def _torque_margins(motion: Motion, robot: Robot) -> list[Margin]:
     if not np.isfinite(robot.limits.torque).any():
         return []
     model = default_model(robot, offset=False)
-    if not np.isfinite(model.nominal).all():
+    if not model.described:
         return []
     tau = model.torque(motion.q, motion.dq, motion.ddq, model.nominal)
     return symmetric_margins("torque", motion.t, tau, robot.limits.torque)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import warnings
 from collections.abc import Mapping, Sequence
 from os import PathLike
 from typing import Any
@@ -10,8 +11,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from robots.common.errors import InputError
+from robots.common.errors import InputError, ShorterWayWarning
 from robots.common.files import write_atomic
+from robots.common.plain import joints_in_words
 from robots.common.tables.table_files import Table, read_table, write_table
 from robots.signals import Motion
 
@@ -91,6 +93,9 @@ def read_trajectory(path: str | PathLike[str], *, n: int | None = None) -> tuple
     Raises:
         InputError: a missing column, an unknown unit, an empty cell or NaN, time that runs backward or unevenly, or
             velocities and accelerations that are not the derivatives of the positions; with column and line.
+
+    Warns:
+        ShorterWayWarning: angles that jump by whole turns while their velocities go on are taken as going round.
     """
     table = read_table(path, wanted=lambda name: name == "t" or JOINT_COLUMN.fullmatch(name) is not None)
     count = _count_joints(table, n)
@@ -99,9 +104,27 @@ def read_trajectory(path: str | PathLike[str], *, n: int | None = None) -> tuple
         np.column_stack([read_lengths(table, quantity, joint + 1) for joint in range(count)]) for quantity in QUANTITIES
     )
     _check_time(t, table)
+    kinds = _kinds(table, count)
+    q = _without_jumps(q, dq, t, kinds.get("kinds", ["revolute"] * count), table)
     motion = Motion(t, q, dq, ddq)
     _check_derivatives(motion, table)
-    return motion, dict(table.metadata) | _kinds(table, count)
+    return motion, dict(table.metadata) | kinds
+
+
+def _without_jumps(q: Array, dq: Array, t: Array, kinds: Sequence[str], table: Table) -> Array:
+    """Angles without jumps by whole turns, where the velocities go on: planners keep angles within a turn."""
+    gap = np.diff(q, axis=0) - np.diff(t)[:, None] * (dq[:-1] + dq[1:]) / 2.0
+    turns = np.round(gap / (2 * np.pi)) * [kind == "revolute" for kind in kinds]
+    if not turns.any():
+        return q
+    row, joint = (int(index) for index in np.argwhere(turns)[0])
+    joints = joints_in_words(int(number) + 1 for number in np.flatnonzero(turns.any(axis=0)))
+    text = (
+        f"{table.path}: row {table.line(row + 1)}: the angle of joint {joint + 1} jumps by {360 * turns[row, joint]:g} "
+        f"degrees while its velocity goes on; such jumps are taken out ({joints})"
+    )
+    warnings.warn(ShorterWayWarning(text), stacklevel=3)
+    return np.concatenate([q[:1], q[1:] - 2 * np.pi * np.cumsum(turns, axis=0)])
 
 
 def _kinds(table: Table, count: int) -> dict[str, list[str]]:

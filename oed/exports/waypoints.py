@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
+import warnings
 from os import PathLike
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from oed.exports.trajectory_csv import JOINT_COLUMN, read_lengths
-from robots.common.errors import InputError
-from robots.common.plain import several
+from robots.common.errors import InputError, ShorterWayWarning
+from robots.common.plain import joints_in_words, several
 from robots.common.tables.table_files import Table, read_table
 from robots.robot import Robot
 
@@ -27,7 +28,7 @@ def read_waypoints(path: str | PathLike[str], n: int | None = None, *, robot: Ro
     Args:
         path: the file.
         n: number of joints, if known.
-        robot: whose joints they are, if known: units and limits are checked.
+        robot: whose joints they are, if known: units and limits are checked, and `shorter_way` is taken.
 
     Returns:
         The waypoints (W, n) [rad or m]; None where the file has a column of times, so that it is a trajectory.
@@ -50,6 +51,42 @@ def read_waypoints(path: str | PathLike[str], n: int | None = None, *, robot: Ro
     if robot is not None:
         _check_units(table, robot)
         _check_limits(q, table, robot)
+        q = shorter_way(robot, q)
+    return q
+
+
+def shorter_way(robot: Robot, waypoints: ArrayLike) -> Array:
+    """Turns joints without end the shorter way from waypoint to waypoint.
+
+    Planners keep the angles of such joints in one turn, so that they jump where a joint passes its end. A column that
+    spans more than a turn counts turns, and is left as it is.
+
+    Args:
+        robot: whose joints they are.
+        waypoints: (W, n) [rad or m].
+
+    Returns:
+        The same poses (W, n).
+
+    Warns:
+        ShorterWayWarning: naming the joints and the first two waypoints, where angles have changed.
+    """
+    q = np.array(waypoints, dtype=np.float64)
+    if q.ndim != 2 or q.shape[1] != robot.n or not np.isfinite(q).all():
+        return q  # Those that use them say what is wrong.
+    within = robot.endless & (np.ptp(q, axis=0) <= 2 * np.pi + ROUNDING)
+    jumps = (np.abs(np.diff(q, axis=0)) > np.pi + ROUNDING) & within
+    joints = np.flatnonzero(jumps.any(axis=0))
+    for joint in joints:
+        q[:, joint] = np.unwrap(q[:, joint])
+    if joints.size:
+        names = joints_in_words(robot.joint_names[joint] for joint in joints)
+        row = int(np.flatnonzero(jumps.any(axis=1))[0]) + 1
+        text = (
+            f"{robot.name}: where waypoints jump by more than half a turn, first from {row} to {row + 1}, the shorter "
+            f"way is taken, because there are no position limits: {names}. For the longer way, put a waypoint between"
+        )
+        warnings.warn(ShorterWayWarning(text), stacklevel=2)
     return q
 
 

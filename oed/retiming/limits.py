@@ -41,7 +41,8 @@ def finite_limits(limits: Limits) -> Limits:
         raise InputError(
             "has no velocity limit",
             joint=int(np.argmin(np.isfinite(limits.velocity))) + 1,
-            remedy="state one under limits in a robot YAML, which may name a URDF or MJCF",
+            remedy="state it: velocity of <limit> in a URDF (0 stands for unknown), or limits.velocity in a robot "
+            "YAML, which may name a URDF or MJCF",
         )
     acceleration = np.where(
         np.isfinite(limits.acceleration), limits.acceleration, ACCELERATION_PER_VELOCITY * limits.velocity

@@ -85,6 +85,10 @@ class NearestBodiesWarning(UserWarning):
     """The links of a written file are not those identified but the nearest that can exist."""
 
 
+class ShorterWayWarning(UserWarning):
+    """Angles that jump by more than half a turn were taken the shorter way round."""
+
+
 class AssumedValueWarning(UserWarning):
     """A robot description contains values without a source; results that depend on them are uncertain."""
 

@@ -13,16 +13,20 @@ from numpy.typing import NDArray
 from robots.common.errors import InputError
 from robots.geometry.chain import Chain, Joint, LinkPlace, joint_motion
 from robots.geometry.inertia import SIZE, body_doubts, check_body, inertial_parameters
-from robots.geometry.urdf_limits import JointBounds, joint_bounds
+from robots.geometry.urdf_limits import JointBounds, joint_bounds, limits_of
 from robots.geometry.urdf_selection import Selection, nearest, select
 from robots.geometry.urdf_xml import UrdfElements, UrdfJoint, UrdfLink, read_elements
 from robots.limits import Limits
 
 Array = NDArray[np.float64]
 
+_FEW = 3  # links of equal mass are common in pendulums, and in no arm
+
 
 class UrdfChain(NamedTuple):
     """A chain taken from a URDF: ``inertia`` is (n, 10) about the link frames, everything locked lumped in.
+
+    A row of NaN is unknown: no link of that body states a mass.
 
     ``unlimited`` names the joints that have stops but state none. ``notes`` says what a reader may not expect.
     ``links`` has all links of the file with the body that carries each.
@@ -69,16 +73,13 @@ class UrdfTree:
         # Simulators accept a "world" that is nowhere declared, so exported files leave it out.
         used, given = {joint.parent for joint in self.joints.values()}, {joint.child for joint in self.joints.values()}
         if "world" in used - given - set(self.links):
-            self.links["world"] = UrdfLink(name="world", com=np.zeros(3), inertia_at_com=np.zeros((3, 3)))
+            self.links["world"] = UrdfLink(name="world")
 
     def _attach(self, joint: UrdfJoint) -> None:
         for role, name in (("parent", joint.parent), ("child", joint.child)):
             if name not in self.links:
                 problem = f"the {role} link {name!r} does not exist"
                 raise InputError(problem, file=self.file, joint=joint.name, remedy=nearest(name, self.links))
-        if joint.mimic is not None and joint.mimic[0] not in self.joints:
-            problem = f"it mimics the joint {joint.mimic[0]!r}, which does not exist"
-            raise InputError(problem, file=self.file, joint=joint.name, remedy=nearest(joint.mimic[0], self.joints))
         first = self.parent_joint.get(joint.child)
         if first is not None:
             raise InputError(
@@ -150,7 +151,7 @@ class UrdfTree:
         selection = select(self, tip, joints, locked)
         moving = {joint.name: i for i, joint in enumerate(selection.moving)}
         chain_joints: list[Joint] = []
-        inertia = np.zeros((len(moving), SIZE))
+        inertia = np.full((len(moving), SIZE), np.nan)
         lumped: list[list[str]] = [[] for _ in moving]
         places: list[LinkPlace] = []
         held: list[str] = []
@@ -160,10 +161,9 @@ class UrdfTree:
             name, body, pose = stack.pop()
             places.append(LinkPlace(name, body + 1, pose))
             if body >= 0:
-                link = self.links[name]
                 # Only what moves: bodies of the base without a proper inertia are common, and do no harm.
-                check_body(link.mass, link.inertia_at_com, f"link {name!r}", file=self.file)
-                inertia[body] += inertial_parameters(link.mass, link.com, link.inertia_at_com, pose)
+                own = self._parameters(self.links[name], pose)
+                inertia[body] = np.where(np.isnan(inertia[body]), own, inertia[body] + np.nan_to_num(own))
                 lumped[body].append(name)
             if name == selection.tip:
                 flange = pose
@@ -178,16 +178,13 @@ class UrdfTree:
                     stated = joint.name in selection.locked or joint.mimic is not None
                     if joint.moves and body >= 0 and not stated and self.links[joint.child].mass > 0:
                         held.append(joint.name)
-        for i, names in enumerate(lumped):
-            if not inertia[i, 0] > 0.0:
-                listed = ", ".join(repr(name) for name in names)
-                raise InputError(
-                    f"the body it moves has no mass (links {listed})",
-                    file=self.file,
-                    joint=selection.moving[i].name,
-                    remedy="give one of these links an <inertial> (two joints of one MJCF body: put the first into a "
-                    "body of its own, with a small one), or lock the joint (--lock)",
-                )
+        for i in np.flatnonzero(inertia[:, 0] == 0.0):
+            raise InputError(
+                f"the body it moves has no mass: the next joint is of the same {self.kind} body",
+                file=self.file,
+                joint=selection.moving[i].name,
+                remedy="put it into a body of its own, with a small mass, or lock the joint (--lock)",
+            )
         inertia.flags.writeable = False
         chain_joints.sort(key=lambda joint: moving[joint.name])
         chain = Chain(tuple(chain_joints), tip=flange)
@@ -198,12 +195,21 @@ class UrdfTree:
             *self._body_notes(chain, lumped),
             *self._held_notes(held),
             *(
-                f"joint {joint.name} mimics the moving joint {joint.mimic[0]}; it is treated as locked"
+                f"joint {joint.name} mimics {'the moving joint' if joint.mimic[0] in moving else 'the unknown joint'} "
+                f"{joint.mimic[0]}; it is treated as locked"
                 for joint in self.joints.values()
-                if joint.mimic is not None and joint.mimic[0] in moving and joint.name not in selection.locked
+                if joint.mimic is not None and joint.name not in selection.locked
+                if joint.mimic[0] in moving or joint.mimic[0] not in self.joints
             ),
         ]
-        return UrdfChain(chain, _limits(bounds), inertia, chain.names, unlimited, tuple(notes), tuple(places))
+        return UrdfChain(chain, limits_of(bounds), inertia, chain.names, unlimited, tuple(notes), tuple(places))
+
+    def _parameters(self, link: UrdfLink, pose: Array) -> Array:
+        """Inertial parameters (10,) about the body's frame; NaN where the link states no mass."""
+        if np.isnan(link.mass):
+            return np.full(SIZE, np.nan)
+        check_body(link.mass, link.inertia_at_com, f"link {link.name!r}", file=self.file)
+        return inertial_parameters(link.mass, link.com, link.inertia_at_com, pose)
 
     def _locked_motion(self, joint: UrdfJoint, selection: Selection) -> Array:
         if not joint.moves:
@@ -218,7 +224,7 @@ class UrdfTree:
         leader, multiplier, offset = joint.mimic
         if leader in seen or leader == joint.name:
             raise InputError("it mimics itself, directly or through other joints", file=self.file, joint=joint.name)
-        if any(leader == moving.name for moving in selection.moving):
+        if leader not in self.joints or any(leader == moving.name for moving in selection.moving):
             return offset
         return multiplier * self._locked_value(self.joints[leader], selection, (*seen, joint.name)) + offset
 
@@ -246,7 +252,15 @@ class UrdfTree:
         size = sum(float(np.linalg.norm(joint.translation)) for joint in chain.joints)
         size += float(np.linalg.norm(chain.tip[:3, 3]))
         links = [self.links[name] for names in lumped for name in names]
-        return [
+        massless = [link.name for link in links if np.isnan(link.mass) and link.inertia_at_com.any()]
+        notes = []
+        if massless:
+            has = "link {} has" if len(massless) == 1 else "links {} have"
+            notes.append(f"{has.format(', '.join(massless))} an inertia but no mass: it is not used")
+        masses = [link.mass for link in links if link.mass > 0]
+        if len(masses) > _FEW and len(set(masses)) == 1:
+            notes.append(f"all {len(masses)} links with a mass have {masses[0]:g} kg: it may stand for unknown masses")
+        return notes + [
             f"link {link.name} has {doubt}"
             for link in links
             for doubt in body_doubts(link.mass, link.com, link.inertia_at_com, size)
@@ -262,20 +276,6 @@ class UrdfTree:
             (n, 4) coefficients f1..f4, of which a URDF states f1 [N m] and f2 [N m s/rad]; 0 where it states none.
         """
         return np.array([[self.joints[name].friction, self.joints[name].damping, 0.0, 0.0] for name in names])
-
-
-def _limits(bounds: Sequence[JointBounds]) -> Limits:
-    def of(name: str) -> Array:
-        return np.array([getattr(bound, name) for bound in bounds])
-
-    return Limits(
-        lower=of("lower"),
-        upper=of("upper"),
-        velocity=of("velocity"),
-        acceleration=of("acceleration"),
-        jerk=of("jerk"),
-        torque=of("effort"),
-    )
 
 
 def read_urdf(path: str | Path) -> UrdfTree:

@@ -2,24 +2,30 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from xml.etree import ElementTree
 
 import numpy as np
+from numpy.typing import NDArray
 
 from robots.common.errors import InputError
 from robots.geometry.chain import Kind
 from robots.geometry.urdf_reader import UrdfReader
+from robots.limits import Limits
 
 # No arm turns a joint three times around, or half of it at eight turns per second; in degrees both are common.
 _ANGLE, _RATE = 20.0, 50.0  # [rad], [rad/s]
 _LENGTH, _SPEED = 30.0, 20.0  # [m], [m/s]
 _ENDLESS = {"revolute": 1e3, "prismatic": 1e4}  # exporters write such numbers, or 1e16, for "no limit"
+_MAGNITUDES = ("velocity", "effort", "acceleration", "deceleration", "jerk")
 
 
 @dataclass(frozen=True, kw_only=True)
 class UrdfLimit:
     """The limits that a joint states; None where it states none.
+
+    Exporters write a magnitude of 0, and two equal ends, where they know none: with them nothing could move.
 
     Attributes:
         lower: lowest position [rad or m].
@@ -31,6 +37,7 @@ class UrdfLimit:
         jerk: highest jerk [rad/s3 or m/s3].
         soft_lower: lowest position of the safety controller.
         soft_upper: highest position of the safety controller.
+        zeros: names of the magnitudes that are stated as 0.
     """
 
     lower: float | None = None
@@ -42,15 +49,16 @@ class UrdfLimit:
     jerk: float | None = None
     soft_lower: float | None = None
     soft_upper: float | None = None
+    zeros: tuple[str, ...] = ()
 
     def range(self, kind: Kind) -> tuple[float, float] | None:
         """Gives the stops by the specification, in which a missing end is 0.
 
         Returns:
-            Lowest and highest position; None where both are 0 or missing, or too far away to be stops.
+            Lowest and highest position; None where both are equal or missing, or too far away to be stops.
         """
         low, high = self.lower or 0.0, self.upper or 0.0
-        return None if low == high == 0.0 or max(-low, high) >= _ENDLESS[kind] else (low, high)
+        return None if low == high or max(-low, high) >= _ENDLESS[kind] else (low, high)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -88,13 +96,30 @@ def read_limit(joint: ElementTree.Element, read: UrdfReader) -> UrdfLimit | None
     element, soft = read.child(joint, "limit"), read.child(joint, "safety_controller")
     if element is None:
         return None
-    magnitudes = ("velocity", "effort", "acceleration", "deceleration", "jerk")
+    stated = {key: read.positive(element, key) for key in _MAGNITUDES}
     return UrdfLimit(
         lower=read.optional(element, "lower"),
         upper=read.optional(element, "upper"),
         soft_lower=read.optional(soft, "soft_lower_limit"),
         soft_upper=read.optional(soft, "soft_upper_limit"),
-        **{key: read.positive(element, key) for key in magnitudes},
+        **{key: value or None for key, value in stated.items()},
+        zeros=tuple(key for key, value in stated.items() if value == 0.0),
+    )
+
+
+def limits_of(bounds: Sequence[JointBounds]) -> Limits:
+    """Puts the bounds of the moving joints together."""
+
+    def of(name: str) -> NDArray[np.float64]:
+        return np.array([getattr(bound, name) for bound in bounds])
+
+    return Limits(
+        lower=of("lower"),
+        upper=of("upper"),
+        velocity=of("velocity"),
+        acceleration=of("acceleration"),
+        jerk=of("jerk"),
+        torque=of("effort"),
     )
 
 
@@ -110,27 +135,17 @@ def joint_bounds(limit: UrdfLimit | None, type_: str, *, name: str, file: str) -
         file: for messages.
 
     Raises:
-        InputError: no limit where one must be, or ends in the wrong order.
+        InputError: ends in the wrong order.
     """
     if limit is None:
-        if type_ == "continuous":
-            return JointBounds()
-        problem, allowed = f"a {type_} joint without <limit>", "<limit> with lower, upper, velocity and effort"
-        raise InputError(problem, file=file, joint=name, allowed=allowed)
+        return JointBounds(unlimited=type_ != "continuous")
     kind: Kind = "prismatic" if type_ == "prismatic" else "revolute"
-    if type_ != "continuous" and (limit.velocity is None or limit.effort is None):
-        missing = "velocity" if limit.velocity is None else "effort"
-        raise InputError(
-            f"<limit> states no {missing}",
-            file=file,
-            joint=name,
-            allowed="velocity [m/s] and effort [N]" if kind == "prismatic" else "velocity [rad/s] and effort [N m]",
-            remedy="add it there",
-        )
     lower, upper = -np.inf, np.inf
     notes: list[str] = []
     if type_ != "continuous":
         lower, upper, notes = _ends(limit, kind, name, file)
+    if limit.zeros:
+        notes.append(f"<limit> has {' and '.join(limit.zeros)} 0, which stands for unknown")
     acceleration = min((a for a in (limit.acceleration, limit.deceleration) if a is not None), default=np.inf)
     if limit.acceleration is not None and limit.deceleration is not None and limit.acceleration != limit.deceleration:
         smaller = "deceleration" if limit.deceleration < limit.acceleration else "acceleration"
@@ -159,6 +174,8 @@ def _ends(limit: UrdfLimit, kind: Kind, name: str, file: str) -> tuple[float, fl
         for key, value in (("lower", limit.lower), ("upper", limit.upper)):
             if value is None:
                 notes.append(f"<limit> states no {key}; it is 0 by the URDF specification")
+    elif limit.lower is not None and limit.lower == limit.upper != 0.0:
+        notes.append(f"<limit> has lower and upper {limit.lower:g}, which stands for unknown")
     soft = limit.soft_lower, limit.soft_upper
     if any(soft):
         tight = max(lower, -np.inf if soft[0] is None else soft[0]), min(upper, np.inf if soft[1] is None else soft[1])

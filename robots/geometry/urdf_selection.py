@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import hashlib
+import json
 import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
@@ -11,6 +13,7 @@ from typing import Protocol
 from robots.common.errors import InputError
 from robots.geometry.urdf_xml import UrdfJoint, UrdfLink
 
+Choice = tuple[str | None, Sequence[str] | None, Mapping[str, float] | None]  # tip, joints, locked
 _LISTED = 12  # a humanoid has dozens of tips; a longer list does not help
 
 
@@ -33,6 +36,18 @@ class Selection:
     moving: tuple[UrdfJoint, ...]
     tip: str
     locked: dict[str, float]
+
+
+def digest_of(*parts: bytes | str | Choice) -> str:
+    """Gives the SHA-256 of files, their digests and a choice of joints, which makes another robot of the same file."""
+    sha = hashlib.sha256()
+    for part in parts:
+        if isinstance(part, tuple):
+            tip, joints, locked = part
+            positions = {name: float(value) for name, value in (locked or {}).items()}
+            part = json.dumps([tip, list(joints or []), positions], sort_keys=True)
+        sha.update(part if isinstance(part, bytes) else part.encode())
+    return sha.hexdigest()
 
 
 def nearest(name: str, choices: Iterable[str]) -> str | None:

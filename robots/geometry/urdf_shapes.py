@@ -99,16 +99,17 @@ def mesh_file(shape: UrdfShape, source: str | Path) -> Path:
     """Finds the file of a mesh.
 
     Args:
-        shape: a mesh; ``package://PACKAGE/...``, ``file://...``, or a path relative to the URDF.
+        shape: a mesh; ``package://PACKAGE/...``, ``model://MODEL/...``, ``file://...``, or a path relative to the URDF.
         source: the URDF or xacro file.
 
     Raises:
         InputError: the package or the file is not found.
     """
     urdf = split_arguments(source)[0]
-    if shape.file.startswith("package://"):
-        package, _, inner = shape.file.removeprefix("package://").partition("/")
-        path = find_package(package, urdf) / inner
+    scheme, found, place = shape.file.partition("://")
+    if found and scheme in ("package", "model"):
+        package, _, inner = place.lstrip("/").partition("/")
+        path = find_package(package, urdf, inner) / inner
     else:
         path = urdf.parent / shape.file.removeprefix("file://")
     if not path.is_file():

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import hashlib
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Literal, get_args
 from xml.etree import ElementTree
@@ -31,12 +31,15 @@ _EXPAND = "expand it first: xacro FILE.xacro > FILE.urdf, or name it .xacro"
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class UrdfLink:
-    """A link: mass [kg], centre of mass [m] and inertia about it [kg m2] in link axes; zeros where not stated."""
+    """A link: mass [kg], centre of mass [m] and inertia about it [kg m2] in link axes.
+
+    A mass of NaN is unknown: the file states none, or zero, as exporters write it for links without material.
+    """
 
     name: str
-    mass: float = 0.0
-    com: Array
-    inertia_at_com: Array
+    mass: float = np.nan
+    com: Array = field(default_factory=lambda: np.zeros(3))
+    inertia_at_com: Array = field(default_factory=lambda: np.zeros((3, 3)))
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -88,18 +91,18 @@ def _link(element: ElementTree.Element, file: str) -> UrdfLink:
     read = UrdfReader(file, f"link {name!r}")
     inertial = read.child(element, "inertial")
     if inertial is None:
-        return UrdfLink(name=name, com=np.zeros(3), inertia_at_com=np.zeros((3, 3)))
+        return UrdfLink(name=name)
     mass_element, inertia_element = read.child(inertial, "mass"), read.child(inertial, "inertia")
-    if mass_element is None or inertia_element is None:
-        raise read.error(f"<inertial> has no <{'mass' if mass_element is None else 'inertia'}>")
-    mass = read.number(mass_element, "value")
-    six = [read.number(inertia_element, key) for key in ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")]
+    mass = np.nan if mass_element is None else read.number(mass_element, "value")
+    # Without <inertia> it is a point mass: cameras and fingers often have only a mass.
+    keys = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
+    six = [0.0 if inertia_element is None else read.number(inertia_element, key) for key in keys]
     pose = read.placement(inertial)
     rotation = pose[:3, :3]
     inertia = rotation @ symmetric(six) @ rotation.T
     if mass < 0.0:
         raise read.error(f"a mass of {mass:g} kg", allowed="zero or more")
-    return UrdfLink(name=name, mass=mass, com=pose[:3, 3], inertia_at_com=inertia)
+    return UrdfLink(name=name, mass=mass or np.nan, com=pose[:3, 3], inertia_at_com=inertia)
 
 
 def _joint(element: ElementTree.Element, file: str) -> UrdfJoint:

@@ -20,6 +20,8 @@ SUFFIXES = (".urdf", ".xacro")
 
 _ARGUMENTS = re.compile(r"(?:\s+[A-Za-z_]\w*:=\S*)+\s*$")
 _UNDEFINED = re.compile(r"Undefined substitution argument (\w+)")
+_PREFIX = re.compile(rb"[<\s]([A-Za-z_][\w.-]*):[A-Za-z_]")
+_ROOT = re.compile(rb"<robot\b")
 _COLOUR = re.compile(r"\x1b\[[0-9;]*m")
 
 
@@ -59,7 +61,19 @@ def urdf_bytes(source: str | Path) -> bytes:
         return _expanded(existing_file(path), arguments)
     if arguments:
         raise InputError(f"arguments {', '.join(arguments)} of a file that is no xacro", file=path, allowed=".xacro")
-    return existing_file(path).read_bytes()
+    return _with_declared_prefixes(existing_file(path).read_bytes())
+
+
+def _with_declared_prefixes(content: bytes) -> bytes:
+    """Declares prefixes that a file uses and does not declare: the parser of ROS knows no name spaces."""
+    try:
+        ElementTree.fromstring(content)
+    except ElementTree.ParseError as error:
+        if "unbound prefix" in str(error):
+            lacking = {name for name in _PREFIX.findall(content) if b"xmlns:" + name + b"=" not in content}
+            declared = b"".join(b" xmlns:" + name + b'="' + name + b'"' for name in sorted(lacking - {b"xacro"}))
+            return _ROOT.sub(lambda match: match[0] + declared, content, count=1)
+    return content
 
 
 def _expanded(path: Path, arguments: dict[str, str]) -> bytes:
@@ -70,16 +84,18 @@ def _expanded(path: Path, arguments: dict[str, str]) -> bytes:
         remedy = "pip install xacro, or expand the file elsewhere: xacro FILE.xacro > FILE.urdf"
         raise InputError("a xacro file needs the package xacro", file=path, remedy=remedy) from error
     heard = io.StringIO()
+    lost: list[InputError] = []
     try:
-        with contextlib.redirect_stderr(heard), _packages_from(path, substitution):
+        with contextlib.redirect_stderr(heard), _packages_from(xacro, path, substitution, lost):
             xacro.init_stacks(str(path))
             document = xacro.parse(None, str(path))
             xacro.process_doc(document, mappings=dict(arguments), verbosity=0)
             content: bytes = document.toxml(encoding="utf-8")
-    except InputError:
-        raise
     # Expressions in the file may raise anything.
     except Exception as error:
+        if lost:
+            # xacro wraps it in words of its own.
+            raise lost[0] from error
         at = str(xacro.filestack[-1]) if xacro.filestack else str(path)
         text = " ".join(str(error).split()) or type(error).__name__
         undefined = _UNDEFINED.search(text)
@@ -92,11 +108,17 @@ def _expanded(path: Path, arguments: dict[str, str]) -> bytes:
 
 
 @contextlib.contextmanager
-def _packages_from(path: Path, substitution: Any) -> Iterator[None]:
-    """Lets ``$(find PACKAGE)`` find packages around a file, where ROS is not installed."""
+def _packages_from(xacro: Any, path: Path, substitution: Any, lost: list[InputError]) -> Iterator[None]:
+    """Lets ``$(find PACKAGE)`` find packages around a file, where ROS is not installed; others are ``lost``."""
 
     def find(name: str) -> str:
-        return str(find_package(name, path))
+        current = Path(xacro.filestack[-1]) if xacro.filestack else path
+        wanted = re.search(rf"\$\(find\s+{re.escape(name)}\)/([^\"'$<>]+)", current.read_text("utf-8", "replace"))
+        try:
+            return str(find_package(name, path, wanted[1] if wanted else None))
+        except InputError as error:
+            lost.append(error)
+            raise
 
     before = substitution._eval_find, substitution._eval_dict["find"]
     substitution._eval_find = substitution._eval_dict["find"] = find
@@ -106,41 +128,51 @@ def _packages_from(path: Path, substitution: Any) -> Iterator[None]:
         substitution._eval_find, substitution._eval_dict["find"] = before
 
 
-def find_package(name: str, beside: Path) -> Path:
+def find_package(name: str, beside: Path, inner: str | None = None) -> Path:
     """Finds the folder of a ROS package.
 
-    It is a folder above the file, one beside such a folder, or one in ``ROS_PACKAGE_PATH`` or ``AMENT_PREFIX_PATH``.
-    Its ``package.xml`` has the name; without one, its folder has it.
+    It is a folder above the file, one beside such a folder, or one below ``ROS_PACKAGE_PATH`` or
+    ``AMENT_PREFIX_PATH``. Its ``package.xml`` has the name, whatever the folder's is; else the folder has it. Else it
+    is the folder above the file that holds what is wanted of the package: copies of packages have other names.
 
     Args:
         name: of the package.
         beside: a file in the same workspace.
+        inner: path of the file that is wanted, in the package.
 
     Raises:
         InputError: it is not found.
     """
     above = beside.resolve().parents
-    folders = [*above, *(folder / name for folder in above)]
-    for variable, inner in (("ROS_PACKAGE_PATH", ""), ("AMENT_PREFIX_PATH", "share")):
-        roots = [Path(root) / inner for root in os.environ.get(variable, "").split(os.pathsep) if root]
-        folders += [folder for root in roots for folder in (root, root / name)]
-    found = next((folder for folder in folders if _package_name(folder) == name), None)
+    roots = [folder for folder in above if folder != folder.parent]
+    for variable, share in (("ROS_PACKAGE_PATH", ""), ("AMENT_PREFIX_PATH", "share")):
+        roots += [Path(root) / share for root in os.environ.get(variable, "").split(os.pathsep) if root]
+    found = next((folder for root in roots for folder in _packages(root) if _package_name(folder) == name), None)
+    # Many packages are copied to other machines without their package.xml, or state another spelling in it.
+    named = (folder for root in roots for folder in (root, root / name) if folder.name == name and folder.is_dir())
+    held = (folder for folder in above if inner and (folder / inner).is_file())
+    found = found or next(named, None) or next(held, None)
     if found is None:
         raise InputError(
-            f"the package {name!r} was not found",
+            f"the package {name!r} was not found: no package.xml and no folder around the file has that name",
             file=beside,
-            remedy="put its folder beside this package, or set ROS_PACKAGE_PATH to the folder above it",
+            remedy="put it beside this package, with its package.xml or in a folder of that name, or set "
+            "ROS_PACKAGE_PATH to the folder above it",
         )
     return found
 
 
+def _packages(root: Path) -> Iterator[Path]:
+    """A folder, and those one and two levels below it, as a repository in a workspace holds several packages."""
+    yield root
+    for pattern in ("*/package.xml", "*/*/package.xml"):
+        with contextlib.suppress(OSError):
+            yield from sorted(path.parent for path in root.glob(pattern))
+
+
 def _package_name(folder: Path) -> str | None:
     try:
-        text = (folder / "package.xml").read_bytes()
-    except OSError:
-        return folder.name if folder.is_dir() else None
-    try:
-        element = ElementTree.fromstring(text).find("name")
-    except ElementTree.ParseError:
-        return folder.name
-    return folder.name if element is None or not element.text else element.text.strip()
+        element = ElementTree.parse(folder / "package.xml").find("name")
+    except (OSError, ElementTree.ParseError):
+        return None
+    return None if element is None or not element.text else element.text.strip()

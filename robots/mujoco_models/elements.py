@@ -121,7 +121,7 @@ def read_model(library: Any, model: Any, *, file: str, name: str, digest: str, u
 
 
 def _massless(name: str) -> UrdfLink:
-    return UrdfLink(name=name, com=np.zeros(3), inertia_at_com=np.zeros((3, 3)))
+    return UrdfLink(name=name, mass=0.0)
 
 
 def _link(model: Any, body: int, name: str) -> UrdfLink:

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
-import json
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -12,8 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from robots.common.errors import InputError
+from robots.description_notes import lacking
 from robots.geometry.chain import Chain
 from robots.geometry.urdf import UrdfChain, UrdfTree
+from robots.geometry.urdf_selection import digest_of
 from robots.mujoco_models.actuators import added_by_actuators
 from robots.mujoco_models.elements import MujocoNames, read_model
 from robots.mujoco_models.files import compile_mjcf, mujoco_library, read_xml
@@ -83,7 +83,7 @@ def robot_from_mjcf(
         origin=str(path),
         mjcf=str(path),
         links=taken.links,
-        digest=_digest(xml.digest, tip, joints, locked) if chosen else xml.digest,
+        digest=digest_of(xml.digest, (tip, joints, locked)) if chosen else xml.digest,
     )
 
 
@@ -111,17 +111,7 @@ def _notes(taken: UrdfChain, unused: Sequence[str], friction: Array, alone: bool
     if not alone:
         return notes
     parts = ["no velocity, acceleration and jerk limits", "a controller period of 4 ms"]
-    still = [name for name, row in zip(taken.names, friction, strict=True) if not row.any()]
-    if still:
-        parts.append("no friction" if len(still) == len(taken.names) else f"no friction at {', '.join(still)}")
-    free = [name for name, torque in zip(taken.names, taken.limits.torque, strict=True) if not np.isfinite(torque)]
-    if free:
-        parts.append("no torque limits" if len(free) == len(taken.names) else f"no torque limits at {', '.join(free)}")
+    parts += lacking("friction", ~friction.any(axis=1), taken.names)
+    parts += lacking("torque limits", ~np.isfinite(taken.limits.torque), taken.names)
     notes.append(f"assumed, because the MJCF does not state it: {', '.join(parts)}")
     return notes
-
-
-def _digest(digest: str, tip: str | None, joints: Sequence[str] | None, locked: Mapping[str, float] | None) -> str:
-    """A choice of joints makes another robot of the same file."""
-    choice = [tip, list(joints or []), {name: float(value) for name, value in (locked or {}).items()}]
-    return hashlib.sha256((digest + json.dumps(choice, sort_keys=True)).encode()).hexdigest()

@@ -153,6 +153,8 @@ def nominal_plant(
                 allowed=f"such as {', '.join(near or model.names[:3])}",
             )
         parameters[model.names.index(name)] = value
+    if not np.isfinite(parameters).all():
+        model.require_description("a virtual robot")
     return Plant(model=model, parameters=parameters, sensors=sensors or Sensors(), effects=effects)
 
 
@@ -194,4 +196,5 @@ def simulate(plant: Plant, motion: Motion, *, seed: int = 0, warmth: Warmth | No
         temperature=now.at(motion.t) if now is not None and seen == "all" else None,
         ambient=np.full(len(motion), plant.heat.ambient) if plant.heat is not None and seen != "none" else None,
         name=f"virtual {plant.robot.name}",
+        metadata={"assumed": list(plant.robot.assumed)} if plant.robot.assumed else {},
     )

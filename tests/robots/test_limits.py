@@ -46,10 +46,14 @@ def test_bound_that_is_no_number_a_joint_is_refused(name, value):
 
 @pytest.mark.parametrize("name", NAMES[2:])
 def test_negative_bound_is_refused_with_its_joint(name):
-    """A magnitude below zero names the joint; zero and infinity are accepted."""
+    """A magnitude below zero names the joint; infinity is accepted, and zero but of a torque, which moves nothing."""
     with pytest.raises(InputError) as caught:
         limits(**{name: [1.0, -1.0]})
     assert (caught.value.column, caught.value.joint) == (name, 2)
+    if name == "torque":
+        with pytest.raises(InputError, match="joint 1: found 0; allowed: above zero, or inf where unknown"):
+            limits(torque=[0.0, np.inf])
+        return
     assert getattr(limits(**{name: [0.0, np.inf]}), name).tolist() == [0.0, np.inf]
 
 

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import pickle
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from robots.common.errors import InputError
+from robots.loading import load_robot
 from robots.regressor import TorqueModel, default_model
 from robots.terms import FrictionPolynomial, RigidBody, RotorInertia, TorqueOffset
 
@@ -152,3 +154,17 @@ def test_terms_choose_the_columns(model, states):
     Y = few.regressor(*states(model.robot, 2))
     np.testing.assert_array_equal(Y[:, :, :6], np.broadcast_to(np.eye(6), (2, 6, 6)))
     np.testing.assert_array_equal(Y[:, :, 6:], [np.diag(row) for row in states(model.robot, 2)[2]])
+
+
+def test_a_model_says_whether_its_robot_is_described():
+    """One question for all that needs parameters of the description: a joint without masses is named, with remedies."""
+    er3a = load_robot("er3a")
+    known = default_model(er3a)
+    assert known.described
+    np.testing.assert_array_equal(known.require_description("a test"), known.nominal)
+    inertia = np.array(er3a.inertia)
+    inertia[3] = np.nan
+    unknown = default_model(replace(er3a, inertia=inertia))
+    assert not unknown.described
+    with pytest.raises(InputError, match=r"joint 4: a test needs masses, .* er3a does not state; .*--assume-masses KG"):
+        unknown.require_description("a test")

@@ -44,8 +44,7 @@ class TorqueSizes(Check):
     def run(self, context: Context) -> list[Finding]:
         """Compares each joint without another finding, if the description has inertias."""
         robot, fitted = context.robot, context.fitted
-        nominal = np.asarray(robot.inertia, dtype=float).ravel()
-        if context.cleaned.columns.prefix != "tau" or not np.isfinite(nominal).all() or not np.any(nominal):
+        if context.cleaned.columns.prefix != "tau" or not robot.has_masses:
             return []
         explained = {finding.joint for finding in context.found(EXPLAINED)}
         described = rigid_body(robot).nominal

@@ -32,7 +32,7 @@ class WrappedAngles(Check):
 def _finding(robot: Robot, wraps: Wraps) -> Finding:
     joint, count = wraps.joint, len(wraps.rows)
     low, high = float(robot.limits.lower[joint]), float(robot.limits.upper[joint])
-    endless = is_continuous(robot, joint) and wraps.turn < 10.0
+    endless = robot.endless[joint] and wraps.turn < 10.0
     unit = "rad" if wraps.turn < 10.0 else "degrees"
     text = f"the angle wraps {several(count, 'time')}: it jumps by {wraps.turn:.4g} ({unit})"
     if endless:
@@ -58,10 +58,3 @@ def _finding(robot: Robot, wraps: Wraps) -> Finding:
         joint=joint + 1,
         row=int(wraps.rows[0]) + 1,
     )
-
-
-def is_continuous(robot: Robot, joint: int) -> bool:
-    """Whether a joint, counted from 0, turns without end."""
-    limits = robot.limits
-    bounded = np.isfinite(limits.lower[joint]) or np.isfinite(limits.upper[joint])
-    return robot.chain.joints[joint].kind == "revolute" and not bounded

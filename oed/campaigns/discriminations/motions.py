@@ -236,10 +236,10 @@ class ExperimentBuilder:
         return [Segment(kind=kind, trajectory=pieces)]
 
     def _torque_kept(self, motion: Motion) -> bool:
-        nominal = self.base.model.nominal
-        if not np.isfinite(self.usable.torque).any() or not np.isfinite(nominal).all():
+        model = self.base.model
+        if not np.isfinite(self.usable.torque).any() or not model.described:
             return True
-        tau = self.base.model.torque(motion.q, motion.dq, motion.ddq, nominal)
+        tau = model.torque(motion.q, motion.dq, motion.ddq, model.nominal)
         return bool((np.abs(tau) <= self.usable.torque).all())
 
     def _reference(self, lower: Array, upper: Array, random: np.random.Generator) -> FourierSeries:

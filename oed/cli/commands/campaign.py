@@ -30,6 +30,7 @@ from oed.cli.links import (
     refuse_without_host,
 )
 from oed.cli.options import (
+    AssumeMassesOption,
     ClusterOption,
     CollisionOption,
     FloorOption,
@@ -130,6 +131,7 @@ def campaign(
     joints: JointsOption = None,
     lock: LockOption = None,
     unlimited: UnlimitedOption = False,
+    assume_masses: AssumeMassesOption = None,
     png: PngOption = False,
     force: ForceOption = False,
     json: JsonOption = False,
@@ -161,7 +163,7 @@ def campaign(
             power_on=power_on,
         )
         around = surroundings_from(floor, no_floor, keep_out)
-        described = robot_from(robot, tip, joints, lock, unlimited=unlimited)
+        described = robot_from(robot, tip, joints, lock, unlimited=unlimited, assume_masses=assume_masses)
         place = None
         if run is not None:
             place = endpoint(run, transport, motion_port, state_port, byte_order, real_bytes, handshake)

@@ -20,6 +20,7 @@ from oed.cli.links import (
     wire_format,
 )
 from oed.cli.options import (
+    AssumeMassesOption,
     ForceOption,
     JointsOption,
     JsonOption,
@@ -104,6 +105,7 @@ def controller(
     tip: TipOption = None,
     joints: JointsOption = None,
     lock: LockOption = None,
+    assume_masses: AssumeMassesOption = None,
     force: ForceOption = False,
     json: JsonOption = False,
     quiet: QuietOption = False,
@@ -153,7 +155,7 @@ def controller(
             wait_for_points=wait_for_points,
             faults=faults,
         )
-        described = robot_from(robot, tip, joints, lock)
+        described = robot_from(robot, tip, joints, lock, assume_masses=assume_masses)
         if pose is not None and pose.endswith(".csv"):
             stands = read_trajectory(pose, n=described.n)[0].q[0]
         else:

@@ -11,6 +11,7 @@ import typer
 from oed.cli.configuration.defaults import is_from_file
 from oed.cli.console import Console
 from oed.cli.options import (
+    AssumeMassesOption,
     BaseFrequencyOption,
     ClusterOption,
     CollisionOption,
@@ -154,6 +155,7 @@ def design(
     joints: JointsOption = None,
     lock: LockOption = None,
     unlimited: UnlimitedOption = False,
+    assume_masses: AssumeMassesOption = None,
     png: PngOption = False,
     force: ForceOption = False,
     json: JsonOption = False,
@@ -172,7 +174,7 @@ def design(
 
             refuse_others(context)
             summary, data = design_discriminating(
-                robot_from(robot, tip, joints, lock, unlimited=unlimited),
+                robot_from(robot, tip, joints, lock, unlimited=unlimited, assume_masses=assume_masses),
                 discriminate,
                 noise=numbers("--noise", noise),
                 friction=friction,
@@ -208,7 +210,7 @@ def design(
             executor_from(workers, cluster) as executor,
             ResultFolder(out, force, names=["trajectory.csv", "design.json", "report.html"]) as folder,
         ):
-            described = robot_from(robot, tip, joints, lock, unlimited=unlimited)
+            described = robot_from(robot, tip, joints, lock, unlimited=unlimited, assume_masses=assume_masses)
             prior, effects = prior_from(after, described.n) if after else (None, ())
             result = run(
                 described,

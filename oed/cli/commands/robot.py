@@ -8,7 +8,16 @@ from typing import Annotated
 import typer
 
 from oed.cli.console import Console
-from oed.cli.options import ROBOT, JointsOption, JsonOption, LockOption, QuietOption, TipOption, robot_from
+from oed.cli.options import (
+    ROBOT,
+    AssumeMassesOption,
+    JointsOption,
+    JsonOption,
+    LockOption,
+    QuietOption,
+    TipOption,
+    robot_from,
+)
 
 
 def robot(
@@ -17,6 +26,7 @@ def robot(
     tip: TipOption = None,
     joints: JointsOption = None,
     lock: LockOption = None,
+    assume_masses: AssumeMassesOption = None,
     json: JsonOption = False,
     quiet: QuietOption = False,
 ) -> None:
@@ -31,7 +41,7 @@ def robot(
 
         # The summary has them.
         warnings.simplefilter("ignore", AssumedValueWarning)
-        described = robot_from(file, tip, joints, lock)
+        described = robot_from(file, tip, joints, lock, assume_masses=assume_masses)
     console.result(robot_summary(described), robot_data(described))
 
 

@@ -10,6 +10,7 @@ import typer
 from oed.cli.console import Console
 from oed.cli.options import (
     ROBOT,
+    AssumeMassesOption,
     ForceOption,
     JointsOption,
     JsonOption,
@@ -68,6 +69,7 @@ def simulate(
     tip: TipOption = None,
     joints: JointsOption = None,
     lock: LockOption = None,
+    assume_masses: AssumeMassesOption = None,
     force: ForceOption = False,
     json: JsonOption = False,
     quiet: QuietOption = False,
@@ -87,6 +89,7 @@ def simulate(
         from oed.campaigns import Campaign, record
         from oed.exports import read_trajectory
         from robots.common.errors import InputError
+        from robots.loading import load_robot
         from robots.plants import load_plant, nominal_plant
         from robots.plants import simulate as run
         from robots.terms.situations.flange_body import with_body
@@ -97,9 +100,11 @@ def simulate(
             raise typer.BadParameter("--model takes the place of --plant and needs a --trajectory", ctx=context)
         if payload is not None and campaign is not None:
             raise typer.BadParameter("--payload needs a --trajectory", ctx=context)
-        given = robot_from(robot, tip, joints, lock) if robot else None
+        given = robot_from(robot, tip, joints, lock, assume_masses=assume_masses) if robot else None
         if campaign is not None:
             planned = Campaign.load(campaign, given)
+            if given is None and assume_masses is not None:
+                planned = replace(planned, robot=load_robot(planned.robot, assume_masses=assume_masses))
             folder = out or Path("logs")
             played = load_plant(plant, planned.robot) if plant else None
             files = record(planned, folder, plant=played, seed=seed, force=force, progress=progress)
@@ -109,6 +114,7 @@ def simulate(
                 "samples": planned.samples,
                 "duration": planned.duration,
                 "robot": planned.robot.name,
+                "assumed": list(planned.robot.assumed),
             }
             size = f"{len(files)} logs, {planned.samples} samples, {planned.duration / 60:.1f} min"
             target = folder
@@ -118,7 +124,7 @@ def simulate(
             target = out or Path("log.csv")
             progress.start("simulating", None)
             named = str(metadata.get("robot") or "")
-            described = given or (robot_from(named, tip, joints, lock) if named else None)
+            described = given or (robot_from(named, tip, joints, lock, assume_masses=assume_masses) if named else None)
             if model is not None:
                 from estimation import load_model
                 from estimation.predictions.virtual_robot import virtual_robot
@@ -135,6 +141,12 @@ def simulate(
                 virtual = replace(virtual, parameters=loaded)
             log = run(virtual, motion, seed=seed)
             write_log(target, log, force=force, kinds=described.chain.kinds)
-            data = {"file": str(target), "samples": len(log), "duration": log.duration, "robot": described.name}
+            data = {
+                "file": str(target),
+                "samples": len(log),
+                "duration": log.duration,
+                "robot": described.name,
+                "assumed": list(described.assumed),
+            }
             size = f"{len(log)} samples, {log.duration:.1f} s"
     console.result(f"{size} of a virtual {data['robot']} written to {target}", data)

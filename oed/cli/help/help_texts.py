@@ -16,7 +16,7 @@ COMMANDS: dict[str, tuple[str, ...]] = {
 OTHER = "Other commands"
 
 OPTIONS = {
-    "Robot": ("robot", "tip", "joints", "lock", "unlimited", "home"),
+    "Robot": ("robot", "tip", "joints", "lock", "unlimited", "assume_masses", "home"),
     "Input": (
         *(
             "trajectory",

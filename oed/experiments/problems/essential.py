@@ -34,9 +34,7 @@ def essential_part(problem: FourierProblem, share: float) -> BaseParameters:
     if not 0 <= share < 1:
         raise InputError(f"the threshold of essential parameters is {share}", allowed="0 to below 1")
     base = problem.base
-    nominal = base.model.nominal
-    if not np.isfinite(nominal).all():
-        raise InputError("essential parameters need the robot's nominal dynamics", remedy="describe them")
+    nominal = base.model.require_description("the choice of essential parameters")
     rng = np.random.default_rng(0)
     drawn = [problem.shrunk(rng.normal(size=problem.size), 0.95, halvings=6) for _ in range(MOTIONS)]
     q, dq, ddq = (np.concatenate(part) for part in zip(*map(problem.limit_states, drawn), strict=True))

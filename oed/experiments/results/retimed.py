@@ -248,10 +248,9 @@ class RetimedExperiment:
 
 def torque_use(base: BaseParameters, motion: Motion) -> TorqueUse | None:
     """Measures the torques of a motion by the nominal model; None where that is not described."""
-    nominal = base.model.nominal
-    if not np.isfinite(nominal).all():
+    if not base.model.described:
         return None
-    tau = base.model.torque(motion.q, motion.dq, motion.ddq, nominal)
+    tau = base.model.torque(motion.q, motion.dq, motion.ddq, base.model.nominal)
     return TorqueUse(peak=np.abs(tau).max(axis=0), rms=np.sqrt(np.square(tau).mean(axis=0)))
 
 

@@ -63,7 +63,7 @@ def nominal_torque(base: BaseParameters, motion: Motion, effects: Sequence[Plant
         effects: what the robot has beyond its description.
     """
     model = base.model
-    if not np.isfinite(model.nominal).all():
+    if not model.described:
         return None
     if not effects:
         return model.torque(motion.q, motion.dq, motion.ddq, model.nominal)

@@ -205,7 +205,7 @@ def _torque_limits(
     """The limits of torque and of its root mean square, where they and the nominal dynamics are described."""
     peak = rms = None
     model, effects = base.model, limits.static_effects
-    known = limits.torque and np.isfinite(model.nominal).all()
+    known = limits.torque and model.described
     if known and np.isfinite(robot.limits.torque).any():
         peak = TorqueLimit(model, model.nominal, robot.limits.torque, margin=limits.torque_margin, effects=effects)
         peak.check_holding(home)

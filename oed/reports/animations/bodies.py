@@ -68,7 +68,9 @@ def bodies_of(robot: Robot, surroundings: Surroundings | None = None) -> tuple[B
     without = set(range(robot.n + 1)) - {body.link for body in drawn}
     around = surroundings or Surroundings()
     model = _model(robot, around)
-    capsules = model.capsules if model is not None else _capsules(robot)
+    capsules: tuple[Capsule, ...] = ()
+    if without - {0} or not drawn:
+        capsules = model.capsules if model is not None else _capsules(robot)
     return (
         *drawn,
         *(

@@ -100,7 +100,7 @@ def _nominal(robot: Robot, motion: Motion) -> Array | None:
     if not np.isfinite(robot.limits.torque).any() or not robot.has_inertia:
         return None
     model = default_model(robot)
-    if not np.isfinite(model.nominal).all():
+    if not model.described:
         return None
     return np.asarray(model.torque(motion.q, motion.dq, motion.ddq, model.nominal))
 

@@ -225,7 +225,7 @@ def test_simulating_the_unknown(run, experiment: Path, robot: Path, out: Path, t
     path = tmp_path / "bare.yaml"
     path.write_text(robot.read_text().split("dynamics:")[0])
     line = ("simulate", "--robot", path, "--trajectory", experiment / "trajectory.csv", "--out", out / "log.csv")
-    refused(run(*line), out, "joint 1", "m_1")
+    refused(run(*line), out, "joint 1", "a virtual robot needs masses", "--assume-masses KG")
 
 
 @pytest.mark.slow

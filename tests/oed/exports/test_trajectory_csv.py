@@ -1,8 +1,10 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from oed.exports import read_trajectory, write_trajectory
-from robots.common.errors import InputError
+from robots.common.errors import InputError, ShorterWayWarning
 from robots.signals import Motion
 
 PERIOD = 0.004
@@ -206,3 +208,19 @@ def test_a_single_sample_is_no_trajectory(file):
     _rewrite(file, change)
     with pytest.raises(InputError, match="one sample"):
         read_trajectory(file)
+
+
+@pytest.mark.parametrize("degrees", [False, True])
+def test_angles_that_go_round_are_taken_on(tmp_path, degrees):
+    """Positions that jump by whole turns while the velocities go on are one motion; a note names row and joints."""
+    t = np.linspace(0.0, 4.0, 1001)
+    speed = 4.0 * np.sin(np.pi * t / 4) ** 2
+    travel = np.column_stack([2 * t - 2 * np.sin(np.pi * t / 2) / (np.pi / 2), np.zeros_like(t)])
+    rise = np.pi * np.sin(np.pi * t / 2)
+    motion = Motion(t, travel, np.column_stack([speed, 0 * t]), np.column_stack([rise, 0 * t]))
+    wrapped = replace(motion, q=(travel + np.pi) % (2 * np.pi) - np.pi)
+    path = tmp_path / "wrapped.csv"
+    write_trajectory(path, wrapped, degrees=degrees)
+    with pytest.warns(ShorterWayWarning, match=r"row \d+: the angle of joint 1 jumps by -360 degrees .* \(joint 1\)"):
+        read, _ = read_trajectory(path)
+    np.testing.assert_allclose(read.q, travel, atol=1e-12)

@@ -7,8 +7,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from oed.exports import read_waypoints
-from robots.common.errors import InputError
+from oed.exports import read_waypoints, shorter_way
+from robots.common.errors import InputError, ShorterWayWarning
+from robots.geometry.chain import Chain, Joint
+from robots.limits import Limits
+from robots.robot import Robot
 
 UNITS = """# %ECSV 1.0
 # ---
@@ -56,3 +59,33 @@ def test_wrong_files(text: str, problem: str, tmp_path: Path) -> None:
     """Another number of joints, text, a missing value or an unknown unit is one message with its place."""
     with pytest.raises(InputError, match=problem):
         read_waypoints(written(tmp_path, text), 2)
+
+
+@pytest.fixture
+def turner() -> Robot:
+    """An endless joint, one with limits of two turns, and an endless slide."""
+    kinds = ("revolute", "revolute", "prismatic")
+    joints = tuple(Joint(name, kind, np.eye(3), np.zeros(3)) for name, kind in zip("abc", kinds, strict=True))
+    ends, free = np.array([np.inf, 6.3, np.inf]), np.full(3, np.inf)
+    limits = Limits(lower=-ends, upper=ends, velocity=np.ones(3), acceleration=free, jerk=free, torque=free)
+    return Robot(name="turner", chain=Chain(joints), limits=limits)
+
+
+def test_endless_joints_turn_the_shorter_way(turner: Robot, tmp_path: Path) -> None:
+    """Angles within one turn that pass pi, or zero, go on; other joints keep theirs; one note names the joint."""
+    text = "q1,q2,q3\n2.8,2.8,2.8\n3.1,3.1,3.1\n-3.0,-3.0,-3.0\n-2.6,-2.6,-2.6\n"
+    with pytest.warns(ShorterWayWarning, match=r"first from 2 to 3, the shorter way .*: joint a\.") as caught:
+        q = read_waypoints(written(tmp_path, text), robot=turner)
+    assert len(caught) == 1
+    np.testing.assert_allclose(q[:, 0], [2.8, 3.1, 2 * np.pi - 3.0, 2 * np.pi - 2.6], rtol=1e-15)
+    np.testing.assert_array_equal(q[:, 1:], np.array([[2.8, 3.1, -3.0, -2.6]] * 2).T)
+    with pytest.warns(ShorterWayWarning, match="first from 1 to 2"):
+        q = shorter_way(turner, [[0.1, 0, 0], [6.2, 0, 0], [0.2, 0, 0]])
+    np.testing.assert_allclose(q[:, 0], [0.1, 6.2 - 2 * np.pi, 0.2], atol=1e-15)
+
+
+@pytest.mark.parametrize("angles", [[0.0, 3.0, -0.1], [0.0, 7.0, 0.0], [0.0, np.pi, 0.0], [-9.0, -2.0, 4.0]])
+def test_counted_turns_and_short_ways_stay(turner: Robot, angles: list[float]) -> None:
+    """Angles that span more than a turn count turns: they stay, as do steps of up to half a turn, without a note."""
+    q = np.array([angles, [0.0] * 3, [0.0] * 3]).T
+    np.testing.assert_array_equal(shorter_way(turner, q), q)

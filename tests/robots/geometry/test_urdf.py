@@ -41,13 +41,80 @@ def test_a_continuous_joint_has_no_position_limits(write_urdf):
     np.testing.assert_array_equal(limits.torque, [3.0, np.inf, 5.0])
 
 
-def test_limits_of_zero_are_read(write_urdf):
-    """A velocity limit of zero is read as stated; lower and upper both zero, as exporters write, are no range."""
+def test_limits_of_zero_are_unknown(write_urdf):
+    """Exporters write zero for what they do not know: no range, and no limit of velocity and torque."""
     inside = '<limit lower="0" upper="0" velocity="0" effort="0"/>'
     taken = read_urdf(write_urdf(link("base") + link("l1") + joint("j1", "base", "l1", inside=inside))).chain()
     assert (taken.limits.lower[0], taken.limits.upper[0]) == (-np.inf, np.inf)
     assert taken.unlimited == ("j1",)
-    assert (taken.limits.velocity[0], taken.limits.torque[0]) == (0.0, 0.0)
+    assert (taken.limits.velocity[0], taken.limits.torque[0]) == (np.inf, np.inf)
+    assert taken.notes[0] == "joint j1: <limit> has velocity and effort 0, which stands for unknown"
+
+
+@pytest.mark.parametrize("inside", ["", '<limit lower="0.3" upper="0.3"/>'])
+def test_limits_that_are_missing_or_equal_are_unknown(inside, write_urdf):
+    """A joint without <limit>, or with two equal ends, has no known limits; a note names ends other than zero."""
+    taken = read_urdf(write_urdf(link("base") + link("l1") + joint("j1", "base", "l1", inside=inside))).chain()
+    assert (taken.limits.lower[0], taken.limits.upper[0]) == (-np.inf, np.inf)
+    assert (taken.limits.velocity[0], taken.limits.torque[0]) == (np.inf, np.inf)
+    assert taken.unlimited == ("j1",)
+    named = "joint j1: <limit> has lower and upper 0.3, which stands for unknown" in taken.notes
+    assert named == bool(inside)
+
+
+def test_links_without_a_mass_are_unknown(write_urdf):
+    """A body whose links state no mass, or zero, has a row of NaN; what is fixed to it counts where it has one."""
+    weightless = BODY.replace('mass value="1"', 'mass value="0"').replace("1", "0")
+    body = link("base") + link("l1", "") + joint("j1", "base", "l1") + link("l2", weightless) + joint("j2", "l1", "l2")
+    body += link("l3", "") + joint("j3", "l2", "l3") + link("tool") + joint("fixed", "l3", "tool", "fixed", "")
+    taken = read_urdf(write_urdf(body)).chain()
+    assert np.isnan(taken.inertia[:2]).all()
+    np.testing.assert_array_equal(taken.inertia[2], [1, 0, 0, 0, 1, 0, 0, 1, 0, 1])
+
+
+def test_a_body_without_one_half_of_its_inertial(write_urdf):
+    """A mass without <inertia> is a point mass; an <inertia> without <mass> is no body, which a note says."""
+    camera = '<inertial><origin xyz="0 0 0.5"/><mass value="2"/></inertial>'
+    body = ARM + link("camera", camera) + joint("f", "l1", "camera", "fixed", "")
+    np.testing.assert_array_equal(read_urdf(write_urdf(body)).chain().inertia[0], [3, 0, 0, 1, 1.5, 0, 0, 1.5, 0, 1])
+    taken = read_urdf(write_urdf(ARM.replace('<mass value="1"/>', ""))).chain()
+    assert np.isnan(taken.inertia).all()
+    assert taken.notes == ("link l1 has an inertia but no mass: it is not used",)
+
+
+def test_a_finger_that_mimics_an_unknown_joint_is_locked(write_urdf):
+    """A joint beside the chain whose leader does not exist is held at its offset, and a note says so."""
+    other = joint("f2", "l1", "b", "prismatic", f'<axis xyz="0 1 0"/><mimic joint="j9" offset="0.25"/>{LIMIT}')
+    taken = read_urdf(write_urdf(ARM + link("b") + other)).chain(joints=["j1"])
+    assert taken.inertia[0, 2] == pytest.approx(0.25, abs=1e-15)
+    assert "joint f2 mimics the unknown joint j9; it is treated as locked" in taken.notes
+
+
+@pytest.mark.parametrize(("count", "named"), [(3, False), (4, True)])
+def test_equal_masses_of_all_links_are_doubted(count, named, write_urdf):
+    """Four links or more of one mass, as exporters fill them in, have a note; the masses count all the same."""
+    body = link("l0") + "".join(link(f"l{i}") + joint(f"j{i}", f"l{i - 1}", f"l{i}") for i in range(1, count + 1))
+    taken = read_urdf(write_urdf(body)).chain()
+    note = f"all {count} links with a mass have 1 kg: it may stand for unknown masses"
+    assert (note in taken.notes) == named
+    np.testing.assert_array_equal(taken.inertia[:, 0], np.ones(count))
+
+
+def test_undeclared_prefixes_are_read_past(write_urdf):
+    """Elements with a prefix that is nowhere declared, which ROS accepts, are not used; the arm is read."""
+    plain = read_urdf(write_urdf(ARM)).chain()
+    drake = "<drake:declare_convex/><ros:control><ros:joint name='j1'/></ros:control>"
+    taken = read_urdf(write_urdf(ARM.replace("<limit ", '<limit drake:acceleration="2" ') + drake))
+    np.testing.assert_array_equal(taken.chain().inertia, plain.inertia)
+    assert any("drake" in part for part in taken.unused)
+
+
+def test_an_inertia_without_mass_is_left_out_with_a_note(write_urdf):
+    """A tool frame of 1e-6 kg m2 without mass, as simulators demand one, is no body: a note says so."""
+    frame = '<inertial><mass value="0"/><inertia ixx="1e-6" ixy="0" ixz="0" iyy="1e-6" iyz="0" izz="1e-6"/></inertial>'
+    taken = read_urdf(write_urdf(ARM + link("tool0", frame) + joint("flange", "l1", "tool0", "fixed", ""))).chain()
+    np.testing.assert_array_equal(taken.inertia[0], [1, 0, 0, 0, 1, 0, 0, 1, 0, 1])
+    assert "link tool0 has an inertia but no mass: it is not used" in taken.notes
 
 
 def test_the_axis_is_x_unless_stated(write_urdf):
@@ -162,11 +229,6 @@ WRONG = {
         link("a") + link("b") + joint("j", "a", "b", inside=LIMIT + '<origin xyz="0 0 nan"/>'),
         "joint j: <origin> xyz is '0 0 nan'",
     ),
-    "no limit": (link("a") + link("b") + joint("j", "a", "b", inside=""), "joint j: a revolute joint without <limit>"),
-    "no velocity": (
-        link("a") + link("b") + joint("j", "a", "b", inside='<limit lower="0" upper="1" effort="1"/>'),
-        "joint j: <limit> states no velocity",
-    ),
     "negative velocity": (
         link("a") + link("b") + joint("j", "a", "b", inside='<limit velocity="-1" effort="1"/>'),
         "joint j: <limit> velocity is -1; allowed: zero or more",
@@ -183,25 +245,9 @@ WRONG = {
         link("a") + link("b", BODY.replace('ixx="1"', 'ixx="-1"')) + joint("j", "a", "b"),
         "link 'b' has an inertia with a negative principal moment of -1",
     ),
-    "inertia without mass": (
-        link("a") + link("b", BODY.replace('mass value="1"', 'mass value="0"')) + joint("j", "a", "b"),
-        "link 'b' has an inertia of up to 1 kg m2 but no mass",
-    ),
-    "no mass element": (
-        link("a") + link("b", BODY.replace('<mass value="1"/>', "")) + joint("j", "a", "b"),
-        "link 'b': <inertial> has no <mass>",
-    ),
     "no izz": (
         link("a") + link("b", BODY.replace('izz="1"', "")) + joint("j", "a", "b"),
         "link 'b': <inertia> izz is missing",
-    ),
-    "moving without mass": (
-        link("a") + link("b", "") + joint("j", "a", "b") + link("c", "") + joint("f", "b", "c", "fixed", ""),
-        r"joint j: the body it moves has no mass \(links 'b', 'c'\)",
-    ),
-    "mimics nothing": (
-        ARM + link("l2") + joint("j2", "l1", "l2", inside=LIMIT + '<mimic joint="j9"/>'),
-        "joint j2: it mimics the joint 'j9', which does not exist",
     ),
     "macro": (
         '<xacro:arm xmlns:xacro="http://www.ros.org/wiki/xacro"/>',

@@ -9,6 +9,7 @@ import pytest
 
 from robots.common.errors import InputError
 from robots.geometry.urdf import read_urdf
+from robots.geometry.urdf_shapes import UrdfShape, mesh_file
 from robots.geometry.xacro_ import find_package, split_arguments
 from robots.loading import load_robot
 
@@ -67,11 +68,38 @@ def test_included_files_and_packages_are_found(xacro, tmp_path):
     write(other / "urdf" / "arm.xacro", MACRO)
     body = '<xacro:include filename="$(find parts)/urdf/arm.xacro"/>' + CALL
     top = write(workspace / "my_arm" / "urdf" / "top.xacro", body)
-    with pytest.raises(InputError, match=r"the package 'parts' was not found.*ROS_PACKAGE_PATH"):
-        load_robot(top)
-    other.rename(workspace / "parts")
     assert load_robot(top).joint_names == ("j_a",)
     assert find_package("my_arm", top) == workspace / "my_arm"
+    assert find_package("folder_of_another_name", top) == other
+
+
+def test_a_missing_package_is_named_once(xacro, tmp_path):
+    """The message names the package, what was looked for and what to do, without the library's words around it."""
+    top = write(tmp_path / "my_arm" / "top.xacro", '<xacro:include filename="$(find parts)/urdf/arm.xacro"/>' + CALL)
+    with pytest.raises(InputError, match="the package 'parts' was not found") as caught:
+        load_robot(top)
+    assert str(caught.value) == (
+        f"{top}: the package 'parts' was not found: no package.xml and no folder around the file has that name; "
+        "put it beside this package, with its package.xml or in a folder of that name, or set ROS_PACKAGE_PATH to the "
+        "folder above it"
+    )
+
+
+def test_a_copied_package_is_the_one_around_the_file(xacro, tmp_path):
+    """Vendors' packages are copied under other names, without package.xml: its own parts are found all the same."""
+    write(tmp_path / "kr10" / "urdf" / "arm_macro.xacro", MACRO)
+    body = '<xacro:include filename="$(find vendor_kr10_support)/urdf/arm_macro.xacro"/>' + CALL
+    assert load_robot(write(tmp_path / "kr10" / "urdf" / "arm.xacro", body)).joint_names == ("j_a",)
+
+
+def test_packages_of_other_repositories(tmp_path):
+    """A workspace holds repositories, and these hold packages: one of another repository is found."""
+    file = tmp_path / "src" / "cell" / "cell_description" / "urdf" / "cell.urdf"
+    file.parent.mkdir(parents=True)
+    arms = tmp_path / "src" / "arms" / "small"
+    arms.mkdir(parents=True)
+    (arms / "package.xml").write_text("<package><name>small_arm_description</name></package>")
+    assert find_package("small_arm_description", file) == arms
 
 
 def test_packages_of_the_environment(tmp_path, monkeypatch):
@@ -140,3 +168,31 @@ def test_arguments_are_distinguished_from_the_path():
         {"a": "1", "b_c": "x/y"},
     )
     assert split_arguments("C:\\arms\\a.urdf")[1] == {}
+
+
+@pytest.mark.parametrize(
+    ("file", "found"),
+    [
+        ("package://vendor_arm/meshes/a.stl", True),  # by the name in package.xml
+        ("package:///vendor_arm/meshes/a.stl", True),
+        ("model://vendor_arm/meshes/a.stl", True),
+        ("package://copy_of_the_arm/meshes/a.stl", True),  # by the folder's name
+        ("package://lost_arm/meshes/a.stl", True),  # the folder above the URDF has the rest of the path
+        ("package://lost_arm/meshes/b.stl", False),
+        ("../meshes/a.stl", True),
+    ],
+)
+def test_meshes_are_found(file, found, tmp_path):
+    """A mesh is found by its package's name, in package.xml or of the folder, or beside the URDF."""
+    package = tmp_path / "copy_of_the_arm"
+    for folder in ("urdf", "meshes"):
+        (package / folder).mkdir(parents=True)
+    (package / "package.xml").write_text("<package><name>vendor_arm</name></package>")
+    mesh, urdf = package / "meshes" / "a.stl", package / "urdf" / "arm.urdf"
+    mesh.touch()
+    shape = UrdfShape(link="l", kind="mesh", pose=np.eye(4), file=file)
+    if found:
+        assert mesh_file(shape, urdf).resolve() == mesh.resolve()
+    else:
+        with pytest.raises(InputError, match="the package 'lost_arm' was not found"):
+            mesh_file(shape, urdf)

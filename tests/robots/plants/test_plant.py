@@ -106,7 +106,7 @@ def test_impossible_plants_are_refused(er3a):
         nominal_plant(er3a, spread=-0.1)
     unknown = np.array(er3a.inertia)
     unknown[1] = np.nan
-    with pytest.raises(InputError, match="joint 2: the plant has no value for m_2"):
+    with pytest.raises(InputError, match="joint 2: a virtual robot needs masses, which the description of er3a does"):
         nominal_plant(replace(er3a, inertia=unknown))
     with pytest.raises(InputError, match=r"\(3,\) plant parameters; allowed: \(96,\)"):
         Plant(model=default_model(er3a), parameters=np.ones(3))

@@ -121,3 +121,27 @@ def test_waypoints_need_a_robot(run: Callable[..., Any], tmp_path: Path) -> None
     (tmp_path / "points.csv").write_text("q1,q2\n0,0\n1,1\n")
     done = run("retime", tmp_path / "points.csv", "--out", tmp_path / "timed")
     assert (done.code, "give --robot" in done.err) == (2, True)
+
+
+TURN3 = """<robot name="turn3"><link name="base"/><link name="a"/><link name="b"/><link name="c"/>
+<joint name="pan" type="continuous"><parent link="base"/><child link="a"/><origin xyz="0 0 0.2"/><axis xyz="0 0 1"/>
+<limit velocity="2" effort="60"/></joint>
+<joint name="lift" type="revolute"><parent link="a"/><child link="b"/><origin xyz="0 0 0.1" rpy="1.5707963 0 0"/>
+<axis xyz="0 0 1"/><limit lower="-2" upper="2" velocity="2" effort="80"/></joint>
+<joint name="elbow" type="continuous"><parent link="b"/><child link="c"/><origin xyz="0.4 0 0"/><axis xyz="0 0 1"/>
+<limit velocity="2" effort="30"/></joint></robot>"""
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("method", ["toppra", "ruckig"])
+def test_continuous_joints_pass_pi_the_shorter_way(method: str, run: Callable[..., Any], tmp_path: Path) -> None:
+    """From 3.1 to -3.0 rad a continuous joint turns by 0.18 rad, not by 6.1 rad back; one note says so."""
+    (tmp_path / "turn3.urdf").write_text(TURN3)
+    (tmp_path / "way.csv").write_text("q1,q2,q3\n2.8,0.2,0.0\n3.1,0.3,0.2\n-3.0,0.4,0.4\n-2.6,0.5,0.6\n")
+    robot, out = tmp_path / "turn3.urdf", tmp_path / "r"
+    done = run("retime", tmp_path / "way.csv", "--robot", robot, "--method", method, "--out", out)
+    assert done.code == 0, done.err
+    assert done.err.count("joint pan. For the longer way, put a waypoint between") == 1
+    motion, _ = read_trajectory(out / "trajectory.csv")
+    # 0.3 rad, 2 pi - 6.1 rad and 0.4 rad, all in one direction.
+    np.testing.assert_allclose(np.abs(np.diff(motion.q[:, 0])).sum(), 2 * np.pi - 5.4, rtol=1e-9)
