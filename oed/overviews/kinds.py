@@ -7,6 +7,8 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
+from estimation.diagnosis.results.standing import standing_of, standing_verdict
+from oed.experiments.safety_checks.freedom import collides, freedom_text
 from oed.reports.pages.design_report import excitation_code
 from oed.reports.rendering.severity import LEVELS
 from robots.common.plain import two_digits
@@ -68,12 +70,16 @@ def _design(data: Data) -> Reading:
     tightest = min((m["slack_fraction"] for m in margins if m["limit"] is not None), default=None)
     cond = whole["cond_Y"]
     excitation = excitation_code(cond, whole["samples"])
+    freedom = data.get("collision")
     codes = ["limit.exceeded"] if beyond else []
+    codes += ["collision.unchecked"] if freedom is None else ["collision.found"] if collides(freedom) else []
     codes += [excitation] if excitation else []
     codes += ["value.assumed"] if data["assumed"] else []
     retimed = data.get("retiming")
     if beyond:
         verdict = f"Do not play this motion: it exceeds {len(beyond)} limits."
+    elif freedom is None or collides(freedom):
+        verdict = f"Do not play this motion. {freedom_text(freedom)}"
     elif retimed:
         verdict = retimed["verdict"]
     elif excitation:
@@ -127,24 +133,30 @@ def _model(data: Data) -> Reading:
 
 def _diagnosis(data: Data) -> Reading:
     verdict, findings = data["verdict"], data["findings"]
-    known = [f"effect.{f['effect']}" for f in findings if f"effect.{f['effect']}" in LEVELS]
-    codes = [*known, *([f"diagnosis.{verdict}"] if verdict in ("ambiguous", "unexplained") else [])]
-    places = [f["effect"].replace("_", " ") + (f" of joint {f['joint']}" if f["joint"] else "") for f in findings]
     text = {
         "none": "No missing effect was found",
         "named": "Found",
         "ambiguous": "Several causes fit",
         "unexplained": "Part of the residual has no known cause",
     }[verdict]
+    known = [f"effect.{f['effect']}" for f in findings if f"effect.{f['effect']}" in LEVELS]
+    before, after = ([math.nan if x is None else x for x in data[part]["nrmse"]] for part in ("baseline", "extended"))
+    standing, forbidden = standing_of(verdict, before, after), standing_verdict(verdict, before, after)
+    codes = [*(known if standing != "unconfirmed" else []), *([f"diagnosis.{standing}"] if standing != "sound" else [])]
+    codes += [f"diagnosis.{verdict}"] if verdict in ("ambiguous", "unexplained") else []
+    places = [f["effect"].replace("_", " ") + (f" of joint {f['joint']}" if f["joint"] else "") for f in findings]
     return Reading(
         kind="diagnosis",
-        verdict=f"{text}{': ' if places else ''}{', '.join(places)}.",
+        verdict=f"{text}{': ' if places else ''}{', '.join(places)}. {forbidden}".rstrip(),
         codes=tuple(codes) or ("done",),
         figures={
             "effects found": len(findings),
             "NRMSE, base model [%]": _pooled(data["baseline"]["nrmse"]),
             "NRMSE, held-out data [%]": _pooled(data["extended"]["nrmse"]),
-            "explained [%]": None if data.get("explained") is None else 100.0 * data["explained"],
+            # Of an unexplained residual the share that has names says nothing of the rest.
+            "explained [%]": None
+            if verdict == "unexplained" or data.get("explained") is None
+            else 100.0 * data["explained"],
         },
         robot=_robot(data),
     )

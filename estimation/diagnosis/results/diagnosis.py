@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from estimation.diagnosis.experiment_plans.detection_limits import Limit, summarise_limits
 from estimation.diagnosis.experiment_plans.next_experiment import NextExperiment
 from estimation.diagnosis.findings import Finding, list_parameters, read_finding
+from estimation.diagnosis.results.standing import standing_text, standing_verdict
 from estimation.diagnosis.results.verdict_text import close_rivals, format_p_value, state_verdict
 from estimation.diagnosis.simulations.simulation_result import Simulation, read_simulation
 from estimation.diagnosis.validations.prediction_settings import all_row_errors
@@ -112,6 +113,9 @@ class Diagnosis:
         """Returns the verdict, findings, held-out errors, simulation, next experiment and notes as text."""
         robot = self.model.robot
         lines = [f"{robot.name}: {state_verdict(self.verdict, self.findings)}"]
+        errors = (self.baseline, self.extended, self.every_row)
+        for say in (standing_verdict, standing_text):
+            lines += [f"  {text}"] if (text := say(self.verdict, *errors, self.limits)) else []
         if self.verdict == "none" and (seen := summarise_limits(self.limits)):
             lines.append(f"  {seen[0].lower()}{seen[1:]}")
         for finding in self.findings:
@@ -181,6 +185,7 @@ class Diagnosis:
     def to_dict(self) -> dict[str, Any]:
         """Returns the content of `diagnosis.json` as plain data."""
         return {
+            "robot": {"name": self.model.robot.name},
             "verdict": self.verdict,
             "findings": [finding.to_dict() for finding in self.findings],
             "baseline": {"nrmse": list(map(finite, self.baseline.tolist()))},

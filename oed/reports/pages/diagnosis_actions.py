@@ -6,7 +6,8 @@ from collections.abc import Iterable
 
 from estimation.diagnosis.calibration import CLOSE_RIVAL_BIC
 from estimation.diagnosis.experiment_plans.detection_limits import summarise_limits
-from oed.reports.pages.diagnosis_view import DiagnosisView
+from estimation.diagnosis.results.standing import standing_of, standing_text, standing_verdict
+from oed.reports.pages.diagnosis_view import DiagnosisView, FindingView
 from oed.reports.rendering.page import Finding, findings_of
 from oed.reports.rendering.severity import FAULTS
 
@@ -73,6 +74,10 @@ def verdict_of(view: DiagnosisView) -> str:
     Args:
         view: the diagnosis.
     """
+    errors = (view.nrmse_before, view.nrmse_after, view.nrmse_every)
+    forbidden = standing_verdict(view.verdict, *errors, view.limits)
+    if forbidden:
+        return f"{forbidden} Record {view.next_kind} and diagnose again." if view.next_kind else forbidden
     if view.verdict == "none":
         return "No missing effect was found: use the model as it is."
     if view.verdict == "named":
@@ -88,21 +93,32 @@ def verdict_of(view: DiagnosisView) -> str:
     return f"Check logs and robot: {why}, and no known experiment finds it."
 
 
+def _code(finding: FindingView, confirmed: bool) -> str:
+    if not finding.named:
+        return "diagnosis.unexplained"
+    return f"effect.{finding.effect}" if confirmed else "diagnosis.note"
+
+
 def findings_in(view: DiagnosisView) -> tuple[Finding, ...]:
     """Lists effects, unexplained residuals, close rivals and notes.
 
     Args:
         view: the diagnosis.
     """
+    standing = standing_of(view.verdict, view.nrmse_before, view.nrmse_after, view.nrmse_every)
+    confirmed = standing != "unconfirmed"
     found = [
         Finding(
-            code=f"effect.{finding.effect}" if finding.named else "diagnosis.unexplained",
+            code=_code(finding, confirmed),
             subject=f"{finding.title[:1].upper()}{finding.title[1:]}:",
             text=finding.sentence,
-            action=action_for(finding.effect, [finding.joint]) if finding.named else "",
+            action=action_for(finding.effect, [finding.joint]) if finding.named and confirmed else "",
         )
         for finding in view.findings
     ]
+    if standing != "sound":
+        errors = (view.nrmse_before, view.nrmse_after, view.nrmse_every)
+        found += findings_of(f"diagnosis.{standing}", [standing_text(view.verdict, *errors, view.limits)])
     found += findings_of("diagnosis.unexplained", view.unexplained)
     if view.verdict == "unexplained" and not any(item.code == "diagnosis.unexplained" for item in found):
         found += findings_of("diagnosis.unexplained", ["Part of the residual is not noise and has no known cause."])

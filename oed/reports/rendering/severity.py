@@ -66,6 +66,8 @@ LEVELS: dict[str, Level] = {
     # Diagnoses and comparisons.
     "diagnosis.ambiguous": "act",
     "diagnosis.unexplained": "act",
+    "diagnosis.unconfirmed": "act",
+    "diagnosis.inaccurate": "act",
     "diagnosis.note": "note",
     "comparison.note": "note",
     "monitor.note": "note",

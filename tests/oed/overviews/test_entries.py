@@ -24,6 +24,7 @@ DESIGN = {
         {"limit": 2.0, "slack_fraction": 0.05},
         {"limit": None, "slack_fraction": 0.01},
     ],
+    "collision": {"clearance": 0.01, "pair": "base / flange", "time": 2.0, "certified": True},
 }
 MODEL = {
     "format": "robot-oed model",
@@ -77,10 +78,12 @@ def test_figures_come_from_the_files(tmp_path: Path) -> None:
         ({"quality": [{"samples": 2500, "cond_Y": None}]}, "act", "does not determine all"),
         ({"quality": [{"samples": 2500, "cond_Y": 9e6}]}, "act", "does not determine all"),
         ({"assumed": ["limits.torque"]}, "note", "Determines 2"),
+        ({"collision": None}, "act", "NOT CHECKED for collisions"),
+        ({"collision": DESIGN["collision"] | {"clearance": -0.02}}, "act", "COLLIDES: base / flange"),
     ],
 )
 def test_designs_are_judged(tmp_path: Path, change: dict, level: str, text: str) -> None:
-    """A design that exceeds a limit or leaves parameters open asks for action, assumed values are a note."""
+    """A design that exceeds a limit, may collide or leaves parameters open asks for action; assumptions are a note."""
     write(tmp_path, "design.json", DESIGN | change)
     (entry,) = find_results(tmp_path)
     assert entry.level == level
