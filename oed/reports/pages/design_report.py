@@ -46,6 +46,7 @@ def design_page(design: Design) -> Page:
         findings=findings,
         facts=_facts(design),
         sections=(
+            _home_section(design),
             Section(
                 title="Motion",
                 paragraphs=(
@@ -77,6 +78,28 @@ def design_page(design: Design) -> Page:
         ),
         footer=footer(design.settings["seed"]),
     )
+
+
+def _home_section(design: Design) -> Section:
+    """Where the robot has to stand, and its moves away from there and back: what a person at the robot checks first."""
+    first, last = design.segments[0], design.segments[-1]
+    begins, returns = first["kind"] == "approach", last["kind"] == "move"
+    text = "The robot has to stand in the home pose before the motion starts, and ends there."
+    if begins:
+        text += f" Its first move, to the start of the excitation, ends at {first['end']:.1f} s."
+    if returns:
+        text += f" Its last move, back home, begins at {last['start']:.1f} s."
+    if design.home_moved:
+        text += " The usual home pose does not keep the limits in space, so another one was taken."
+    times = [first["end"] if begins else first["start"], last["start"] if returns else last["end"]]
+    poses = [design.home, *(design.motion.q[int(np.abs(design.motion.t - time).argmin())] for time in times)]
+    scales = [1.0 if kind == "prismatic" else 180.0 / np.pi for kind in design.robot.chain.kinds]
+    rows: list[tuple[Cell, ...]] = [
+        (name, "m" if scale == 1.0 else "deg", *(float(scale * pose[joint]) for pose in poses))
+        for joint, (name, scale) in enumerate(zip(design.robot.joint_names, scales, strict=True))
+    ]
+    table = Table(headings=("joint", "unit", "home", "after the first move", "before the last"), rows=tuple(rows))
+    return Section(title="Start and end", paragraphs=(text,), tables=(table,))
 
 
 def _animation(design: Design) -> Section:

@@ -151,3 +151,16 @@ def test_pictures_on_request(design: Design, tmp_path: Path) -> None:
 def test_works_in_a_browser(design: Design, in_browser: Callable[[Page], None]) -> None:
     """The page passes all checks of `browser_checks`."""
     in_browser(design_page(design))
+
+
+def test_the_report_begins_with_home(design: Design) -> None:
+    """The first section says where the robot stands at first, and when its first and last moves are, by the file."""
+    section = design_page(design).sections[0]
+    assert section.title == "Start and end"
+    (table,) = section.tables
+    home = np.array([row[2] for row in table.rows])
+    np.testing.assert_allclose(np.deg2rad(home), design.motion.q[0], atol=1e-9)
+    np.testing.assert_allclose(home, np.rad2deg(design.motion.q[-1]), atol=1e-6)
+    approach = [s for s in design.segments if s["kind"] == "approach"]
+    assert approach
+    assert f"ends at {approach[0]['end']:.1f} s" in section.paragraphs[0]
