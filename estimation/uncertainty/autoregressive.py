@@ -7,8 +7,9 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.fft import next_fast_len
 from scipy.signal import lfilter
+
+from estimation.uncertainty.correlations import lagged_products
 
 Array = NDArray[np.float64]
 
@@ -45,9 +46,7 @@ class Noise:
 
 def autocovariance(series: Array, count: float, lags: int = HIGHEST_ORDER) -> Array:
     """Sums products at lags 0..`lags` over `count` rows (lags + 1,); masked rows must be zero."""
-    length = next_fast_len(len(series) + lags + 1)
-    spectrum = np.fft.rfft(series, length)
-    return np.fft.irfft(np.abs(spectrum) ** 2, length)[: lags + 1] / max(count, 1.0)
+    return lagged_products(series, lags) / max(count, 1.0)
 
 
 def fit_noise(residual: Array, counts: Array, covariances: Sequence[Array] | Array, times: int = 1) -> Noise:

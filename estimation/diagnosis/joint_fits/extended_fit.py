@@ -13,7 +13,6 @@ from estimation.diagnosis.hypothesis_tests.fitted_effects import FittedEffect, a
 from estimation.diagnosis.hypothesis_tests.hypotheses import Hypothesis
 from estimation.diagnosis.hypothesis_tests.problem import Problem
 from estimation.diagnosis.hypothesis_tests.scoring import accept, score
-from estimation.diagnosis.joint_fits.block_errors import widened_by_blocks
 from estimation.diagnosis.joint_fits.event_window import open_event_edges
 from estimation.diagnosis.joint_fits.shape_errors import (
     formula_errors,
@@ -27,6 +26,7 @@ from estimation.identifications.verdicts import NEGLIGIBLE, RELATIVE
 from estimation.models.extension import Extension
 from estimation.models.model import Model
 from estimation.regressions.parameter_priors import GaussianPrior
+from estimation.uncertainty.blocks import widened_by_blocks
 from robots.terms.effect_bases.capabilities import AboveBand, AtReversals
 
 Array = NDArray[np.float64]

@@ -15,6 +15,7 @@ from estimation.gate.quick_fits.joint_columns import OWN, JointColumns, joined, 
 from estimation.gate.quick_fits.rigid_body import joint_rows, rigid_body, used_columns
 from estimation.gate.quick_fits.whole_fit import Moments, solve_scaled
 from estimation.preprocessing import rows_at_rest
+from estimation.uncertainty.blocks import block_numbers, clustered_errors
 from robots.robot import Robot
 
 Array = NDArray[np.float64]
@@ -58,9 +59,7 @@ class JointFit:
         """
         direction = weights / self.scale
         value = float(direction @ self.values)
-        blocks = len(self.scores)
-        influence = self.scores @ (self.inverse @ direction)
-        return value, float(np.sqrt(influence @ influence * blocks / max(blocks - 1, 1)))
+        return value, float(clustered_errors(self.scores @ (self.inverse @ direction)))
 
 
 @dataclass(frozen=True, eq=False)
@@ -109,7 +108,7 @@ class Rows:
             excerpts = [part.thinned(stride) for part in excerpts]
         q, dq, ddq = (np.concatenate([getattr(part, name) for part in excerpts]) for name in ("q", "dq", "ddq"))
         rows = len(q)
-        block = np.minimum((np.arange(rows) * BLOCKS) // rows, BLOCKS - 1)
+        block = block_numbers(rows, BLOCKS)
         speed = np.sqrt(np.mean(dq**2, axis=0))
         own = np.zeros_like(ddq) if static else ddq
         bodies, used = joint_rows(robot, q, np.zeros_like(dq) if static else dq, own), used_columns(robot)

@@ -18,7 +18,6 @@ from oed.reports import (
     torque_picture,
     trajectory_picture,
 )
-from oed.reports.pictures.torque_pictures import autocorrelation
 from robots.common.errors import InputError
 from robots.limits import Limits, Margin
 
@@ -161,18 +160,6 @@ def test_bars_that_would_flatten_the_others_are_stated() -> None:
     picture = error_bars_picture({"fit": [0.02]}, rivals={"constant": [0.9], "description": [0.06]})
     assert [series.name for series in picture.panels[0].series] == ["fit", "description"]
     assert "constant (90 to 90 %)" in picture.caption
-
-
-@pytest.mark.parametrize("gaps", [False, True])
-def test_autocorrelation_is_that_of_its_definition(gaps: bool) -> None:
-    """The correlations by FFT equal the sums over pairs, to rounding; pairs with a gap count for nothing."""
-    rng = np.random.default_rng(0)
-    y = np.convolve(rng.normal(size=300), np.ones(5), mode="valid")
-    if gaps:
-        y[40:60] = np.nan
-    centred = y - np.nanmean(y)
-    expected = [np.nanmean(centred[: len(y) - lag] * centred[lag:]) for lag in range(20)]
-    np.testing.assert_allclose(autocorrelation(y, 19), np.array(expected) / expected[0], atol=1e-12)
 
 
 @pytest.mark.slow
