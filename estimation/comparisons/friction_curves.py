@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from estimation.comparisons.common_parameters import CommonParameters, friction_table
 from estimation.comparisons.runs import Run
-from estimation.uncertainty.normal import NORMAL_95
+from estimation.uncertainty.quantiles import NORMAL_95
 from robots.common.plain import all_finite
 
 Array = NDArray[np.float64]

@@ -8,7 +8,6 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import norm
 
 from estimation.comparisons.common_parameters import CommonParameters
 from estimation.comparisons.hypothesis_tests import agreement_test
@@ -16,6 +15,7 @@ from estimation.models.model import Model
 from estimation.payloads.determination import determined
 from estimation.payloads.intervals import Quantity, quantities
 from estimation.payloads.physical import physical_body
+from estimation.uncertainty.quantiles import normal_limit
 from robots.base_parameters import find_base_parameters
 from robots.common.plain import finite
 from robots.geometry.inertia import SIZE
@@ -151,7 +151,7 @@ def _payload(
     explained = 1 - max(rest - free, 0.0) / excess if excess > 0 else 0.0
     # What the body leaves unexplained is an error of the models: it widens the intervals.
     covariance = covariance * max(rest / max(free, 1), 1.0)
-    significant = abs(p[0]) > norm.isf(alpha / 2) * np.sqrt(covariance[0, 0])
+    significant = abs(p[0]) > normal_limit(alpha) * np.sqrt(covariance[0, 0])
     if not significant or explained < EXPLAINED:
         return None
     removed = bool(p[0] < 0)

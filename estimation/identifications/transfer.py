@@ -15,14 +15,15 @@ from estimation.preprocessing import Smoother
 from estimation.regressions.blocks import Blocks, Sides
 from estimation.regressions.moments import Moments
 from estimation.regressions.preparation import Rows
+from estimation.uncertainty.quantiles import NORMAL_95
 
 Array = NDArray[np.float64]
 Which = NDArray[np.bool_]
 
 # Joints with the widest ranges: of each, the lower half of the range predicts the upper, and the upper the lower.
 WIDEST = 3
-# Share of the errors that a band is to hold, and the normal distribution's half-width for it.
-BAND, NORMAL_95 = 0.95, 1.96
+# Share of the errors that a band is to hold.
+BAND = 0.95
 # Factors on the parameters' standard errors from which the band of other motions takes the first that suffices.
 GROWTHS = (1.0, 1.5, 2.0, 3.0, 4.0, 6.0, 8.0, 12.0, 16.0, 24.0, 32.0)
 # Share of the splits' errors that this band is to hold. A new motion may lie farther away than one half of the log from

@@ -6,10 +6,10 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import chi2
 
 from estimation.linear_algebra.conic import ConicProgram
 from estimation.linear_algebra.log_determinant import VARIABLES, add_log_determinant
+from estimation.uncertainty.quantiles import chi2_limit
 from robots.consistency import BASIS, normalised_eigenvalues, pseudo_inertia
 from robots.geometry.inertia import SIZE, inertial_parameters
 
@@ -42,7 +42,7 @@ class PhysicalBody:
     @property
     def contradicted(self) -> bool:
         """Whether least squares lie farther from all bodies than chance explains."""
-        return self.distance > float(chi2.isf(UNLIKELY, SIZE))
+        return self.distance > chi2_limit(UNLIKELY, SIZE)
 
 
 def physical_body(values: Array, covariance: Array) -> PhysicalBody:

@@ -16,13 +16,13 @@ from estimation.diagnosis.recordings.log_reading import Recording
 from estimation.regressions.parameter_priors import GaussianPrior
 from estimation.uncertainty.blocks import moving_block_sums
 from estimation.uncertainty.correlations import correlation_rows
+from estimation.uncertainty.quantiles import CHI2_95, TAIL
 from robots.common.plain import several
 
 Array = NDArray[np.float64]
 
 PARTS = 5  # stretches into which a log is split
 RESAMPLES = 500  # bootstrap samples of an interval
-SURELY = 1.96  # standard errors of a contradiction
 BLOCK = 1.0  # shortest block [s]; longer ones have five times the correlation time of the errors
 
 
@@ -117,20 +117,20 @@ class HeldOutErrors:
         sums = moving_block_sums(np.hstack([*squares, counts]), block, RESAMPLES, rng)
         old, new, counted = np.split(sums, 3, axis=1)
         falls = ((np.sqrt(old / np.maximum(counted, 1)) - np.sqrt(new / np.maximum(counted, 1))) / level).mean(axis=1)
-        low, high = np.quantile(falls, [0.025, 0.975])
+        low, high = np.quantile(falls, [TAIL, 1 - TAIL])
         return float(low), float(high)
 
     def surely_worse(self, model: int) -> bool:
         """Whether the held-out rows significantly contradict the effect that a model lacks.
 
         If the effect is true, its chi2 grows by g'g + 2 g'e on the held-out rows: g is its torque there beside the
-        base model, e the noise. This falls below -1.96^2 noise variances with a probability of 2.5 % at most, for any
-        g.
+        base model, e the noise. This falls below -`CHI2_95` noise variances with a probability of 2.5 % at most,
+        for any g.
 
         Args:
             model: index of the model without the effect.
         """
-        return self.growth[model] < -(SURELY**2)
+        return self.growth[model] < -CHI2_95
 
     def _block(self) -> float:
         """Computes the length of a bootstrap block [s] from the correlation time of the errors."""

@@ -16,6 +16,7 @@ from estimation.diagnosis.recordings.log_reading import Recording
 from estimation.models.extension import Extension
 from estimation.uncertainty.blocks import block_numbers, jackknife_errors
 from estimation.uncertainty.correlations import effective_rows
+from estimation.uncertainty.quantiles import student_95
 from robots.signals import Log
 from robots.terms.base import force_unit, length_unit
 from robots.terms.effect_bases.unknown_rotor import KNOWN
@@ -173,7 +174,7 @@ def _test_joint(
     folds = [_solve(whole[~b], w[~b]) for b in blocks]
     error = jackknife_errors(np.stack(folds))
     freedom = len(blocks) - 1
-    quantile = float(student.ppf(0.975, freedom))
+    quantile = student_95(freedom)
     p_value = min(tests * float(student.sf(values[-1] / max(error[-1], 1e-300), freedom)), 1.0)
     if not (values[-1] > STIFFEST and p_value <= false_alarm):
         return None
@@ -243,7 +244,7 @@ def _gain(errors: Sequence[tuple[Array, Array]], level: Array) -> Gain:
     shares = np.sqrt(sums[:, :2] / sums[:, 2:]) / max(float(level.std()), 1e-300)
     before, after = shares[0].tolist()
     falls = -np.diff(shares[1:], axis=1)[:, 0]
-    reach = float(student.ppf(0.975, len(falls) - 1)) * float(jackknife_errors(falls))
+    reach = student_95(len(falls) - 1) * float(jackknife_errors(falls))
     return Gain(nrmse_before=before, nrmse_after=after, ci95=(before - after - reach, before - after + reach))
 
 

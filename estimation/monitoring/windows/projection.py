@@ -6,15 +6,13 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.signal import lfilter
 
 from estimation.monitoring.windows.baseline import Directions
-from estimation.uncertainty.autoregressive import autocovariance, levinson
+from estimation.uncertainty.autoregressive import autocovariance, levinson, whitened
+from estimation.uncertainty.quantiles import NORMAL_MEDIAN
 
 Array = NDArray[np.float64]
 
-# Median of the square of a standard normal variable.
-NORMAL_MEDIAN = 0.4549
 HIGHEST_ORDER = 12
 # Rows below this share of the usual speed say more of presliding than of friction.
 SLOWEST = 0.03
@@ -193,7 +191,7 @@ def _solve(
     for j in range(n):
         a = colour.coefficients[j]
         columns = np.column_stack([directions.friction[:, j], np.ones(len(y)), directions.payload[:, j, :], y[:, j]])
-        white = lfilter(np.concatenate([[1.0], -a]), [1.0], columns, axis=0) if len(a) else columns
+        white = whitened(columns, a)
         chosen = _usable(live[:, j], len(a))
         white = white[chosen]
         X, target = white[:, :-1], white[:, -1]
@@ -234,7 +232,7 @@ def _burst(t: Array, residual: Array, live: NDArray[np.bool_], colour: Colour) -
     n = residual.shape[1]
     white = np.zeros_like(residual)
     for j, a in enumerate(colour.coefficients):
-        filtered = lfilter(np.concatenate([[1.0], -a]), [1.0], residual[:, j])
+        filtered = whitened(residual[:, j], a)
         chosen = _usable(live[:, j], len(a))
         # The sum of whitened values over the root of their number is normal for noise, and large for a short force.
         white[chosen, j] = filtered[chosen] / np.sqrt(colour.variances[j])
@@ -246,5 +244,5 @@ def _burst(t: Array, residual: Array, live: NDArray[np.bool_], colour: Colour) -
     chi = (sums**2).sum(axis=1)
     worst = int(np.argmax(chi))
     # Of the median: a short force fills few blocks.
-    scatter = np.sqrt(np.maximum(np.median(sums**2, axis=0) / NORMAL_MEDIAN, 1.0))
+    scatter = np.sqrt(np.maximum(np.median(sums**2, axis=0) / NORMAL_MEDIAN**2, 1.0))
     return float(t[min(worst * length + length // 2, len(t) - 1)]), float(chi[worst]), sums[worst], scatter

@@ -8,11 +8,12 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from estimation.uncertainty.correlations import autocorrelation
+from estimation.uncertainty.quantiles import NORMAL_95
 from oed.reports.rendering.gaps import break_at_pauses
 from oed.reports.rendering.joint_units import joint_titles, joint_units
 from oed.reports.rendering.palette import joint_role
 from oed.reports.rendering.picture import Band, Line, Panel, Picture, Series
-from oed.reports.rendering.significant import NORMAL_95, percent, significant
+from oed.reports.rendering.significant import percent, significant
 from robots.common.errors import InputError
 from robots.signals import FloatArray
 

@@ -177,7 +177,7 @@ def test_parameters_are_grouped_by_unit() -> None:
     picture = parameter_picture([name, "m_1", "Izz_1"], [1.0, 2.0, 3.0], [0.1, 0.2, np.nan], ["kg m²", "kg", "kg m²"])
     assert [panel.y_label for panel in picture.panels] == ["value [kg m²]", "value [kg]"]
     bars = picture.panels[0].series[0]
-    np.testing.assert_allclose(bars.error, [0.196, 0.0])
+    np.testing.assert_allclose(bars.error, [0.1959964, 0.0])
     assert bars.texts[0] == f"{name}: 1.00 ± 0.10 kg m²"
     assert len(picture.panels[0].categories[0]) <= 14
     with pytest.raises(InputError):
@@ -192,7 +192,7 @@ def test_friction_is_the_polynomial_with_a_gap_at_rest() -> None:
     assert curve.y[-1] == pytest.approx(3 + 4 + 4 + 4)
     assert np.isnan(curve.y[curve.x == 0.0]).all()
     assert curve.error is not None
-    assert curve.error[-1] == pytest.approx(1.96 * 0.2)
+    assert curve.error[-1] == pytest.approx(1.959964 * 0.2)
 
 
 def test_errors_are_in_percent() -> None:
