@@ -9,7 +9,7 @@ The parts of ``--part``:
 - estimates: parameters, errors, bands and held-out predictions of the published logs, of virtual robots, and of each
   estimator.
 - payloads, forces, comparisons, thermal, monitor: virtual robots of known truth.
-- diagnoses: 60 cases of ``oed/benchmarks/truth`` and the published logs.
+- diagnoses: 84 cases of ``oed/benchmarks/truth`` and the published logs.
 - small: some of these that need no published log. Continuous integration compares them with ``frozen_small.jsonl``.
 
 Texts are left out: a change of wording is no change of behaviour. A run that was stopped goes on where it was.
@@ -28,6 +28,7 @@ import warnings
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from functools import partial
+from itertools import product
 from pathlib import Path
 from typing import Any
 
@@ -57,8 +58,8 @@ def gate(data: Path | None, cases: Path | None) -> Iterator[Item]:
     """Verdicts of the gate."""
     for name in diagnosis_real.SETS if data else ():
         yield Item(f"gate/measured/{name}", partial(verdicts.check_measured, name, data))
-    for name in torque_columns.ROBOTS:
-        yield Item(f"gate/foreign/{name}", partial(verdicts.check_foreign, name, 0))
+    for name, seed in product(torque_columns.ROBOTS, range(2)):
+        yield Item(f"gate/foreign/{name}-{seed}", partial(verdicts.check_foreign, name, seed))
     for number in range(verdicts.MANGLED):
         yield Item(f"gate/mangled/{number}", partial(verdicts.check_mangled, number))
     for folder in sorted(path.parent for path in cases.glob("*/README.md")) if cases else ():
@@ -77,16 +78,17 @@ def estimated(data: Path | None, _: Path | None) -> Iterator[Item]:
 
 def virtual(_: Path | None, __: Path | None) -> Iterator[Item]:
     """Payloads, forces, comparisons, thermal models and weeks of the monitor."""
-    for kind in ("ur10", "panda"):
-        yield Item(f"payloads/{kind}-0", partial(campaigns.run_payloads, kind, 0))
-    yield Item("forces/0", partial(campaigns.run_forces, 0))
-    for damaged in (None, 2):
-        yield Item(f"comparisons/{damaged or 'healthy'}", partial(campaigns.run_comparison, 0, damaged))
+    for kind, seed in product(("ur10", "panda"), range(2)):
+        yield Item(f"payloads/{kind}-{seed}", partial(campaigns.run_payloads, kind, seed))
+    for seed in range(2):
+        yield Item(f"forces/{seed}", partial(campaigns.run_forces, seed))
+    for damaged, seed in product((None, 2), range(3)):
+        yield Item(f"comparisons/{damaged or 'healthy'}-{seed}", partial(campaigns.run_comparison, seed, damaged))
     for order in ("first", "second", "advanced", "fractional"):
         yield Item(f"thermal/{order}", partial(campaigns.run_thermal, order, 0))
     yield Item("thermal/campaign", partial(campaigns.run_campaign, 1))
-    for stops in (False, True):
-        yield Item(f"monitor/{'stops' if stops else 'cycles'}", partial(campaigns.run_week, 1, stops))
+    for stops, week in product((False, True), range(4)):
+        yield Item(f"monitor/{'stops' if stops else 'cycles'}-{week}", partial(campaigns.run_week, week, stops))
 
 
 def diagnosed(data: Path | None, _: Path | None) -> Iterator[Item]:
@@ -99,7 +101,7 @@ def diagnosed(data: Path | None, _: Path | None) -> Iterator[Item]:
 
 def small() -> list[Item]:
     """What continuous integration can afford."""
-    kept = {"gate/foreign/planar arm", "estimates/method/wls"}
+    kept = {"gate/foreign/planar arm-0", "estimates/method/wls"}
     kept |= {f"gate/mangled/{number}" for number in range(12)}
     return [item for item in everything(None, None) if item.key in kept]
 

@@ -1,4 +1,4 @@
-"""Diagnoses of 60 cases of ``oed/benchmarks/truth`` and of the real logs of ``diagnosis_real.py``."""
+"""Diagnoses of 84 cases of ``oed/benchmarks/truth`` and of the real logs of ``diagnosis_real.py``."""
 
 from __future__ import annotations
 
@@ -11,7 +11,8 @@ from benchmarks.diagnosis_parts.strata import STRATA, Task, draw
 from benchmarks.diagnosis_real import SETS
 
 # Seeds of logs of 60 s (most) and 120 s; no threshold was tuned on them. Singles cover every effect of the catalogue.
-# 15 without an effect, 25 with one, 10 with two, 10 outside the catalogue.
+# 15 without an effect, 25 with one, 10 with two, 10 outside the catalogue; and four each of moves with pauses, of a
+# description without drives, of 15 s, and of noise that wanders for a second.
 FIRST = 9600
 CASES = (
     [Task("none", FIRST + k) for k in range(15)]
@@ -19,6 +20,11 @@ CASES = (
     + [Task("half", FIRST + 32 + k) for k in range(9)]
     + [Task("two", FIRST + k) for k in range(10)]
     + [Task("stranger", FIRST + k) for k in range(10)]
+    + [
+        Task(name, FIRST + k)
+        for name in ("idle_moves", "moves", "bare", "brief", "slow_none", "slow")
+        for k in range(4)
+    ]
 )
 
 

@@ -16,7 +16,7 @@ from estimation import Estimate, Prediction, identify, predict
 from robots import simulate
 from robots.plants import Sensors
 
-VIRTUAL = (0,)
+VIRTUAL = (0, 1, 2)
 # Covariances act on the standard errors, and on the band of a prediction.
 LARGE = frozenset({"band_covariance"})
 CHOSEN = ("low_pass", "ridge", "velocity_scales", "position", "held_out", "spread", "cost")

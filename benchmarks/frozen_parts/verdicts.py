@@ -22,7 +22,7 @@ from robots.signals import Log
 
 # Logs are checked whole, halved and thirded.
 PARTS = (1, 2, 3)
-MANGLED = 100
+MANGLED = 300
 SEED = 11
 # Endings of what a reader takes, in the folders of published failures.
 LOGS = (".csv", ".parquet")
