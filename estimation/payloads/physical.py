@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from estimation.linear_algebra.conic import ConicProgram
 from estimation.linear_algebra.log_determinant import VARIABLES, add_log_determinant
+from estimation.linear_algebra.scaled import floored_inverse
 from estimation.uncertainty.quantiles import chi2_limit
 from robots.consistency import BASIS, normalised_eigenvalues, pseudo_inertia
 from robots.geometry.inertia import SIZE, inertial_parameters
@@ -59,10 +60,7 @@ def physical_body(values: Array, covariance: Array) -> PhysicalBody:
     reference = ball(values)
     mass, length = reference[0], _size(reference)
     scale = mass * np.array([1.0] + [length] * 3 + [length**2] * 6)
-    errors = np.sqrt(np.diag(covariance))
-    inner, vectors = np.linalg.eigh(covariance / errors[:, None] / errors)
-    inner = np.maximum(inner, np.finfo(float).eps * SIZE * inner[-1])
-    precision = (vectors / inner) @ vectors.T / errors[:, None] / errors
+    precision = floored_inverse(covariance)
     quadratic = precision * scale[:, None] * scale
     wanted = -quadratic @ (values / scale)
 

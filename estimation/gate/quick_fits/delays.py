@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from estimation.gate.quick_fits.joint_fit import OWN_RIDGE, JointFit, Rows
-from estimation.gate.quick_fits.whole_fit import solve_scaled
+from estimation.linear_algebra.scaled import solve_ridge
 
 Array = NDArray[np.float64]
 
@@ -96,7 +96,7 @@ class _Search:
             Y, tau = rows.joints[joint].Y[kept[counted]], rows.near_torques(shifts, joint, stride)[:, counted]
             tau -= tau.mean(axis=1, keepdims=True)
             cross, square = Y.T @ tau.T, np.einsum("st,st->s", tau, tau)
-            left = square - np.einsum("ks,ks->s", cross, solve_scaled(Y.T @ Y, cross, OWN_RIDGE))
+            left = square - np.einsum("ks,ks->s", cross, solve_ridge(Y.T @ Y, cross, OWN_RIDGE))
             self._starts[joint] = int(np.argmin(left / np.maximum(square, 1e-300)))
 
     def error(self, joint: int, k: int) -> float:

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from estimation.linear_algebra.scaled import inverse
 from estimation.monitoring.windows.baseline import Directions
 from estimation.uncertainty.autoregressive import autocovariance, levinson, whitened
 from estimation.uncertainty.quantiles import NORMAL_MEDIAN
@@ -198,9 +199,7 @@ def _solve(
         index = np.concatenate([[j, n + j], np.arange(2 * n, size)]).astype(int)
         H[np.ix_(index, index)] += X.T @ X / colour.variances[j]
         g[index] += X.T @ target / colour.variances[j]
-    root = 1 / np.sqrt(np.diag(H))
-    inverse = np.linalg.inv(H * root[:, None] * root) * root[:, None] * root
-    covariance = (inverse + inverse.T) / 2
+    covariance = inverse(H)
     return covariance @ g, covariance, prior
 
 
