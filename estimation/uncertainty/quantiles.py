@@ -18,6 +18,8 @@ NORMAL_MEDIAN = float(ndtri(0.75))
 """Median of the absolute value of a standard normal variable: 0.6745. Its square is the median of chi-square."""
 TAIL = 0.025
 """Probability on either side of a 95 % interval."""
+BAND = 0.95
+"""Share of the errors that a band is to hold."""
 
 
 def normal_quantile(probability: float) -> float:
@@ -54,6 +56,14 @@ def robust_deviation(values: ArrayLike, axis: int | None = 0) -> Array:
     Source: Rousseeuw and Croux 1993.
     """
     return np.asarray(np.nanmedian(np.abs(values), axis=axis) / NORMAL_MEDIAN)
+
+
+def band_of(errors: Array) -> Array:
+    """Gives the half-widths (n,) that hold `BAND` of each joint's known absolute errors (N, n); NaN where none is."""
+    if not np.isnan(errors).any():
+        return np.asarray(np.quantile(errors, BAND, axis=0))
+    known = [column[~np.isnan(column)] for column in errors.T]
+    return np.array([np.quantile(column, BAND) if len(column) else np.nan for column in known])
 
 
 def share_interval(hits: int, tries: int) -> tuple[float, float]:

@@ -25,9 +25,7 @@ class Rate:
     @property
     def interval(self) -> tuple[float, float] | None:
         """The interval; None without a case."""
-        if not self.tries:
-            return None
-        return share_interval(self.hits, self.tries)
+        return share_interval(self.hits, self.tries) if self.tries else None
 
     def text(self) -> str:
         """Writes counts and interval, such as ``7 of 8 (47 to 100 %)``."""

@@ -8,6 +8,7 @@ from estimation.uncertainty.quantiles import (
     CHI2_95,
     NORMAL_95,
     NORMAL_MEDIAN,
+    band_of,
     chi2_limit,
     count_interval,
     median_interval,
@@ -69,3 +70,18 @@ def test_a_median_s_interval_leaves_out_what_chance_allows():
         low, high = median_interval(tuple(range(n)))
         assert low + high == n - 1
         assert binom.cdf(low, n, 0.5) <= 0.025 < binom.cdf(low + 1, n, 0.5)
+
+
+def test_intervals_of_shares_are_the_published_ones():
+    """1 of 150 gives 0.02 to 3.7 %, none of 300 at most 1.2 %."""
+    assert share_interval(1, 150) == pytest.approx((0.00017, 0.0366), abs=5e-5)
+    assert share_interval(0, 300) == pytest.approx((0.0, 0.01222), abs=5e-5)
+    assert share_interval(300, 300)[1] == 1.0
+
+
+def test_a_band_holds_its_share():
+    """The half-width is the quantile of the errors that are known."""
+    errors = np.abs(np.random.default_rng(0).normal(size=(20_000, 2)))
+    np.testing.assert_allclose(band_of(errors), 1.96, rtol=0.03)
+    errors[:, 1] = np.nan
+    assert np.isnan(band_of(errors)[1])
