@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from estimation.estimators.base import Array
+from estimation.linear_algebra.scaled import lengths
 from estimation.regressions.regression_data import CHUNK
 from robots.base_parameters import BaseParameters
 from robots.common.errors import InputError, NotIdentifiableError
@@ -136,11 +137,10 @@ def _fit(total: Array, count: Array, size: int, n: int) -> DriveGains:
         gram, right = matrix[:-1, :-1].copy(), matrix[:-1, -1]
         # The currents' own noise, in their mean square: least squares would shrink the gains by it.
         gram[gains_at, gains_at] -= weights * np.maximum(count, 1) * noise
-        scale = np.sqrt(np.maximum(np.diag(gram), 0.0))
-        scale = np.where(scale > 0, scale, 1.0)
+        scale = lengths(gram)
         scaled = gram / scale[:, None] / scale
-        lengths = np.linalg.eigvalsh(scaled)
-        if lengths[0] < REGULAR * lengths[-1]:
+        eigenvalues = np.linalg.eigvalsh(scaled)
+        if eigenvalues[0] < REGULAR * eigenvalues[-1]:
             raise NotIdentifiableError(
                 "the runs do not determine all drive gains",
                 remedy="move every joint, with a payload that loads each of them",

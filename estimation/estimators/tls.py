@@ -10,7 +10,7 @@ from scipy.linalg import cho_factor, cho_solve, solve_triangular
 
 from estimation.estimators.base import Array, Solution
 from estimation.estimators.wls import WeightedLeastSquares
-from estimation.linear_algebra.scaled import square_root
+from estimation.linear_algebra.scaled import lengths, square_root
 from estimation.regressions.moments import Moments
 from estimation.regressions.position_noise import smoothed_noise
 from estimation.regressions.regression_data import CHUNK, RegressionData
@@ -98,8 +98,7 @@ class _Problem:
         errors = np.tensordot(weights, self.errors, axes=1)
         cross, square = weights @ moments.cross, weights @ moments.square
         extra, right = regularisation(moments, weights, gram, self.ridge)
-        scale = np.sqrt(np.diag(gram))
-        scale = np.where(scale > 0, scale, 1.0)
+        scale = lengths(gram)
         errors, cross, right = errors / scale[:, None] / scale, cross / scale, right / scale
         matrix = (gram + extra) / scale[:, None] / scale
         matrix[np.diag_indices_from(matrix)] += 1e-13

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from estimation.identifications.estimate import Estimate
+from estimation.linear_algebra.scaled import lengths
 from estimation.preprocessing import Harmonics
 from estimation.regressions.joint_regressor import JointRegressor, chunks
 from estimation.regressions.moments import Moments
@@ -201,8 +202,7 @@ def _moments(regressor: JointRegressor, part: Rows, piece: slice) -> Moments:
 
 def _refits(gram: Array, cross: Array, moving: int, resamples: int, rng: np.random.Generator) -> Array:
     """Solutions (R, b) of sums of drawn blocks, each of `moving` consecutive pieces, in a circle."""
-    scale = np.sqrt(np.maximum(np.einsum("kpp->p", gram), 0.0))
-    scale = np.where(scale > 0, scale, 1.0)
+    scale = lengths(gram.sum(axis=0))
     gram, cross = gram / scale[:, None] / scale, cross / scale
     faint = FAINT * np.eye(len(scale))
     values = np.empty((resamples, len(scale)))

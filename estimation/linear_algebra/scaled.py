@@ -11,8 +11,8 @@ Array = NDArray[np.float64]
 
 
 def lengths(matrix: Array) -> Array:
-    """Gives the roots of a Gram matrix's diagonal (p,), 1 for a column that is zero."""
-    scale = np.sqrt(np.maximum(np.diag(matrix), 0.0))
+    """Gives the roots of the diagonals (..., p) of Gram matrices (..., p, p), 1 for a column that is zero."""
+    scale = np.sqrt(np.maximum(np.einsum("...kk->...k", matrix), 0.0))
     return np.where(scale > 0, scale, 1.0)
 
 

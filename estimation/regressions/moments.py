@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from estimation.linear_algebra.positive import solve_nearly_positive
-from estimation.linear_algebra.scaled import solve_ridge
+from estimation.linear_algebra.scaled import lengths, solve_ridge
 from estimation.regressions.parameter_priors import GaussianPrior
 
 Array = NDArray[np.float64]
@@ -124,8 +124,7 @@ def solve_all(gram: Array, cross: Array, square: Array, ridge: float, pull: Gaus
         Parameters (B, p).
     """
     diagonal = np.arange(gram.shape[1])
-    scale = np.sqrt(gram[:, diagonal, diagonal])
-    scale = np.where(scale > 0, scale, 1.0)
+    scale = lengths(gram)
     factor = 1.0 / scale
     right = cross * factor
     matrix = gram * factor[:, :, None]

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.signal import lfilter
 
+from estimation.linear_algebra.scaled import lengths
 from estimation.uncertainty.autoregressive import HIGHEST_ORDER, Noise, autocovariance, fit_noise, taps
 from estimation.uncertainty.averages import Averages
 
@@ -122,8 +123,7 @@ def spread_of(meat: Array, inverse: Array) -> Array:
         meat: symmetric, positive semidefinite up to rounding (p, p).
         inverse: symmetric (p, p).
     """
-    scale = np.sqrt(np.maximum(np.diag(meat), 0.0))
-    scale = np.where(scale > 0, scale, 1.0)
+    scale = lengths(meat)
     values, vectors = np.linalg.eigh(meat / scale[:, None] / scale)
     known = max(float(values[-1]), np.finfo(float).tiny) * len(values) * np.finfo(float).eps
     root = (np.sqrt(np.maximum(values, known)) * vectors).T @ (scale[:, None] * inverse)
