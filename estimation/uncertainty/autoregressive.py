@@ -50,9 +50,18 @@ def whitened(series: Array, coefficients: Array) -> Array:
     return np.asarray(lfilter(taps(coefficients), [1.0], series, axis=0))
 
 
-def autocovariance(series: Array, count: float, lags: int = HIGHEST_ORDER) -> Array:
-    """Sums products at lags 0..`lags` over `count` rows (lags + 1,); masked rows must be zero."""
-    return lagged_products(series, lags) / max(count, 1.0)
+def autocovariance(series: Array, counts: Array | float, lags: int = HIGHEST_ORDER) -> Array:
+    """Divides sums of products at lags 0..`lags` by numbers of rows.
+
+    Args:
+        series: (N, ...), zero where masked.
+        counts: rows that are not masked (...).
+        lags: the longest lag.
+
+    Returns:
+        Autocovariances (..., lags + 1).
+    """
+    return np.moveaxis(lagged_products(series, lags) / np.maximum(counts, 1.0), 0, -1)
 
 
 def fit_noise(residual: Array, counts: Array, covariances: Sequence[Array] | Array, times: int = 1) -> Noise:

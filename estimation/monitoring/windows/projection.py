@@ -213,13 +213,9 @@ def _usable(live: NDArray[np.bool_], order: int) -> NDArray[np.bool_]:
 
 def _colour(residual: Array, live: NDArray[np.bool_]) -> tuple[Array, Array]:
     rows = np.maximum(live.sum(axis=0), 1).astype(float)
-    masked = np.where(live, residual, 0.0)
-    lags = min(HIGHEST_ORDER, len(residual) - 1)
-    found = np.stack([autocovariance(masked[:, j], rows[j], lags) for j in range(residual.shape[1])])
-    padded = np.zeros((len(found), HIGHEST_ORDER + 1))
-    padded[:, : found.shape[1]] = found
-    padded[:, 0] = np.maximum(padded[:, 0], np.finfo(float).tiny)
-    return padded, rows
+    found = autocovariance(np.where(live, residual, 0.0), rows, HIGHEST_ORDER)
+    found[:, 0] = np.maximum(found[:, 0], np.finfo(float).tiny)
+    return found, rows
 
 
 def _burst(t: Array, residual: Array, live: NDArray[np.bool_], colour: Colour) -> tuple[float, float, Array, Array]:
