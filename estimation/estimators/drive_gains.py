@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -22,22 +21,6 @@ ROUNDS = 8
 SETTLED = 1e-6
 # Ratio of smallest to largest eigenvalue of the scaled normal equations, below which a gain is undetermined.
 REGULAR = 1e-13
-
-
-class CurrentRows(Protocol):
-    """Smoothed motion, motor currents (N, n) [A] and the rows that count (N, n) of one run."""
-
-    @property
-    def motion(self) -> Motion:
-        """The smoothed motion of N samples."""
-
-    @property
-    def current(self) -> Array:
-        """Measured current (N, n)."""
-
-    @property
-    def mask(self) -> Array:
-        """Zero where a row of a joint does not count (N, n)."""
 
 
 @dataclass(frozen=True, kw_only=True)
