@@ -52,7 +52,8 @@ def of_prediction(prediction: Prediction) -> dict[str, Any]:
         "band_limited_spread": prediction.band_limited_spread.tolist(),
         "band": None if band is None else band.mean(axis=0).tolist(),
         "band_coverage": prediction.band_coverage.tolist(),
-        "extrapolates": None if beyond is None else beyond.mean(axis=0).tolist(),
+        # A row at the edge itself is on either side by rounding.
+        "extrapolates": None if beyond is None else beyond.mean(axis=0).round(2).tolist(),
         "cutoff": prediction.cutoff,
     }
 

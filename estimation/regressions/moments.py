@@ -7,8 +7,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from estimation.linear_algebra.positive import solve_nearly_positive
-from estimation.linear_algebra.scaled import lengths, solve_ridge
+from estimation.linear_algebra.positive import solve_nearly_positive, solve_positive
+from estimation.linear_algebra.scaled import lengths
 from estimation.regressions.parameter_priors import GaussianPrior
 
 Array = NDArray[np.float64]
@@ -92,7 +92,9 @@ class Moments:
         matrix, extra = self._weighted(weights), ridge
         if self.pull is not None:
             matrix, extra = matrix + ridge * float(weights @ self.square) * self.pull.precision, FAINT
-        return solve_ridge(matrix, np.eye(len(matrix)), extra)
+        scale, unit = lengths(matrix), np.eye(len(matrix))
+        inverse = solve_positive(matrix / scale[:, None] / scale + extra * unit, unit)
+        return np.asarray(inverse / scale[:, None] / scale)
 
     def _weighted(self, weights: Array) -> Array:
         return np.asarray((weights @ self.gram.reshape(len(self.gram), -1)).reshape(self.gram.shape[1:]))

@@ -171,7 +171,8 @@ def batch_factors(scores: Array, inverse: Array, model: Array) -> Array:
 def _noise(parts: Sequence[Part | Averages], correction: Array) -> Noise:
     counts = sum(part.mask.sum(axis=0) for part in parts)
     residual = np.concatenate([part.residual for part in parts])
-    return fit_noise(residual, counts, autocovariance(residual, counts) + correction, ORDERS)
+    own = np.stack([autocovariance(residual[:, j], counts[j]) for j in range(residual.shape[1])])
+    return fit_noise(residual, counts, own + correction, ORDERS)
 
 
 def _corrected(parts: Sequence[Part], weights: Array, inverse: Array, noise: Noise, rng: np.random.Generator) -> Noise:
@@ -198,8 +199,11 @@ def _lost(parts: Sequence[Part], weights: Array, inverse: Array, noise: Noise, r
         for rows in part.chunks():
             Y = part.regressor(rows.start, rows.stop)
             left[rows] = draws[rows] - (Y.reshape(-1, Y.shape[2]) @ fitted).reshape(-1, joints, DRAWS)
-        before, after = (autocovariance(x * part.mask[:, :, None], counts[:, None]) for x in (draws, left))
-        lost += (before - after).sum(axis=1)
+        for j in range(joints):
+            mask = part.mask[:, j]
+            for k in range(DRAWS):
+                before = autocovariance(draws[:, j, k] * mask, counts[j])
+                lost[j] += before - autocovariance(left[:, j, k] * mask, counts[j])
     return lost / DRAWS
 
 
