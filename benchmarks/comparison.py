@@ -31,6 +31,7 @@ from estimation import compare, fit_campaign, identify
 from estimation.comparisons import ModelComparison, identify_runs
 from estimation.preprocessing import resample, smooth
 from estimation.thermal import start_temperatures
+from estimation.uncertainty.quantiles import NORMAL_95
 from oed.benchmarks.truth.description import write_description
 from oed.benchmarks.truth.effects.base import Effect
 from oed.benchmarks.truth.effects.friction import FrictionStep, Warming
@@ -51,7 +52,6 @@ DAMAGE = 0.10
 FAST, SLOW, COOL = 150.0, 900.0, 5.0
 # Fall of the friction per unit of heat: steady state is 2.5 units without pauses.
 FALL = 0.38
-NORMAL_95 = 1.959964
 # Percentages are given for parameters with at most this relative standard error.
 PRECISE = 0.02
 

@@ -29,6 +29,7 @@ from estimation.estimators import WeightedLeastSquares
 from estimation.identifications.fit import sum_moments
 from estimation.regressions.joint_regressor import JointRegressor
 from estimation.regressions.preparation import prepare
+from estimation.uncertainty.quantiles import NORMAL_95
 from robots import load_robot, nominal_plant, simulate
 from robots.base_parameters import find_base_parameters
 from robots.common.errors import AssumedValueWarning
@@ -42,7 +43,6 @@ Array = NDArray[np.float64]
 SEEDS = 200
 MOTIONS = 8
 DURATION, PERIOD, HARMONICS, BASE_FREQUENCY = 30.0, 0.004, 5, 0.1
-NORMAL_95 = 1.959964
 CLASSES = {"f1": "f1", "f2": "f2", "f3": "f3", "f4": "f4", "Im": "rotor", "offset": "offset"}
 
 

@@ -24,11 +24,11 @@ sys.path.insert(0, str(Path(__file__).parents[1]))
 sys.path.insert(0, str(Path(__file__).parent))
 
 from forces import flange_jacobians, motion_of, plant_of
-from scipy.stats import chi2
 
 from benchmarks.monitoring_parts.stops import held_torque, moves_with_stops
 from estimation import identify
 from estimation.external_forces import ForceEstimate, estimate_forces
+from estimation.uncertainty.quantiles import count_interval
 from robots import Log, Motion, Robot, load_robot, simulate
 from robots.common.errors import AssumedValueWarning, NotIdentifiableError
 
@@ -124,8 +124,8 @@ class Tally:
 
 def _rate(count: int, hours: float) -> str:
     """Says a count of false contacts and their rate with its 95 % interval."""
-    low, high = chi2.ppf([0.025, 0.975], [2 * count, 2 * count + 2]) / 2 / hours
-    interval = f"{np.nan_to_num(low):.1f} to {high:.1f}"
+    low, high = (end / hours for end in count_interval(count))
+    interval = f"{low:.1f} to {high:.1f}"
     return f"{count} false contacts in {hours:.2f} h: {count / hours:.1f} ({interval}) per hour"
 
 

@@ -23,7 +23,6 @@ from typing import Any
 
 import numpy as np
 import pinocchio as pin
-from scipy.stats import beta, chi2
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
 
@@ -33,6 +32,7 @@ from estimation.external_forces.force_estimation import Predictor
 from estimation.models.model import Model
 from estimation.predictions.prediction import predict
 from estimation.thermal import ThermalTorqueModel, start_temperatures
+from estimation.uncertainty.quantiles import NORMAL_95, count_interval, share_interval
 from robots import Log, Motion, Robot, load_robot, nominal_plant, simulate
 from robots.common.errors import AssumedValueWarning, OedError
 from robots.plants import Plant, PlantEffect
@@ -211,17 +211,16 @@ def table(rows: list[dict[str, Any]]) -> str:
         pushes = [push for row in rows for push in row[name]["pushes"]]
         hits = [push for push in pushes if push["detected"]]
         close = sum(abs(push["magnitude"] - FORCE) <= WITHIN * FORCE for push in hits)
-        inside = sum(abs(push["magnitude"] - FORCE) <= 1.96 * push["deviation"] for push in hits)
+        inside = sum(abs(push["magnitude"] - FORCE) <= NORMAL_95 * push["deviation"] for push in hits)
         tool = sum(bool(push["tool"]) for push in hits)
         alarms, hours = sum(row[name]["alarms"] for row in rows), sum(row[name]["hours"] for row in rows)
-        low, high = chi2.ppf([0.025, 0.975], [2 * alarms, 2 * alarms + 2]) / 2 / hours
+        low, high = (end / hours for end in count_interval(alarms))
         refused = sum("refused" in row[name] for row in rows)
         lines += [
             f"{words}: {len(rows)} robots, {refused} of them refused, {len(pushes)} pushes of {FORCE:g} N for "
             f"{LENGTH:g} s",
             f"  detected {len(hits)} ({_share(len(hits), len(pushes))})",
-            f"  false alarms {alarms} in {hours:.2f} h: {alarms / hours:.2f} per hour "
-            f"({np.nan_to_num(low):.2f} to {high:.2f})",
+            f"  false alarms {alarms} in {hours:.2f} h: {alarms / hours:.2f} per hour ({low:.2f} to {high:.2f})",
         ]
         if hits:
             errors = np.array([push["error"] for push in hits])
@@ -240,8 +239,7 @@ def table(rows: list[dict[str, Any]]) -> str:
 
 def _share(count: int, total: int) -> str:
     """Share in per cent with its exact 95 % interval (Clopper and Pearson)."""
-    low = beta.ppf(0.025, count, total - count + 1) if count else 0.0
-    high = beta.ppf(0.975, count + 1, total - count) if count < total else 1.0
+    low, high = share_interval(count, total)
     return f"{100 * count / total:.1f} %, {100 * low:.1f} to {100 * high:.1f} %"
 
 

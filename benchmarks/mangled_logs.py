@@ -30,10 +30,12 @@ from functools import cache
 from pathlib import Path
 
 import numpy as np
-from mangled_parts.content import BYTES, TEXT
-from mangled_parts.formats import FORMATS, write
-from mangled_parts.values import VALUES
 
+sys.path.insert(0, str(Path(__file__).parents[1]))
+
+from benchmarks.mangled_parts.content import BYTES, TEXT
+from benchmarks.mangled_parts.formats import FORMATS, write
+from benchmarks.mangled_parts.values import VALUES
 from estimation import identify, read_log
 from estimation.identifications.choices import Candidates
 from robots.base_parameters import find_base_parameters

@@ -233,6 +233,7 @@ def week(folder: Path, number: int, *, stops: bool = False) -> dict[str, Any]:
             "found": [f.sentence(begin) for f in found],
             "dated": [bool(f.earliest <= moment <= f.latest) for f in found],
             "sizes": [size_of(f, causes) for f in found if size_of(f, causes) is not None],
+            "findings": [f.to_dict(begin) for f in found],
         }
     return row
 

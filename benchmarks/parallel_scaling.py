@@ -22,7 +22,7 @@ sys.path.insert(0, str(Path(__file__).parents[1]))
 for _name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
     os.environ.setdefault(_name, "1")
 
-from benchmarks.diagnosis_frozen import CASES, run_case  # noqa: E402
+from benchmarks.frozen_parts.diagnoses import CASES, run_case  # noqa: E402
 from oed.experiments import Effort, ModelOptions, SearchOptions, design  # noqa: E402
 from robots.common.clusters import cluster  # noqa: E402
 from robots.common.errors import AssumedValueWarning  # noqa: E402
@@ -42,7 +42,7 @@ def diagnoses(cases: int, workers: int | None, executor: Executor | None) -> Any
     """Diagnoses of the benchmark's cases; gives what must be the same."""
     tasks = CASES[:: max(1, len(CASES) // cases)][:cases]
     rows = parallel_map(run_case, tasks, workers=workers, executor=executor)
-    return [{key: value for key, value in row.items() if key != "seconds"} for row in rows]
+    return rows
 
 
 def measure(name: str, work: Callable[[int | None, Executor | None], Any], address: str) -> None:

@@ -91,24 +91,3 @@ def normalised_eigenvalues(parameters: ArrayLike) -> Array:
     scale[..., 3] = np.where(proper, 1 / np.sqrt(np.where(proper, mass, 1.0)), 1.0)
     scale[..., :3] = np.where(proper, 1 / np.sqrt(np.where(proper, trace, 1.0)), 1.0)[..., None]
     return np.asarray(np.linalg.eigvalsh(pseudo * scale[..., :, None] * scale[..., None, :]))
-
-
-def entropic_distance(parameters: ArrayLike, reference: ArrayLike) -> Array:
-    """Measures the distance of bodies from references, independent of frame and units.
-
-    ``-log det(P P0^-1) + tr(P0^-1 P) - 4``, the Bregman divergence of log det (Lee, Wensing, Park 2020,
-    10.1109/TRO.2019.2926491).
-
-    Args:
-        parameters: (..., 10) of bodies that can exist.
-        reference: (..., 10) likewise.
-
-    Returns:
-        (...), zero where both are the same, infinite where a body cannot exist.
-    """
-    pseudo, given = pseudo_inertia(parameters), pseudo_inertia(reference)
-    possible = (np.linalg.eigvalsh(pseudo) > 0).all(axis=-1)
-    ratio = np.linalg.solve(given, pseudo)
-    with np.errstate(divide="ignore", invalid="ignore"):
-        distance = -np.linalg.slogdet(ratio)[1] + np.trace(ratio, axis1=-2, axis2=-1) - 4
-    return np.where(possible, distance, np.inf)

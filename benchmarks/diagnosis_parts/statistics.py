@@ -6,11 +6,11 @@ from collections.abc import Callable, Iterable
 from typing import Any
 
 import numpy as np
-from scipy.stats import beta
+
+from estimation.uncertainty.quantiles import share_interval
 
 Row = dict[str, Any]
 
-LEVEL = 0.95
 # A gain smaller than this share of the error before is lost in the noise of the unseen log.
 LEAST_GAIN = 0.01
 CHANGE_TIME, NONLINEAR = 0.2, 0.2
@@ -27,21 +27,13 @@ SHAPES = {
 }
 
 
-def interval(hits: int, tries: int) -> tuple[float, float]:
-    """The Clopper-Pearson interval of a share at 95 %."""
-    tail = (1 - LEVEL) / 2
-    lower = 0.0 if hits == 0 else float(beta.ppf(tail, hits, tries - hits + 1))
-    upper = 1.0 if hits == tries else float(beta.ppf(1 - tail, hits + 1, tries - hits))
-    return lower, upper
-
-
 def share(name: str, rows: Iterable[Row], hit: Callable[[Row], bool], target: str) -> str:
     """One line: hits of tries, the share, its interval and what is asked for."""
     values = [bool(hit(row)) for row in rows]
     if not values:
         return f"  {name:58} no case                                 wanted {target}"
     hits, tries = sum(values), len(values)
-    low, high = interval(hits, tries)
+    low, high = share_interval(hits, tries)
     counted = f"{hits} of {tries}"
     return (
         f"  {name:58} {counted:>12} {100 * hits / tries:6.1f} % [{100 * low:5.1f}, {100 * high:5.1f}]  wanted {target}"

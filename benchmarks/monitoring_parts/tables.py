@@ -7,7 +7,8 @@ from collections.abc import Iterable, Sequence
 from pathlib import Path
 
 import numpy as np
-from scipy.stats import beta
+
+from estimation.uncertainty.quantiles import share_interval
 
 
 def print_table(folder: Path, variants: Iterable[str], *, cycle: float, damage: float) -> None:
@@ -61,7 +62,7 @@ def print_table(folder: Path, variants: Iterable[str], *, cycle: float, damage: 
                 print(f"  {name:14} {sum(map(len, found))} false alarms in {hours:.0f} h, {motion:.1f} h of it logged")
             elif study in ("weeks", "stops"):
                 right = sum(f["right"] for f in found)
-                low, high = beta.ppf([0.025, 0.975], [right, right + 1], [len(found) - right + 1, len(found) - right])
+                low, high = share_interval(right, len(found))
                 by = {row["kind"]: [0, 0] for row in rows}
                 for row in rows:
                     by[row["kind"]][0] += row[name]["right"]

@@ -8,11 +8,12 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import norm, t
+from scipy.stats import t
 
 from estimation.comparisons.common_parameters import CommonParameters
 from estimation.comparisons.friction_curves import LEVEL_SHARE, FrictionCurves
 from estimation.comparisons.hypothesis_tests import adjust_holm
+from estimation.uncertainty.quantiles import normal_limit
 from robots.common.plain import finite
 
 Array = NDArray[np.float64]
@@ -161,7 +162,7 @@ def settled_from(values: Array, errors: Array, alpha: float) -> tuple[int | None
     final = float(w @ values)
     # The mean holds the run itself where that is among the last.
     variance = errors**2 * (1 - 2 * w) + float(w**2 @ errors**2)
-    limit = float(norm.isf(alpha / count / 2))
+    limit = normal_limit(alpha, count)
     within = np.abs(values - final) <= limit * np.sqrt(np.maximum(variance, 0.0))
     if not within[last].all():
         return None, final

@@ -8,10 +8,10 @@ from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import norm
 
 from estimation.comparisons.common_parameters import CommonParameters
 from estimation.comparisons.friction_curves import FrictionCurves
+from estimation.uncertainty.quantiles import NORMAL_95, normal_limit
 from robots.common.plain import finite
 
 Array = NDArray[np.float64]
@@ -124,7 +124,7 @@ class FrictionChange:
         def shown(value: float, error: float) -> dict[str, Any]:
             return {
                 "percent": finite(_percent(value)),
-                "ci95": [finite(_percent(value + sign * 1.96 * error)) for sign in (-1, 1)],
+                "ci95": [finite(_percent(value + sign * NORMAL_95 * error)) for sign in (-1, 1)],
             }
 
         return {
@@ -157,7 +157,7 @@ def friction_changes(
     rows = np.array([curve.mean_row for curve in curves]).reshape(len(curves), -1)
     found: list[FrictionChange] = []
     tests = max(1, len(curves) * (len(common.values) - 1))
-    limit = float(norm.isf(alpha / tests / 2))
+    limit = normal_limit(alpha, tests)
     first, slope = _log_level(rows, common.values[0])
     for run in range(1, len(common.values)):
         last, other = _log_level(rows, common.values[run])
@@ -247,7 +247,7 @@ def percent_of(log_ratio: float) -> str:
 
 def interval_of(log_ratio: float, error: float) -> str:
     """Writes the 95 % interval of a log ratio in per cent, such as ``10.2 to 14.4 %``."""
-    low, high = (_percent(log_ratio + sign * 1.96 * error) for sign in (-1, 1))
+    low, high = (_percent(log_ratio + sign * NORMAL_95 * error) for sign in (-1, 1))
     return f"{low:+.1f} to {high:+.1f} %"
 
 

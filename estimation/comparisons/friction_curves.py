@@ -11,7 +11,8 @@ from numpy.typing import NDArray
 
 from estimation.comparisons.common_parameters import CommonParameters, friction_table
 from estimation.comparisons.runs import Run
-from estimation.uncertainty.normal import NORMAL_95
+from estimation.linear_algebra.scaled import square_root
+from estimation.uncertainty.quantiles import NORMAL_95
 from robots.common.plain import all_finite
 
 Array = NDArray[np.float64]
@@ -146,9 +147,7 @@ def simultaneous_factor(rows: Array, covariance: Array, confidence: float = 0.95
     used = scale > 0
     if not used.any():
         return NORMAL_95
-    variance, ways = np.linalg.eigh(covariance)
-    root = ways * np.sqrt(np.maximum(variance, 0.0))
-    standard = (rows[used] / scale[used, None]) @ root
+    standard = (rows[used] / scale[used, None]) @ square_root(covariance)
     draws = np.random.default_rng(BAND_SEED).normal(size=(DRAWS, standard.shape[1]))
     largest = np.abs(draws @ standard.T).max(axis=1)
     return float(np.quantile(largest, confidence))

@@ -8,14 +8,15 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import norm
 
 from estimation.comparisons.common_parameters import CommonParameters
-from estimation.comparisons.hypothesis_tests import agreement_test
+from estimation.comparisons.hypothesis_tests import ROUNDING, agreement_test
+from estimation.linear_algebra.scaled import inverse, inverse_root
 from estimation.models.model import Model
 from estimation.payloads.determination import determined
 from estimation.payloads.intervals import Quantity, quantities
 from estimation.payloads.physical import physical_body
+from estimation.uncertainty.quantiles import normal_limit
 from robots.base_parameters import find_base_parameters
 from robots.common.plain import finite
 from robots.geometry.inertia import SIZE
@@ -140,18 +141,17 @@ def _payload(
     common: CommonParameters, run: int, columns: Array, used: Sequence[int], alpha: float
 ) -> PayloadDifference | None:
     d = (common.values[run] - common.values[0])[used]
-    whitening = _whitening((common.covariances[run] + common.covariances[0])[np.ix_(used, used)])
+    whitening = inverse_root((common.covariances[run] + common.covariances[0])[np.ix_(used, used)], ROUNDING).T
     target, G = whitening @ d, whitening @ columns[used]
     precision = G.T @ G + np.eye(SIZE) / OPEN**2
-    scale = np.sqrt(np.diag(precision))
-    covariance = np.linalg.inv(precision / scale[:, None] / scale) / scale[:, None] / scale
+    covariance = inverse(precision)
     p = covariance @ G.T @ target
     rest, free = float(np.sum((target - G @ p) ** 2)), len(target) - np.linalg.matrix_rank(G)
     excess = float(target @ target) - len(target)
     explained = 1 - max(rest - free, 0.0) / excess if excess > 0 else 0.0
     # What the body leaves unexplained is an error of the models: it widens the intervals.
     covariance = covariance * max(rest / max(free, 1), 1.0)
-    significant = abs(p[0]) > norm.isf(alpha / 2) * np.sqrt(covariance[0, 0])
+    significant = abs(p[0]) > normal_limit(alpha) * np.sqrt(covariance[0, 0])
     if not significant or explained < EXPLAINED:
         return None
     removed = bool(p[0] < 0)
@@ -169,14 +169,6 @@ def _payload(
         change=columns @ p,
         covariance=columns @ covariance @ columns.T,
     )
-
-
-def _whitening(covariance: Array) -> Array:
-    """Gives W with W C W' = 1; directions without variance are left out."""
-    scale = np.sqrt(np.maximum(np.diag(covariance), np.finfo(float).tiny))
-    variance, ways = np.linalg.eigh(covariance / scale[:, None] / scale)
-    known = variance > 1e-10 * variance.max()
-    return np.asarray((ways[:, known] / np.sqrt(variance[known])).T / scale)
 
 
 def _interval(item: Quantity) -> str:

@@ -12,6 +12,7 @@ from scipy.linalg import null_space
 
 from estimation.estimators.base import Array, Solution
 from estimation.estimators.wls import WeightedLeastSquares
+from estimation.linear_algebra.scaled import square_root
 from estimation.regressions.covariances import FAINT as OPEN
 from estimation.regressions.covariances import Equations, regressor_rows, robust_covariance
 from estimation.regressions.regression_data import RegressionData
@@ -82,7 +83,7 @@ class ConstrainedLeastSquares(WeightedLeastSquares):
         gram = np.tensordot(weights, data.moments.gram, axes=1)
         extra, right = regularisation(data.moments, weights, gram, data.ridge)
         level = float(weights @ (np.maximum(data.moments.count, 1) * data.moments.level(values) ** 2))
-        root = _root(gram + extra) / np.sqrt(level)  # root' root = (gram + extra) / level
+        root = square_root(gram + extra).T / np.sqrt(level)  # root' root = (gram + extra) / level
         grouping = data.base.grouping * scale
         target = np.linalg.lstsq(root.T, (weights @ data.moments.cross + right) / level, rcond=None)[0]
         reference = np.zeros(model.size)
@@ -181,9 +182,3 @@ def _solve(matrix: Array, target: Array, rows: Array, lower: Array, upper: Array
     if problem.status not in (cvxpy.OPTIMAL, cvxpy.OPTIMAL_INACCURATE):
         raise SolverError(f"constrained fit: Clarabel ended with {problem.status}", remedy="check the bounds")
     return np.asarray(x.value, dtype=float)
-
-
-def _root(gram: Array) -> Array:
-    """A square root of a Gram matrix: root' root = gram."""
-    values, vectors = np.linalg.eigh(gram)
-    return np.asarray((vectors * np.sqrt(np.maximum(values, 0.0))).T)

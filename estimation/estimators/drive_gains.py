@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from estimation.estimators.base import Array
+from estimation.linear_algebra.scaled import lengths
 from estimation.regressions.regression_data import CHUNK
 from robots.base_parameters import BaseParameters
 from robots.common.errors import InputError, NotIdentifiableError
@@ -21,22 +21,6 @@ ROUNDS = 8
 SETTLED = 1e-6
 # Ratio of smallest to largest eigenvalue of the scaled normal equations, below which a gain is undetermined.
 REGULAR = 1e-13
-
-
-class CurrentRows(Protocol):
-    """Smoothed motion, motor currents (N, n) [A] and the rows that count (N, n) of one run."""
-
-    @property
-    def motion(self) -> Motion:
-        """The smoothed motion of N samples."""
-
-    @property
-    def current(self) -> Array:
-        """Measured current (N, n)."""
-
-    @property
-    def mask(self) -> Array:
-        """Zero where a row of a joint does not count (N, n)."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -136,11 +120,10 @@ def _fit(total: Array, count: Array, size: int, n: int) -> DriveGains:
         gram, right = matrix[:-1, :-1].copy(), matrix[:-1, -1]
         # The currents' own noise, in their mean square: least squares would shrink the gains by it.
         gram[gains_at, gains_at] -= weights * np.maximum(count, 1) * noise
-        scale = np.sqrt(np.maximum(np.diag(gram), 0.0))
-        scale = np.where(scale > 0, scale, 1.0)
+        scale = lengths(gram)
         scaled = gram / scale[:, None] / scale
-        lengths = np.linalg.eigvalsh(scaled)
-        if lengths[0] < REGULAR * lengths[-1]:
+        eigenvalues = np.linalg.eigvalsh(scaled)
+        if eigenvalues[0] < REGULAR * eigenvalues[-1]:
             raise NotIdentifiableError(
                 "the runs do not determine all drive gains",
                 remedy="move every joint, with a payload that loads each of them",

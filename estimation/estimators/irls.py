@@ -14,10 +14,9 @@ from estimation.regressions.covariances import Equations, regressor_rows, robust
 from estimation.regressions.moments import Moments
 from estimation.regressions.regression_data import RegressionData
 from estimation.regressions.regularisation import torque_change
+from estimation.uncertainty.quantiles import robust_deviation
 from robots.common.errors import InputError
 
-# Median absolute deviation of a normal variable of unit variance.
-MAD_OF_NORMAL = 0.6744897501960817
 ROUNDS = 50
 # Parameters have settled when no joint's torque moves by more than this share of its residual level.
 SETTLED = 1e-4
@@ -165,4 +164,4 @@ def _scale(data: RegressionData, values: Array) -> Array:
     residual[:, empty] = 0.0
     rms = np.sqrt(data.moments.square / np.maximum(data.moments.count, 1))
     floor = np.maximum(EXACT * rms, np.finfo(float).tiny)
-    return np.maximum(np.nanmedian(residual, axis=0) / MAD_OF_NORMAL, floor)
+    return np.maximum(robust_deviation(residual), floor)

@@ -8,6 +8,7 @@ import numpy as np
 
 from estimation.estimators.base import Array, Solution
 from estimation.estimators.wls import WeightedLeastSquares
+from estimation.linear_algebra.scaled import inverse
 from estimation.regressions.covariances import Equations, regressor_rows, robust_covariance
 from estimation.regressions.regression_data import CHUNK, FittedRows, RegressionData
 from estimation.regressions.regularisation import regularisation, solve_scaled
@@ -39,13 +40,13 @@ class MaximumLikelihood(WeightedLeastSquares):
         """Alternates until the likelihood settles."""
         noise = _noise(data, values)
         for _ in range(ROUNDS):
-            precision = _inverse(noise)
+            precision = inverse(noise)
             values = _generalised(data, precision)
             before, noise = noise, _noise(data, values)
             level = np.sqrt(np.diag(noise))
             if np.abs((noise - before) / level[:, None] / level).max() <= SETTLED:
                 break
-        precision = _inverse(noise)
+        precision = inverse(noise)
         return Solution(
             values=values,
             weights=1 / np.diag(noise),
@@ -105,9 +106,3 @@ def _noise(data: RegressionData, values: Array) -> Array:
     eigenvalues, vectors = np.linalg.eigh(correlation)
     regular = (vectors * np.maximum(eigenvalues, REGULAR)) @ vectors.T
     return np.asarray(regular * level[:, None] * level)
-
-
-def _inverse(noise: Array) -> Array:
-    level = np.sqrt(np.diag(noise))
-    inverse = np.linalg.inv(noise / level[:, None] / level) / level[:, None] / level
-    return np.asarray((inverse + inverse.T) / 2)

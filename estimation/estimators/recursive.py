@@ -8,6 +8,7 @@ from scipy.linalg import cho_factor, cho_solve
 
 from estimation.estimators.base import Array, Solution
 from estimation.estimators.wls import WeightedLeastSquares
+from estimation.linear_algebra.scaled import lengths
 from estimation.regressions.regression_data import RegressionData
 from estimation.regressions.regularisation import regularisation
 from robots.base_parameters import BaseParameters
@@ -129,8 +130,7 @@ class Stream:
         information, right = self.information, self.right
         if extra is not None:
             information, right = information + extra[0], right + extra[1]
-        scale = np.sqrt(np.diag(information))
-        scale = np.where(scale > 0, scale, 1.0)
+        scale = lengths(information)
         matrix = information / scale[:, None] / scale
         try:
             factor = cho_factor(matrix)

@@ -10,6 +10,7 @@ from scipy.linalg import cho_factor, cho_solve, solve_triangular
 
 from estimation.estimators.base import Array, Solution
 from estimation.estimators.wls import WeightedLeastSquares
+from estimation.linear_algebra.scaled import lengths, square_root
 from estimation.regressions.moments import Moments
 from estimation.regressions.position_noise import smoothed_noise
 from estimation.regressions.regression_data import CHUNK, RegressionData
@@ -97,18 +98,15 @@ class _Problem:
         errors = np.tensordot(weights, self.errors, axes=1)
         cross, square = weights @ moments.cross, weights @ moments.square
         extra, right = regularisation(moments, weights, gram, self.ridge)
-        scale = np.sqrt(np.diag(gram))
-        scale = np.where(scale > 0, scale, 1.0)
+        scale = lengths(gram)
         errors, cross, right = errors / scale[:, None] / scale, cross / scale, right / scale
         matrix = (gram + extra) / scale[:, None] / scale
         matrix[np.diag_indices_from(matrix)] += 1e-13
         # Exact columns make the noise's covariance singular: its root keeps the eigenvalue finite.
-        length, vectors = np.linalg.eigh(errors)
-        root = vectors * np.sqrt(np.maximum(length, 0.0))
         augmented = np.block([[matrix, cross[:, None]], [cross[None], np.array([[square]])]])
         augmented[-1, -1] += 1e-12 * square  # an exact fit leaves nothing to divide by
         noise = np.zeros((len(cross) + 1, len(cross) + 1))
-        noise[:-1, :-1], noise[-1, -1] = root, np.sqrt(torque)
+        noise[:-1, :-1], noise[-1, -1] = square_root(errors), np.sqrt(torque)
         try:
             inner = noise.T @ cho_solve(cho_factor(augmented), noise)
             mu = min(1.0, 1 / float(np.linalg.eigvalsh(inner)[-1]))
@@ -134,10 +132,7 @@ def _regressor_noise(data: RegressionData, noise: Array) -> Array:
     """
     n, size = data.robot.n, data.base.size
     total = np.zeros((n, size, size))
-    roots = []
-    for covariance in noise:
-        length, vectors = np.linalg.eigh(covariance)
-        roots.append(vectors * np.sqrt(np.maximum(length, 0.0)))
+    roots = [square_root(covariance) for covariance in noise]
     if not np.any(roots):
         return total
     rows = sum(len(part.motion) for part in data.parts)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -11,7 +12,6 @@ from estimation.exports.standard import MARGIN, rigid_grouping, semidefinite_bod
 from estimation.linear_algebra.conic import ConicProgram
 from estimation.models.model import Model
 from estimation.regressions.parameter_priors import link_spreads
-from robots.geometry.inertia import SIZE
 
 Array = NDArray[np.float64]
 
@@ -51,29 +51,65 @@ def nearest_feasible(model: Model, inertia: Array, rotor_inertia: Array) -> tupl
     rest = values - grouped @ np.asarray(rotor_inertia, dtype=float)[rotors]
     spread = link_spreads(inertia)
     scaled = grouping * spread.reshape(-1)
-    error = np.sqrt(np.diag(model.covariance)[own])
-    # What is not determined may be anything within the sizes of links.
-    error = np.where(model.determined[own] & (error > 0.0), error, np.abs(scaled).sum(axis=1))
-    correlation = np.where(
-        np.outer(model.determined[own], model.determined[own]),
-        model.covariance[np.ix_(own, own)] / np.outer(error, error),
-        np.eye(len(error)),
+    return nearest_within_errors(
+        model,
+        own,
+        scaled,
+        rest,
+        (inertia / spread).reshape(-1),
+        lambda program: semidefinite_bodies(program, spread, program.size, ROOM * MARGIN),
+        "bodies that can exist",
     )
-    whiten = np.linalg.inv(np.linalg.cholesky(correlation + FLOOR * np.eye(len(error)))) / error
-    n, count = len(inertia), len(values)
-    size = SIZE * n + count
-    program = ConicProgram(size)
+
+
+def nearest_within_errors(
+    model: Model,
+    own: NDArray[np.bool_],
+    scaled: Array,
+    rest: Array,
+    start: Array,
+    constrain: Callable[[ConicProgram], None],
+    what: str,
+) -> tuple[Model, float]:
+    """Moves base parameters to those of standard parameters x that obey constraints, by as little as errors allow.
+
+    With the change d = scaled x - rest it minimises ``d' C^-1 d``, C the covariance of the moved parameters. The others
+    follow by their covariance with them.
+
+    Args:
+        model: an identified model.
+        own: which of its b parameters are moved; c of them.
+        scaled: makes them of x (c, k), whose units are those of links.
+        rest: what they are (c,), less what x does not make.
+        start: x by the description (k,), which decides what the data leave open.
+        constrain: adds the constraints to a program of k + c variables, x first.
+        what: is solved for, for messages.
+
+    Returns:
+        The model, and the largest change of a determined parameter in standard errors.
+
+    Raises:
+        InfeasibleError: no parameters obey the constraints.
+        SolverError: the solver gave up.
+    """
+    determined, covariance = model.determined[own], model.covariance[np.ix_(own, own)]
+    error = np.sqrt(np.diag(covariance))
+    # What is not determined may be anything within the sizes of links.
+    error = np.where(determined & (error > 0.0), error, np.abs(scaled).sum(axis=1))
+    correlation = np.where(np.outer(determined, determined), covariance / np.outer(error, error), np.eye(len(error)))
+    correlation = correlation + FLOOR * np.eye(len(error))
+    whiten = np.linalg.inv(np.linalg.cholesky(correlation)) / error
+    count, free = scaled.shape
+    program = ConicProgram(free + count)
     rows = np.hstack([whiten @ scaled, -np.eye(count)])
     unit = np.maximum(np.abs(rows).max(axis=1), 1.0)
     program.equal(rows / unit[:, None], -(whiten @ rest) / unit)
-    semidefinite_bodies(program, spread, size, ROOM * MARGIN)
-    start = np.concatenate([(inertia / spread).reshape(-1), np.zeros(count)])
-    weights = np.concatenate([np.full(SIZE * n, PRIOR), np.ones(count)])
-    found = program.solve(np.diag(weights), -weights * start, "bodies that can exist")
-    change = scaled @ found[: SIZE * n] - rest
+    constrain(program)
+    weights = np.concatenate([np.full(free, PRIOR), np.ones(count)])
+    found = program.solve(np.diag(weights), -weights * np.concatenate([start, np.zeros(count)]), what)
+    change = scaled @ found[:free] - rest
     moved = np.array(model.values)
     moved[own] += change
     cross = model.covariance[np.ix_(~own, own)] / error
-    moved[~own] += cross @ np.linalg.solve(correlation + FLOOR * np.eye(len(error)), change / error)
-    known = model.determined[own]
-    return replace(model, values=moved), float(np.abs(change / error)[known].max(initial=0.0))
+    moved[~own] += cross @ np.linalg.solve(correlation, change / error)
+    return replace(model, values=moved), float(np.abs(change / error)[determined].max(initial=0.0))

@@ -13,7 +13,7 @@ from estimation.external_forces.residuals.signals import Signals
 from estimation.external_forces.thresholds.calibrations import Calibration
 from estimation.external_forces.thresholds.observations import Observed
 from estimation.external_forces.wrenches import tool_load
-from estimation.identifications.transfer import NORMAL_95
+from estimation.uncertainty.quantiles import NORMAL_95
 from robots.common.plain import all_finite, finite
 from robots.common.stretches import joined_spans
 from robots.geometry.chain import Chain

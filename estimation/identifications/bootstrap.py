@@ -13,10 +13,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from estimation.identifications.estimate import Estimate
+from estimation.linear_algebra.scaled import lengths
 from estimation.preprocessing import Harmonics
 from estimation.regressions.joint_regressor import JointRegressor, chunks
 from estimation.regressions.moments import Moments
 from estimation.regressions.preparation import Prepared, Rows, prepare_all
+from estimation.uncertainty.blocks import circular_block_counts
 from robots.base_parameters import find_base_parameters
 from robots.common.errors import InputError, NotIdentifiableError
 from robots.common.parallel import one_blas_thread, threaded
@@ -200,15 +202,10 @@ def _moments(regressor: JointRegressor, part: Rows, piece: slice) -> Moments:
 
 def _refits(gram: Array, cross: Array, moving: int, resamples: int, rng: np.random.Generator) -> Array:
     """Solutions (R, b) of sums of drawn blocks, each of `moving` consecutive pieces, in a circle."""
-    pieces = len(gram)
-    draws = rng.integers(pieces, size=(resamples, -(-pieces // moving)))
-    drawn = (draws[:, :, None] + np.arange(moving)).reshape(resamples, -1) % pieces
-    scale = np.sqrt(np.maximum(np.einsum("kpp->p", gram), 0.0))
-    scale = np.where(scale > 0, scale, 1.0)
+    scale = lengths(gram.sum(axis=0))
     gram, cross = gram / scale[:, None] / scale, cross / scale
     faint = FAINT * np.eye(len(scale))
     values = np.empty((resamples, len(scale)))
-    for k, chosen in enumerate(drawn):
-        counts = np.bincount(chosen, minlength=pieces).astype(float)
+    for k, counts in enumerate(circular_block_counts(len(gram), moving, resamples, rng)):
         values[k] = np.linalg.solve(np.tensordot(counts, gram, axes=1) + faint, counts @ cross) / scale
     return values

@@ -14,7 +14,6 @@ from estimation.identifications.choices import Candidates, Choice, choose
 from estimation.identifications.estimate import Estimate, JointFit, colour_of
 from estimation.identifications.fit import Fit, fit
 from estimation.identifications.model_forms import ModelForm
-from estimation.identifications.transfer import band_of
 from estimation.identifications.verdicts import determined_parameters, require_predictable
 from estimation.logs.known_setup import gravities_of, require_plain
 from estimation.logs.provenance import describe_logs
@@ -23,6 +22,7 @@ from estimation.preprocessing import Harmonics
 from estimation.regressions.preparation import Prepared, prepare_all
 from estimation.regressions.torque_meanings import as_joint_torque, with_torque_constants
 from estimation.uncertainty import fast_noise, period_noise
+from estimation.uncertainty.quantiles import band_of
 from robots.common.errors import InputError, NotIdentifiableError
 from robots.common.parallel import one_blas_thread
 from robots.common.progress import SILENT, Progress

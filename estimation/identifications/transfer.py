@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -15,14 +15,13 @@ from estimation.preprocessing import Smoother
 from estimation.regressions.blocks import Blocks, Sides
 from estimation.regressions.moments import Moments
 from estimation.regressions.preparation import Rows
+from estimation.uncertainty.quantiles import BAND, NORMAL_95
 
 Array = NDArray[np.float64]
 Which = NDArray[np.bool_]
 
 # Joints with the widest ranges: of each, the lower half of the range predicts the upper, and the upper the lower.
 WIDEST = 3
-# Share of the errors that a band is to hold, and the normal distribution's half-width for it.
-BAND, NORMAL_95 = 0.95, 1.96
 # Factors on the parameters' standard errors from which the band of other motions takes the first that suffices.
 GROWTHS = (1.0, 1.5, 2.0, 3.0, 4.0, 6.0, 8.0, 12.0, 16.0, 24.0, 32.0)
 # Share of the splits' errors that this band is to hold. A new motion may lie farther away than one half of the log from
@@ -252,11 +251,3 @@ def _lower_half(keys: Array) -> Which:
     lower = np.zeros(len(keys), dtype=bool)
     lower[np.argsort(keys, kind="stable")[: len(keys) // 2]] = True
     return lower
-
-
-def band_of(errors: Array) -> Array:
-    """Gives the half-widths (n,) that hold `BAND` of each joint's errors (N, n) that are known; NaN where none is."""
-    if not np.isnan(errors).any():
-        return np.asarray(np.quantile(errors, BAND, axis=0))
-    known: Sequence[Array] = [column[~np.isnan(column)] for column in errors.T]
-    return np.array([np.quantile(column, BAND) if len(column) else np.nan for column in known])

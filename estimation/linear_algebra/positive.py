@@ -33,3 +33,20 @@ def solve_positive(matrix: Array, right: Array) -> Array:
     if not np.isfinite(solution).all():
         raise np.linalg.LinAlgError("the matrix or the right side is not finite")
     return np.asarray(solution)
+
+
+def solve_nearly_positive(matrix: Array, right: Array) -> Array:
+    """Solves matrix x = right as `solve_positive` does; by least squares where rounding made the matrix indefinite.
+
+    Args:
+        matrix: symmetric, with a diagonal of about one (p, p).
+        right: (p,) or (p, k).
+
+    Raises:
+        numpy.linalg.LinAlgError: a matrix that is not finite.
+    """
+    try:
+        return solve_positive(matrix, right)
+    except np.linalg.LinAlgError:
+        # The values differ by twelve orders of magnitude.
+        return np.asarray(np.linalg.lstsq(matrix, right, rcond=1e-9)[0])

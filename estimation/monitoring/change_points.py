@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from estimation.monitoring.control_charts.level_filter import CORRELATION_TIME
+from estimation.uncertainty.quantiles import robust_deviation
 
 Array = NDArray[np.float64]
 
@@ -88,4 +89,4 @@ def _noise(y: Array, step: float) -> float:
     distance = min(max(1, round(DISTANCE * CORRELATION_TIME / step)), len(y) // 6)
     differences = y[distance:] - y[:-distance]
     own = 2 * (1 - np.exp(-distance * step / CORRELATION_TIME))
-    return float(np.median(np.abs(differences)) / 0.6745 / np.sqrt(own))
+    return float(robust_deviation(differences) / np.sqrt(own))

@@ -8,7 +8,7 @@ from typing import Any, Literal
 
 import numpy as np
 
-from estimation.uncertainty.normal import NORMAL_95
+from estimation.uncertainty.quantiles import NORMAL_95
 from robots.common.plain import finite
 
 Kind = Literal["damage", "friction_decrease", "payload", "contact", "heat", "offset", "misfit", "unknown"]

@@ -7,13 +7,12 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import chi2
 
 from estimation.monitoring.control_charts.change_fit import StepFit
 from estimation.monitoring.control_charts.quantities import Quantity, start_limit
 from estimation.monitoring.findings import Finding, Kind, relative
 from estimation.monitoring.windows.baseline import PAYLOAD
-from estimation.uncertainty.normal import NORMAL_95
+from estimation.uncertainty.quantiles import NORMAL_95, chi2_limit
 
 Array = NDArray[np.float64]
 
@@ -67,7 +66,7 @@ def changes_at(quantities: Sequence[Quantity], sources: Sequence[Quantity], begi
         The changes; none where the alarm is not confirmed.
     """
     fits = [(q, q.steps()) for q in quantities if len(q.samples) > 1]
-    critical, limit = float(chi2.isf(BESIDE / max(len(fits), 1), 1)), start_limit(len(quantities))
+    critical, limit = chi2_limit(BESIDE, tests=max(len(fits), 1)), start_limit(len(quantities))
 
     def changed(q: Quantity, fit: StepFit, k: int) -> bool:
         if k == 0 and q.is_whole(begin):

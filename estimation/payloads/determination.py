@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from estimation.payloads.intervals import AXES, Quantity
-from estimation.uncertainty.normal import NORMAL_95
+from estimation.uncertainty.quantiles import NORMAL_95
 from robots.common.errors import InputError, NotIdentifiableError
 from robots.geometry.chain import Chain
 from robots.regressor import TorqueModel

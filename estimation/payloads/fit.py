@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from estimation.linear_algebra.scaled import floored_inverse
 from estimation.payloads.equations import Arm, Equations
 from estimation.regressions.moments import Moments
 from estimation.uncertainty import Part, covariance, with_repetitions
@@ -63,10 +64,10 @@ def fit_payload(arm: Arm, equations: Sequence[Equations], *, period: float, seed
     weights = moments.level(np.zeros(arm.size)) ** -2
     values = np.zeros(arm.size)
     for _ in range(ROUNDS):
-        inverse = _inverse(np.tensordot(weights, moments.gram, axes=1) + known)
+        inverse = floored_inverse(np.tensordot(weights, moments.gram, axes=1) + known)
         values = inverse @ (weights @ moments.cross + known @ target)
         weights = moments.level(values) ** -2
-    inverse = _inverse(np.tensordot(weights, moments.gram, axes=1) + known)
+    inverse = floored_inverse(np.tensordot(weights, moments.gram, axes=1) + known)
     values = inverse @ (weights @ moments.cross + known @ target)
     used = [np.flatnonzero(np.diag(gram) > 0) for gram in moments.gram]
     rows = sum(some.rows for some in equations)
@@ -105,13 +106,6 @@ def _prior(arm: Arm, moments: Moments) -> tuple[Array, Array, Array]:
     return known, scatter, target
 
 
-def _inverse(matrix: Array) -> Array:
-    scale = np.sqrt(np.diag(matrix))
-    values, vectors = np.linalg.eigh(matrix / scale[:, None] / scale)
-    values = np.maximum(values, np.finfo(float).eps * len(values) * values[-1])
-    return np.asarray((vectors / values) @ vectors.T / scale[:, None] / scale)
-
-
 def _residual(equations: Equations, values: Array) -> Array:
     errors = np.empty_like(equations.target)
     for at in equations.chunks():
@@ -125,5 +119,5 @@ def _without(moments: Moments, weights: Array, known: Array, target: Array) -> A
     b = len(target) - SIZE
     gram, cross = np.tensordot(weights, moments.gram, axes=1) + known, weights @ moments.cross + known @ target
     values = np.zeros(len(target))
-    values[:b] = _inverse(gram[:b, :b]) @ cross[:b]
+    values[:b] = floored_inverse(gram[:b, :b]) @ cross[:b]
     return values

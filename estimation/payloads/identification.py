@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from estimation.gate import check_logs
 from estimation.identifications.estimate import Estimate
 from estimation.identifications.identification import identify
+from estimation.linear_algebra.scaled import floored_inverse
 from estimation.logs.known_setup import require_known
 from estimation.logs.provenance import describe_logs
 from estimation.models.model import Model
@@ -147,14 +148,11 @@ def _arm_of_model(model: Model) -> Arm:
     """The arm's parameters by a model, its covariance widened by a drift of friction."""
     friction = np.array([column.friction for column in model.parameters])
     covariance = model.covariance + np.diag(np.where(friction, FRICTION_DRIFT * model.values, 0.0) ** 2)
-    scale = np.sqrt(np.maximum(np.diag(covariance), np.finfo(float).tiny))
-    inner, vectors = np.linalg.eigh(covariance / scale[:, None] / scale)
-    inner = np.maximum(inner, np.finfo(float).eps * len(inner) * inner[-1])
     return Arm(
         model=model.torque_model,
         columns=model.columns,
         values=model.values,
-        precision=(vectors / inner) @ vectors.T / scale[:, None] / scale,
+        precision=floored_inverse(covariance),
         target=np.zeros(len(model.values)),
         weight=max(float(model.provenance.get("colour", 1.0)), 1.0) ** 2,
     )

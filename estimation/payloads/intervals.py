@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from estimation.payloads.body import central_inertia
-from estimation.uncertainty.normal import NORMAL_95
+from estimation.uncertainty.quantiles import NORMAL_95
 
 Array = NDArray[np.float64]
 

@@ -7,7 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import minimize_scalar
-from scipy.signal import fftconvolve
+
+from estimation.uncertainty.correlations import squared_differences
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.intp]
@@ -94,18 +95,11 @@ def _coarse_shift(a: Array, b: Array) -> int:
     middle = a.mean(axis=0)
     a, b = a - middle, b - middle
     least = max(1, int(LEAST_OVERLAP * min(len(a), len(b))))
-    cross = sum(fftconvolve(b[:, j], a[::-1, j]) for j in range(a.shape[1]))
-    square_a, square_b = ((x**2).sum(axis=1) for x in (a, b))
-    ones_a, ones_b = np.ones(len(a)), np.ones(len(b))
-    # Entry k of each convolution belongs to the shift k - (len(a) - 1).
-    rows = fftconvolve(ones_b, ones_a)
-    of_b, of_a = fftconvolve(square_b, ones_a), fftconvolve(ones_b, square_a[::-1])
-    rows = np.maximum(np.rint(rows), 1.0)
-    mean = np.maximum(of_a + of_b - 2 * cross, 0.0) / rows
-    mean = np.where(rows >= least, mean, np.inf)
-    alike = mean <= mean.min() + ALIKE * float(square_a.mean())
-    best = int(np.argmax(np.where(alike, rows, -1.0)))
-    return best - (len(a) - 1)
+    shifts = np.arange(least - len(a), len(b) - least + 1)
+    rows = np.minimum(len(b), len(a) + shifts) - np.maximum(shifts, 0)
+    mean = np.maximum(squared_differences(b, a, shifts).sum(axis=1), 0.0)
+    alike = mean <= mean.min() + ALIKE * float((a**2).sum(axis=1).mean())
+    return int(shifts[np.argmax(np.where(alike, rows, -1))])
 
 
 def _pairs(times: Array, others: Array) -> tuple[Indices, Indices]:

@@ -6,10 +6,11 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import chi2
 
 from estimation.linear_algebra.conic import ConicProgram
 from estimation.linear_algebra.log_determinant import VARIABLES, add_log_determinant
+from estimation.linear_algebra.scaled import floored_inverse
+from estimation.uncertainty.quantiles import chi2_limit
 from robots.consistency import BASIS, normalised_eigenvalues, pseudo_inertia
 from robots.geometry.inertia import SIZE, inertial_parameters
 
@@ -42,7 +43,7 @@ class PhysicalBody:
     @property
     def contradicted(self) -> bool:
         """Whether least squares lie farther from all bodies than chance explains."""
-        return self.distance > float(chi2.isf(UNLIKELY, SIZE))
+        return self.distance > chi2_limit(UNLIKELY, SIZE)
 
 
 def physical_body(values: Array, covariance: Array) -> PhysicalBody:
@@ -59,10 +60,7 @@ def physical_body(values: Array, covariance: Array) -> PhysicalBody:
     reference = ball(values)
     mass, length = reference[0], _size(reference)
     scale = mass * np.array([1.0] + [length] * 3 + [length**2] * 6)
-    errors = np.sqrt(np.diag(covariance))
-    inner, vectors = np.linalg.eigh(covariance / errors[:, None] / errors)
-    inner = np.maximum(inner, np.finfo(float).eps * SIZE * inner[-1])
-    precision = (vectors / inner) @ vectors.T / errors[:, None] / errors
+    precision = floored_inverse(covariance)
     quadratic = precision * scale[:, None] * scale
     wanted = -quadratic @ (values / scale)
 

@@ -6,9 +6,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from estimation.comparisons.common_parameters import friction_table
-from estimation.identifications.transfer import NORMAL_95
 from estimation.models.model import Model
 from estimation.regressions.joint_regressor import chunks
+from estimation.uncertainty.quantiles import NORMAL_95
 from robots.common.plain import two_digits
 from robots.signals import Motion
 from robots.terms.base import length_unit

@@ -7,11 +7,9 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
-from scipy.interpolate import CubicSpline
 
 from estimation.gate import GateReport, check_log
-from estimation.gate.measurements.columns import Columns
-from estimation.gate.measurements.outliers import find_outliers
+from estimation.gate.measurements.outliers import interpolated
 from estimation.gate.measurements.timing import FEWEST
 from estimation.models.model import Model
 from estimation.preprocessing import LowPass, Smoother, SmoothingSpline
@@ -40,24 +38,12 @@ def checked_motion(robot: Robot, log: Log) -> tuple[GateReport, list[Log]]:
     """
     gate = check_log(robot, log).for_motion()
     gate.raise_if_refused()
-    log = _without_outliers(gate.corrected(log), set(gate.spikes.tolist()))
+    log = gate.corrected(log)
+    log = interpolated(log, ["q"]) if len(gate.spikes) else log
     if gate.motion_parts == ((0, len(log)),):
         return gate, [log]
     parts = [log.rows(slice(first, stop)) for first, stop in gate.motion_parts if stop - first >= FEWEST]
     return gate, parts or [log]
-
-
-def _without_outliers(log: Log, spikes: set[int]) -> Log:
-    """Interpolates isolated outliers of positions."""
-    if not spikes:
-        return log
-    q = np.array(log.q)
-    for (prefix, joint), found in find_outliers(Columns.of(log)).items():
-        rows = [row for row in found.tolist() if row in spikes]
-        if prefix == "q" and rows:
-            known = np.setdiff1d(np.arange(len(log)), rows)
-            q[rows, joint] = CubicSpline(log.t[known], q[known, joint])(log.t[rows])
-    return replace(log, q=q)
 
 
 def joined(parts: Sequence[Log]) -> Log:

@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 from numpy.typing import NDArray
 
+from estimation.exports.feasible import nearest_within_errors
 from estimation.linear_algebra.conic import ConicProgram
 from estimation.models.model import Model
 from estimation.regressions.parameter_priors import link_spreads
@@ -20,10 +19,6 @@ Array = NDArray[np.float64]
 
 MARGIN = 1e-6
 """Smallest eigenvalue of a pseudo-inertia, in units of the link's own mass and reach."""
-PRIOR = 1e-2
-"""Weight of the description, in units of each link's mass and reach: it decides what the data leave open."""
-FLOOR = 1e-9
-"""Of a correlation matrix, against rounding."""
 INERTIAL = ("rigid_body", "rotor_inertia")
 
 
@@ -59,32 +54,15 @@ def nearest_simulable(model: Model) -> tuple[Model, float]:
     rotor_spread = np.where(rotor > 0.0, rotor, spread[:, -1])[joints]
     unit = np.concatenate([spread.reshape(-1), rotor_spread])
     scaled = base.grouping[own][:, [*rigid, *rotors]] * unit
-    determined, values = model.determined[own], model.values[own]
-    error = np.sqrt(np.diag(model.covariance)[own])
-    # What is not determined may be anything within the sizes of links.
-    error = np.where(determined & (error > 0.0), error, np.abs(scaled).sum(axis=1))
-    covariance = model.covariance[np.ix_(own, own)]
-    correlation = np.where(np.outer(determined, determined), covariance / np.outer(error, error), np.eye(len(error)))
-    correlation = correlation + FLOOR * np.eye(len(error))
-    whiten = np.linalg.inv(np.linalg.cholesky(correlation)) / error
-    free, count = len(unit), len(values)
-    program = ConicProgram(free + count)
-    rows = np.hstack([whiten @ scaled, -np.eye(count)])
-    size = np.maximum(np.abs(rows).max(axis=1), 1.0)
-    program.equal(rows / size[:, None], -(whiten @ values) / size)
-    _keep_bodies(program, described, spread)
-    if len(joints):
-        place = np.arange(SIZE * robot.n, free)
-        program.nonnegative(np.eye(free + count)[place], -LEAST_INERTIA * rotor[joints] / rotor_spread)
-    start = np.concatenate([(described / spread).reshape(-1), rotor[joints] / rotor_spread, np.zeros(count)])
-    weights = np.concatenate([np.full(free, PRIOR), np.ones(count)])
-    found = program.solve(np.diag(weights), -weights * start, "a model that simulates")
-    change = scaled @ found[:free] - values
-    moved = np.array(model.values)
-    moved[own] += change
-    cross = model.covariance[np.ix_(~own, own)] / error
-    moved[~own] += cross @ np.linalg.solve(correlation, change / error)
-    return replace(model, values=moved), float(np.abs(change / error)[determined].max(initial=0.0))
+
+    def constrain(program: ConicProgram) -> None:
+        _keep_bodies(program, described, spread)
+        if len(joints):
+            place = np.arange(SIZE * robot.n, len(unit))
+            program.nonnegative(np.eye(program.size)[place], -LEAST_INERTIA * rotor[joints] / rotor_spread)
+
+    start = np.concatenate([(described / spread).reshape(-1), rotor[joints] / rotor_spread])
+    return nearest_within_errors(model, own, scaled, model.values[own], start, constrain, "a model that simulates")
 
 
 def _keep_bodies(program: ConicProgram, described: Array, spread: Array) -> None:

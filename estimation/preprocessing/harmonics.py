@@ -7,12 +7,12 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.fft import irfft, next_fast_len, rfft
 from scipy.linalg import cho_factor, cho_solve
 from scipy.optimize import minimize_scalar
 
 from estimation.preprocessing.base import Smoother
 from estimation.preprocessing.resampling import Resampled
+from estimation.uncertainty.correlations import squared_differences
 from robots.signals import Motion
 
 Array = NDArray[np.float64]
@@ -104,7 +104,9 @@ def period_of(positions: Resampled) -> float | None:
     if not moves.any() or len(q) < LEAST * SAMPLES:
         return None
     x = (q[:, moves] - q[:, moves].mean(axis=0)) / spread[moves]
-    misses = _misses(x)
+    # RMS over sqrt(2) of x(t + lag) - x(t), of the worst joint.
+    differences = squared_differences(x, x, np.arange(len(x) // 2 + 1))
+    misses = np.sqrt(np.maximum(differences, 0.0) / 2).max(axis=1)
     longest = min(len(misses) - 1, int(len(x) / LEAST))
     if longest < SAMPLES:
         return None
@@ -117,17 +119,6 @@ def period_of(positions: Resampled) -> float | None:
         if found is not None:
             return float(found * step)
     return None
-
-
-def _misses(x: Array) -> Array:
-    """RMS over sqrt(2) of x(t + lag) - x(t) of the worst joint (N / 2,), by Fourier transforms."""
-    rows = len(x)
-    length = next_fast_len(2 * rows, real=True)
-    products = irfft(np.abs(rfft(x, length, axis=0)) ** 2, length, axis=0)[: rows // 2 + 1]
-    squares = np.concatenate([np.zeros((1, x.shape[1])), np.cumsum(x**2, axis=0)])
-    lags = np.arange(len(products))
-    sums = squares[rows - lags] + squares[rows] - squares[lags] - 2 * products
-    return np.sqrt(np.maximum(sums, 0.0) / (2 * (rows - lags))[:, None]).max(axis=1)
 
 
 def _refine(x: Array, lag: int) -> float | None:

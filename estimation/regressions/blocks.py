@@ -40,6 +40,10 @@ class Blocks:
         gram, cross = np.zeros((*shape, columns, columns)), np.zeros((*shape, columns))
         return Blocks(gram, cross, np.zeros(shape), np.zeros(shape))
 
+    def scaled(self, factor: Array) -> Blocks:
+        """Gives the normal equations of the torques times a factor (n,)."""
+        return Blocks(self.gram, self.cross * factor[:, None, None], self.square * factor[:, None] ** 2, self.count)
+
     @cached_property
     def total(self) -> Moments:
         """The normal equations of all blocks together."""

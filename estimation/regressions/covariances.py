@@ -5,8 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
-import numpy as np
-
+from estimation.linear_algebra import scaled
 from estimation.regressions.moments import Array
 from estimation.uncertainty import Part, covariance
 from robots.base_parameters import BaseParameters
@@ -48,9 +47,7 @@ def robust_covariance(
         The sandwich of `estimation.uncertainty`.
     """
     if inverse is None:
-        scale = np.sqrt(np.diag(gram))
-        scale = np.where(scale > 0, scale, 1.0)
-        inverse = np.linalg.inv(gram / scale[:, None] / scale + FAINT * np.eye(len(scale))) / scale[:, None] / scale
+        inverse = scaled.inverse(gram, FAINT)
     parts = [Part(e.rows, e.regressor, e.mask, e.residual * e.mask) for e in equations]
     return covariance(parts, weights, (inverse + inverse.T) / 2)
 

@@ -7,7 +7,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from estimation.linear_algebra.positive import solve_positive
+from estimation.linear_algebra.positive import solve_nearly_positive, solve_positive
+from estimation.linear_algebra.scaled import lengths
 from estimation.regressions.parameter_priors import GaussianPrior
 
 Array = NDArray[np.float64]
@@ -91,9 +92,7 @@ class Moments:
         matrix, extra = self._weighted(weights), ridge
         if self.pull is not None:
             matrix, extra = matrix + ridge * float(weights @ self.square) * self.pull.precision, FAINT
-        scale = np.sqrt(np.diag(matrix))
-        scale = np.where(scale > 0, scale, 1.0)
-        unit = np.eye(len(scale))
+        scale, unit = lengths(matrix), np.eye(len(matrix))
         inverse = solve_positive(matrix / scale[:, None] / scale + extra * unit, unit)
         return np.asarray(inverse / scale[:, None] / scale)
 
@@ -127,8 +126,7 @@ def solve_all(gram: Array, cross: Array, square: Array, ridge: float, pull: Gaus
         Parameters (B, p).
     """
     diagonal = np.arange(gram.shape[1])
-    scale = np.sqrt(gram[:, diagonal, diagonal])
-    scale = np.where(scale > 0, scale, 1.0)
+    scale = lengths(gram)
     factor = 1.0 / scale
     right = cross * factor
     matrix = gram * factor[:, :, None]
@@ -141,4 +139,4 @@ def solve_all(gram: Array, cross: Array, square: Array, ridge: float, pull: Gaus
         matrix *= factor[:, None, :]
         matrix[:, diagonal, diagonal] += FAINT
         right += strength * (pull.precision @ pull.target) * factor + FAINT * scale * pull.target
-    return np.array([solve_positive(*system) for system in zip(matrix, right, strict=True)]) * factor
+    return np.array([solve_nearly_positive(*system) for system in zip(matrix, right, strict=True)]) * factor

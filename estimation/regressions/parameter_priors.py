@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import solve_triangular
 
+from estimation.linear_algebra.scaled import lengths
 from robots.base_parameters import BaseParameters
 from robots.terms import Column
 from robots.terms.rigid_body import SYMBOLS
@@ -88,8 +89,7 @@ def usual_share(column: Column) -> float:
 def prior_of_spreads(base: BaseParameters, spread: Array, target: Array) -> GaussianPrior:
     """Builds a prior of base parameters from spreads (p,) of the standard parameters about a target (p,)."""
     covariance = (base.grouping * spread**2) @ base.grouping.T
-    scale = np.sqrt(np.diag(covariance))
-    scale = np.where(scale > 0, scale, 1.0)
+    scale = lengths(covariance)
     normalised = covariance / scale[:, None] / scale + FAINT * np.eye(len(scale))
     precision = np.linalg.inv(normalised) / scale[:, None] / scale
     return GaussianPrior(precision, base.from_standard(target))

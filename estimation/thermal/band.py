@@ -11,6 +11,7 @@ from estimation.preprocessing import resample, smooth
 from estimation.regressions.preparation import torque_of
 from estimation.thermal.runs.condensed import Condensed
 from estimation.thermal.torque import ThermalTorqueModel
+from estimation.uncertainty.quantiles import band_of
 
 Array = NDArray[np.float64]
 
@@ -42,4 +43,4 @@ def error_band(model: ThermalTorqueModel, condensed: Condensed, factors: Sequenc
         factor = np.stack([np.interp(t, middles, values[part]) for values in factors], axis=-1)
         rigid, cold = model.split(motion.q[::stride], motion.dq[::stride], motion.ddq[::stride])
         errors.append(np.abs(tau[::stride] - rigid - factor * cold))
-    return [float(value) for value in np.quantile(np.concatenate(errors), 0.95, axis=0)]
+    return band_of(np.concatenate(errors)).tolist()

@@ -11,11 +11,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from estimation.identifications.identification import identify
+from estimation.linear_algebra.scaled import solve_ridge
 from estimation.logs.known_setup import HEAT, require_plain
 from estimation.models.model import Model
 from estimation.thermal.band import error_band
 from estimation.thermal.expected_rounds import expected_rounds
-from estimation.thermal.information import inverse_of, solve_normal
+from estimation.thermal.information import FAINT, inverse_of
 from estimation.thermal.results.campaign_estimate import CampaignEstimate
 from estimation.thermal.results.estimate import ThermalEstimate, searched_parameters, with_errors
 from estimation.thermal.runs.condensed import Condensed, JointSums, condense
@@ -186,7 +187,7 @@ class _AlternatingFit:
                 part, right = sums.scaled(factor)
                 gram[np.ix_(sums.used, sums.used)] += weight * part
                 cross[sums.used] += weight * right
-            self.values = solve_normal(gram, cross)
+            self.values = solve_ridge(gram, cross, FAINT)
             self.weights = 1.0 / np.maximum(self._residuals(), 1e-9) ** 2
 
     def _residuals(self) -> Array:

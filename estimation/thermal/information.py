@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg import cho_factor, cho_solve
+
+from estimation.linear_algebra.scaled import solve_ridge
 
 Array = NDArray[np.float64]
 
@@ -26,21 +27,5 @@ def inverse_of(information: Array) -> Array:
     known = np.diag(information) > SILENT
     inverse = np.diag(np.where(known, 0.0, np.inf))
     inside = np.ix_(known, known)
-    inverse[inside] = solve_normal(information[inside], np.eye(int(known.sum())))
+    inverse[inside] = solve_ridge(information[inside], np.eye(int(known.sum())), FAINT)
     return inverse
-
-
-def solve_normal(matrix: Array, right: Array) -> Array:
-    """Solves normal equations, scaled to a diagonal of ones.
-
-    Args:
-        matrix: (p, p), symmetric and positive semidefinite.
-        right: (p,) or (p, k).
-
-    Returns:
-        The solution, in the shape of the right-hand side.
-    """
-    scale = np.sqrt(np.maximum(np.diag(matrix), 1e-300))
-    scaled = matrix / scale[:, None] / scale + FAINT * np.eye(len(scale))
-    solved = cho_solve(cho_factor(scaled), right / (scale if right.ndim == 1 else scale[:, None]))
-    return np.asarray(solved / scale if right.ndim == 1 else solved / scale[:, None])

@@ -7,8 +7,9 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.fft import next_fast_len
 from scipy.signal import lfilter
+
+from estimation.uncertainty.correlations import lagged_products
 
 Array = NDArray[np.float64]
 
@@ -29,25 +30,38 @@ class Noise:
 
     def whitened(self, residual: Array) -> Array:
         """Filters residuals (N, n) to their innovations."""
-        columns = [lfilter(np.concatenate([[1.0], -a]), [1.0], residual[:, j]) for j, a in enumerate(self.coefficients)]
-        return np.stack(columns, axis=1)
+        return np.stack([whitened(residual[:, j], a) for j, a in enumerate(self.coefficients)], axis=1)
 
     def simulated(self, samples: int, rng: np.random.Generator, warm_up: int = 1500) -> Array:
         """Draws noise (N, n)."""
         root = np.linalg.cholesky(self.covariance)
         innovations = rng.standard_normal((samples + warm_up, len(root))) @ root.T
-        columns = [
-            lfilter([1.0], np.concatenate([[1.0], -a]), innovations[:, j])[warm_up:]
-            for j, a in enumerate(self.coefficients)
-        ]
+        columns = [lfilter([1.0], taps(a), innovations[:, j])[warm_up:] for j, a in enumerate(self.coefficients)]
         return np.stack(columns, axis=1)
 
 
-def autocovariance(series: Array, count: float, lags: int = HIGHEST_ORDER) -> Array:
-    """Sums products at lags 0..`lags` over `count` rows (lags + 1,); masked rows must be zero."""
-    length = next_fast_len(len(series) + lags + 1)
-    spectrum = np.fft.rfft(series, length)
-    return np.fft.irfft(np.abs(spectrum) ** 2, length)[: lags + 1] / max(count, 1.0)
+def taps(coefficients: Array) -> Array:
+    """Gives the filter (p + 1,) that turns an autoregressive process into its innovations: 1, -a_1, ..., -a_p."""
+    return np.concatenate([[1.0], -coefficients])
+
+
+def whitened(series: Array, coefficients: Array) -> Array:
+    """Filters series (N, ...) of an autoregressive process (p,) to its innovations, from rest."""
+    return np.asarray(lfilter(taps(coefficients), [1.0], series, axis=0))
+
+
+def autocovariance(series: Array, counts: Array | float, lags: int = HIGHEST_ORDER) -> Array:
+    """Divides sums of products at lags 0..`lags` by numbers of rows.
+
+    Args:
+        series: (N, ...), zero where masked.
+        counts: rows that are not masked (...).
+        lags: the longest lag.
+
+    Returns:
+        Autocovariances (..., lags + 1).
+    """
+    return np.moveaxis(lagged_products(series, lags) / np.maximum(counts, 1.0), 0, -1)
 
 
 def fit_noise(residual: Array, counts: Array, covariances: Sequence[Array] | Array, times: int = 1) -> Noise:

@@ -8,8 +8,8 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.fft import irfft, next_fast_len, rfft
 
+from estimation.uncertainty.correlations import squared_differences
 from estimation.uncertainty.sandwich import Part, at_least, covariance
 
 Array = NDArray[np.float64]
@@ -121,15 +121,9 @@ def _shift(one: Played, other: Played) -> int | None:
     spread = one.q.std(axis=0)
     scale = np.where(spread > 1e-6 * max(1.0, float(spread.max())), spread, max(float(spread.max()), 1e-12))
     a, b = (one.q - one.q.mean(axis=0)) / scale, (other.q - one.q.mean(axis=0)) / scale
-    length = next_fast_len(len(a) + len(b), real=True)
-    product = np.conj(rfft(b, length, axis=0)) * rfft(a, length, axis=0)
     shifts = np.arange(least - len(b), len(a) - least + 1)
-    cross = irfft(product.sum(axis=1), length)[shifts]
-    first, last = np.maximum(shifts, 0), np.minimum(len(a), len(b) + shifts)
-    square_a, square_b = (np.concatenate([[0.0], np.cumsum((x**2).sum(axis=1))]) for x in (a, b))
-    squares = square_a[last] - square_a[first] + square_b[last - shifts] - square_b[first - shifts]
-    best = int(np.argmin((squares - 2 * cross) / (last - first)))
-    begin, end, shift = int(first[best]), int(last[best]), int(shifts[best])
+    shift = int(shifts[squared_differences(a, b, shifts).sum(axis=1).argmin()])
+    begin, end = max(shift, 0), min(len(a), len(b) + shift)
     miss = np.sqrt(np.mean((a[begin:end] - b[begin - shift : end - shift]) ** 2, axis=0))
     return shift if float(miss.max()) < ALIKE else None
 

@@ -9,7 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.signal import lfilter
 
-from estimation.uncertainty.autoregressive import HIGHEST_ORDER, Noise, autocovariance, fit_noise
+from estimation.linear_algebra.scaled import lengths
+from estimation.uncertainty.autoregressive import HIGHEST_ORDER, Noise, autocovariance, fit_noise, taps
 from estimation.uncertainty.averages import Averages
 
 Array = NDArray[np.float64]
@@ -122,8 +123,7 @@ def spread_of(meat: Array, inverse: Array) -> Array:
         meat: symmetric, positive semidefinite up to rounding (p, p).
         inverse: symmetric (p, p).
     """
-    scale = np.sqrt(np.maximum(np.diag(meat), 0.0))
-    scale = np.where(scale > 0, scale, 1.0)
+    scale = lengths(meat)
     values, vectors = np.linalg.eigh(meat / scale[:, None] / scale)
     known = max(float(values[-1]), np.finfo(float).tiny) * len(values) * np.finfo(float).eps
     root = (np.sqrt(np.maximum(values, known)) * vectors).T @ (scale[:, None] * inverse)
@@ -229,7 +229,7 @@ def _meats(parts: Sequence[Part | Averages], weights: Array, noise: Noise, size:
             for j, (a, (Y, columns)) in enumerate(zip(noise.coefficients, found, strict=True)):
                 backward = (Y.T * (weights[j] * part.repeats * part.mask[rows, j]))[:, ::-1]
                 if len(a):
-                    backward, states[j] = lfilter([1.0], np.concatenate([[1.0], -a]), backward, zi=states[j])
+                    backward, states[j] = lfilter([1.0], taps(a), backward, zi=states[j])
                 begin, end = end, end + len(columns)
                 filtered[begin:end] = backward[:, ::-1]
                 scores[columns] += filtered[begin:end] * innovations[j, rows]

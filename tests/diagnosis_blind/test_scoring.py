@@ -16,7 +16,6 @@ from benchmarks.diagnosis_parts.statistics import (
     file_over_reported,
     first_is_right,
     gain_ratios,
-    interval,
     parameter_errors,
     spurious,
     within_limits,
@@ -41,13 +40,6 @@ def row(found: list[tuple[str, int | None]], hidden: list[tuple[str, int | None]
     base = {"key": "one-1", "status": "done", "stratum": "one", "seed": 1, "motion": "periodic", "robot": "ur10"}
     cost = {"cpu": 1.0, "wall": 1.0, "memory": 100.0, "verdict": "named" if found else "none"}
     return {**base, **cost, "findings": findings, "truth": truth, **more}
-
-
-def test_intervals_are_clopper_and_pearsons() -> None:
-    """Shares come with the exact interval: 1 of 150 gives 0.02 to 3.7 %, none of 300 at most 1.2 %."""
-    assert interval(1, 150) == pytest.approx((0.00017, 0.0366), abs=5e-5)
-    assert interval(0, 300) == pytest.approx((0.0, 0.01222), abs=5e-5)
-    assert interval(300, 300)[1] == 1.0
 
 
 def test_scores_of_known_rows() -> None:

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from robots.common.errors import InputError
-from robots.consistency import entropic_distance, inertial_from_pseudo, normalised_eigenvalues, pseudo_inertia
+from robots.consistency import inertial_from_pseudo, normalised_eigenvalues, pseudo_inertia
 from robots.geometry.inertia import inertial_parameters
 
 
@@ -55,20 +55,6 @@ def test_eigenvalues_are_free_of_units():
     in_millimetres = body * np.array([1.0] + [1e3] * 3 + [1e6] * 6)
     for other in (in_grams, in_millimetres):
         np.testing.assert_allclose(normalised_eigenvalues(other), normalised_eigenvalues(body), rtol=1e-9)
-
-
-def test_the_entropic_distance_does_not_depend_on_the_frame():
-    """Moved and turned together, two bodies keep their distance; it is zero for the same body, infinite for none."""
-    (mass, place), (other_mass, other_place) = cloud(1), cloud(2)
-    body, reference = parameters_of(mass, place), parameters_of(other_mass, other_place)
-    turn = np.linalg.qr(np.random.default_rng(0).normal(size=(3, 3)))[0]
-    shift = np.array([0.3, 2.0, -1.0])
-    moved = parameters_of(mass, place @ turn.T + shift), parameters_of(other_mass, other_place @ turn.T + shift)
-    distance = entropic_distance(body, reference)
-    assert distance > 0
-    np.testing.assert_allclose(entropic_distance(*moved), distance, rtol=1e-9)
-    np.testing.assert_allclose(entropic_distance(body, body), 0.0, atol=1e-10)
-    assert entropic_distance(-body, reference) == np.inf
 
 
 def test_other_numbers_of_parameters_are_refused():

@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from estimation.diagnosis.base_models.baseline import Baseline
 from estimation.diagnosis.recordings.log_reading import Recording
+from estimation.linear_algebra.scaled import inverse_root
 from estimation.regressions.parameter_priors import (
     OWN,
     SILENT,
@@ -101,8 +102,4 @@ def _root(gram: Array, pull: GaussianPrior) -> Array:
     b = len(pull.target)
     gram = gram.copy()
     gram[:b, :b] += pull.precision
-    scale = np.sqrt(np.maximum(np.diag(gram), 0.0))
-    scale[scale == 0] = 1.0
-    values, vectors = np.linalg.eigh(gram / scale[:, None] / scale)
-    kept = values > FAINT * values[-1]
-    return np.asarray(vectors[:, kept] / np.sqrt(values[kept]) / scale[:, None])
+    return inverse_root(gram, FAINT)

@@ -7,9 +7,10 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import brentq
-from scipy.stats import chi2, ncx2, norm
+from scipy.stats import ncx2, norm
 
 from estimation.diagnosis.calibration import CLOSE_RIVAL_BIC, POWER
+from estimation.uncertainty.quantiles import chi2_limit, normal_quantile
 
 Array = NDArray[np.float64]
 
@@ -30,7 +31,7 @@ def detectable_energy(degrees: int, tries: int, *, false_alarm: float = 0.01, pe
         false_alarm: probability that noise alone gives a finding.
         penalty: cost of the effect's parameters in the BIC, k log N.
     """
-    level = max(float(chi2.isf(false_alarm / max(tries, 1), degrees)), penalty)
+    level = max(chi2_limit(false_alarm, degrees, max(tries, 1)), penalty)
     return float(brentq(lambda energy: ncx2.sf(level, degrees, energy) - POWER, 1e-9, 10.0 * level + 100.0))
 
 
@@ -44,7 +45,7 @@ def resolving_energy(margin: float = CLOSE_RIVAL_BIC) -> float:
     Args:
         margin: value that twice the log likelihood ratio must exceed.
     """
-    root = norm.ppf(POWER) + np.sqrt(norm.ppf(POWER) ** 2 + margin)
+    root = normal_quantile(POWER) + np.sqrt(normal_quantile(POWER) ** 2 + margin)
     return float(root**2)
 
 

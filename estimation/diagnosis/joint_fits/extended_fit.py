@@ -13,7 +13,6 @@ from estimation.diagnosis.hypothesis_tests.fitted_effects import FittedEffect, a
 from estimation.diagnosis.hypothesis_tests.hypotheses import Hypothesis
 from estimation.diagnosis.hypothesis_tests.problem import Problem
 from estimation.diagnosis.hypothesis_tests.scoring import accept, score
-from estimation.diagnosis.joint_fits.block_errors import widened_by_blocks
 from estimation.diagnosis.joint_fits.event_window import open_event_edges
 from estimation.diagnosis.joint_fits.shape_errors import (
     formula_errors,
@@ -27,6 +26,8 @@ from estimation.identifications.verdicts import NEGLIGIBLE, RELATIVE
 from estimation.models.extension import Extension
 from estimation.models.model import Model
 from estimation.regressions.parameter_priors import GaussianPrior
+from estimation.uncertainty.blocks import widened_by_blocks
+from estimation.uncertainty.quantiles import NORMAL_95
 from robots.terms.effect_bases.capabilities import AboveBand, AtReversals
 
 Array = NDArray[np.float64]
@@ -141,7 +142,7 @@ def fit_extended(problem: Problem, members: Sequence[FittedEffect], provenance: 
         coefficients = np.clip(values[start : start + size], lower, upper)
         own[range(len(own)), range(len(own))] += formula_errors(problem, member, coefficients) ** 2
         for i, k, apart in member.hypothesis.effect.ties(coefficients):
-            own = _narrowed(own, size + k, float(np.hypot(np.sqrt(own[i, i]), apart)))
+            own = _narrowed(own, size + k, float(np.hypot(np.sqrt(own[i, i]), apart / NORMAL_95)))
         errors = np.sqrt(np.maximum(np.diag(own), 0.0))
         determined = np.concatenate(
             [

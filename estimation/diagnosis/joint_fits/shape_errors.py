@@ -14,6 +14,7 @@ from estimation.diagnosis.hypothesis_tests.fitted_effects import FittedEffect
 from estimation.diagnosis.hypothesis_tests.problem import Problem
 from estimation.diagnosis.hypothesis_tests.refinement import climb
 from estimation.diagnosis.hypothesis_tests.scoring import Accepted, score
+from estimation.uncertainty.quantiles import CHI2_95, NORMAL_95
 from robots.common.stretches import spans
 from robots.terms.effect_bases.capabilities import Reading
 
@@ -21,9 +22,8 @@ Array = NDArray[np.float64]
 
 # Drop of the explained chi-square to which a profile is followed.
 DROP = 2.0
-# A value is possible if the explained chi-square there is lower by less than this (95 %).
-OPEN = 3.84
-# The same for a change time: (1 - e^(-x / 2))^2 = 0.95, the distribution of its likelihood ratio (Hansen 2000).
+# A value is possible if the explained chi-square there is lower by less than `CHI2_95`. For a change time:
+# (1 - e^(-x / 2))^2 = 0.95, the distribution of its likelihood ratio (Hansen 2000).
 CHANGED = 7.35
 # Steps of its profile in each direction: the first in standard errors, their growth, their largest number, and the
 # number of successive drops beyond twice that value at which it ends.
@@ -87,11 +87,11 @@ def shape_errors(problem: Problem, member: FittedEffect, others: Accepted) -> li
                 step *= 2.0
         if shape.unit == "s" and shape.scale == "linear" and np.isfinite(found):
             profile = partial(_drop, problem, member, k, others, best)
-            found = max(found, _reach(profile, value, found, (low, high)) / 1.96)
+            found = max(found, _reach(profile, value, found, (low, high)) / NORMAL_95)
         if value == shape.default and len(member.shape) == 1:
-            found = _assumed(problem, member, others, best, (low, high)) / 1.96
+            found = _assumed(problem, member, others, best, (low, high)) / NORMAL_95
         if _paired(member) and np.isfinite(found):
-            found = max(found, _along_ridge(problem, member, k, others, found) / 1.96)
+            found = max(found, _along_ridge(problem, member, k, others, found) / NORMAL_95)
         steps.append(found if found <= (abs(value) if shape.scale == "log" else 0.3 * room) else np.inf)
     return steps
 
@@ -110,7 +110,7 @@ def _assumed(
     points = np.linspace(*bounds, POINTS)
     gains = [_gain(problem, member, (float(x),), others) for x in points]
     top = max(best, *gains)
-    near = [abs(float(x) - member.shape[0]) for x, gain in zip(points, gains, strict=True) if top - gain < OPEN]
+    near = [abs(float(x) - member.shape[0]) for x, gain in zip(points, gains, strict=True) if top - gain < CHI2_95]
     return max(near, default=0.0)
 
 
@@ -178,15 +178,15 @@ def _along_ridge(problem: Problem, member: FittedEffect, k: int, others: Accepte
     relative = shapes[k].scale == "log"
     farthest = 0.0
     for way in (-1, 1):
-        distance, start, inner = 1.96 * step, middle, (0.0, 0.0)
+        distance, start, inner = NORMAL_95 * step, middle, (0.0, 0.0)
         for _ in range(FEW):
             x = value * np.exp(way * distance / value) if relative else value + way * distance
             if not bounds[k][0] <= x <= bounds[k][1]:
                 break
             gain, start = fitted(float(x), start)
             root = float(np.sqrt(max(top - gain, 0.0)))
-            if root > np.sqrt(OPEN):
-                distance = np.interp(np.sqrt(OPEN), (inner[1], root), (inner[0], distance))
+            if root > NORMAL_95:
+                distance = np.interp(NORMAL_95, (inner[1], root), (inner[0], distance))
                 break
             inner = (distance, root)
             distance *= WIDENING
@@ -213,7 +213,7 @@ def widen_change_times(
         for start, stop in _hidden(problem, member, others, member.shape[k]):
             far = max(member.shape[k] - start, stop - member.shape[k])
             for i in (k, *lasts):
-                result[i] = max(result[i], float(far) / 1.96)
+                result[i] = max(result[i], float(far) / NORMAL_95)
     return result
 
 

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from scipy.ndimage import maximum_filter1d, uniform_filter1d
 
 from estimation.diagnosis.calibration import BURST_SIGMAS, MAX_BURST_SHARE, SPIKE_SIGMAS
+from estimation.uncertainty.quantiles import robust_deviation
 
 Array = NDArray[np.float64]
 
@@ -31,15 +32,15 @@ def find_bursts(pieces: Sequence[Array], measured: NDArray[np.bool_], step: floa
     """
     marked = np.zeros_like(measured)
     rows_of = np.abs(np.concatenate(pieces))
-    usual = [float(np.median(x[rows])) if rows.any() else 0.0 for x, rows in zip(rows_of.T, measured.T, strict=True)]
-    most = SPIKE_SIGMAS * np.array(usual) / 0.6745
+    pairs = zip(rows_of.T, measured.T, strict=True)
+    most = SPIKE_SIGMAS * np.array([robust_deviation(x[rows]) if rows.any() else 0.0 for x, rows in pairs])
     pieces = [np.clip(piece, -most, most) for piece in pieces]
     for width in WIDTHS:
         size = max(1, round(width / step))
         means = np.concatenate([uniform_filter1d(piece, size, axis=0, mode="constant") for piece in pieces])
         for j, (mean, counts) in enumerate(zip(np.abs(means).T, measured.T, strict=True)):
             if counts.any():
-                far = mean > BURST_SIGMAS * float(np.median(mean[counts])) / 0.6745
+                far = mean > BURST_SIGMAS * robust_deviation(mean[counts])
                 # A large average marks all rows that it covers.
                 marked[:, j] |= maximum_filter1d(far.astype(np.int8), size) > 0
     marked &= measured

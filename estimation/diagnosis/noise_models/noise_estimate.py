@@ -26,6 +26,7 @@ from estimation.diagnosis.noise_models.spectral_lines import remove_lines
 from estimation.diagnosis.noise_models.whitening import Whitening, free_columns
 from estimation.diagnosis.recordings.log_reading import Recording
 from estimation.diagnosis.recordings.recording import rest_rows
+from estimation.uncertainty.quantiles import NORMAL_MEDIAN, robust_deviation
 
 Array = NDArray[np.float64]
 
@@ -140,7 +141,7 @@ def estimate_whitening(
     free = free_columns(recording.sign_unknown, longest, plain, widths.tolist())
     plain = replace(plain, masked=replace(gaps, free=free))
     white_left = np.where(resting, np.nan, np.abs(plain.all(residual)))
-    level = np.array([np.nanmedian(column) if np.isfinite(column).any() else 1.0 for column in white_left.T]) / 0.6745
+    level = np.array([robust_deviation(x) if np.isfinite(x).any() else 1.0 / NORMAL_MEDIAN for x in white_left.T])
     weights = np.minimum(1.0, MAX_ROW_SIGMAS * np.maximum(level, 0.1) / np.maximum(white_left, 1e-12))
     weights[_pushed(weights < 1.0, recording, stride, cutoffs)] = 1.0
     return replace(plain, weights=np.where(resting, 0.0, weights))
@@ -232,4 +233,4 @@ def _density(pieces: Sequence[Array], step: float, known: Sequence[NDArray[np.bo
         # Interpolated rows are free of noise. They are most rows of a joint that mostly rests.
         inner = np.concatenate([rows[:-2] & rows[1:-1] & rows[2:] for rows in known])
         squares[~inner & (inner.sum(axis=0) >= FEWEST_ROWS)] = np.nan
-    return np.asarray(np.nanmedian(squares, axis=0) / 0.455 / 6 * 2 * step)
+    return np.asarray(np.nanmedian(squares, axis=0) / NORMAL_MEDIAN**2 / 6 * 2 * step)

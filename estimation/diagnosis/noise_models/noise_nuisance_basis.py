@@ -12,6 +12,7 @@ from estimation.diagnosis.base_models.baseline import Baseline
 from estimation.diagnosis.noise_models.frequency_bands import Band
 from estimation.diagnosis.recordings.recording import Recording
 from estimation.linear_algebra.orthonormal import orthonormal
+from estimation.linear_algebra.scaled import inverse_root
 
 Array = NDArray[np.float64]
 
@@ -107,10 +108,7 @@ def build_nuisance_projection(recording: Recording, baseline: Baseline, residual
         columns = _functions(recording, sign, recording.tau - residual, j)
         gram += weighted.T @ weighted
         shown.append((columns, weighted.T @ (columns * weights[:, j, None])))
-    scale = np.sqrt(np.maximum(np.diag(gram), 1e-300))
-    values, vectors = np.linalg.eigh(gram / scale[:, None] / scale)
-    kept = values > FAINT**2 * values[-1]
-    root = vectors[:, kept] / np.sqrt(values[kept]) / scale[:, None]
+    root = inverse_root(gram, FAINT**2)
     for j, (columns, cross) in enumerate(shown):
         made = root @ (root.T @ cross)
         edge = baseline.regressor.shape[2]

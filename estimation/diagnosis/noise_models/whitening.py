@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from estimation.diagnosis.noise_models.frequency_bands import Band
 from estimation.diagnosis.noise_models.masked_rows import MaskedRows
 from estimation.linear_algebra.free_torque import FreeTorque, Real, span_of
+from estimation.uncertainty.autoregressive import taps
 from robots.common.stretches import spans
 
 Array = NDArray[np.float64]
@@ -59,7 +60,7 @@ class Whitening:
 
     def taps(self, joint: int) -> Array:
         """Returns a joint's filter (p_j + 1,), for the noise of a log of level one."""
-        return np.concatenate([[1.0], -self.coefficients[joint]]) / self.scale[joint]
+        return taps(self.coefficients[joint]) / self.scale[joint]
 
     @property
     def at_rest(self) -> Array:

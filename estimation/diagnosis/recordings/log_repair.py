@@ -7,13 +7,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.interpolate import CubicSpline
 
 from estimation.gate import GateReport, check_log
 from estimation.gate.finding import Finding
-from estimation.gate.measurements.columns import Columns
-from estimation.gate.measurements.outliers import are_isolated, find_outliers
-from estimation.gate.measurements.timing import FEWEST
+from estimation.gate.measurements.outliers import interpolated
 from estimation.regressions.torque_meanings import as_joint_torque
 from robots.robot import Robot
 from robots.signals import Log
@@ -88,7 +85,7 @@ def repair_log(robot: Robot, log: Log, which: str) -> RepairedLog:
         if _is_reported(finding)
     ]
     log = gate.corrected(log)
-    return RepairedLog(_stretches(_filled(log) if len(gate.spikes) else log, gate), tuple(notes))
+    return RepairedLog(_stretches(interpolated(log) if len(gate.spikes) else log, gate), tuple(notes))
 
 
 _SIZES = (
@@ -106,23 +103,6 @@ def _is_reported(finding: Finding) -> bool:
     if finding.severity == "refuse":
         return finding.name not in ("no_motion", "short")
     return finding.severity == "warning" and finding.name not in OWN
-
-
-def _filled(log: Log) -> Log:
-    """Replaces outliers in each column by interpolation; the times of the rows stay."""
-    values: dict[str, Array] = {}
-    for (prefix, joint), rows in find_outliers(Columns.of(log)).items():
-        name = {"q": "q", "tau": "tau", "i": "current"}[prefix]
-        known = np.setdiff1d(np.arange(len(log)), rows)
-        if not are_isolated(rows, len(log)) or len(known) < FEWEST:
-            continue
-        column = values.setdefault(name, np.array(getattr(log, name)))[:, joint]
-        if prefix == "q":
-            # A straight line would cut the corner of a motion by more than an encoder step.
-            column[rows] = CubicSpline(log.t[known], column[known])(log.t[rows])
-        else:
-            column[rows] = np.interp(log.t[rows], log.t[known], column[known])
-    return replace(log, **values) if values else log  # type: ignore[arg-type]
 
 
 def _stretches(log: Log, gate: GateReport) -> tuple[Log, ...]:

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 
+from estimation.uncertainty.correlations import squared_differences
 from robots.common.stretches import spans
 
 Array = NDArray[np.float64]
@@ -70,7 +71,8 @@ def find_cycle(q: Array, step: float) -> Cycle | None:
 
 def _candidate_lags(x: Array, step: float) -> list[int]:
     """Returns the lags at which the motion returns after it moved away, the shortest first."""
-    difference = _difference(x)
+    # For lags up to just over half the length.
+    difference = 0.5 * squared_differences(x, x, np.arange(len(x) // 2 + 2)).mean(axis=1)
     shortest, longest = max(2, round(SHORTEST / step)), len(x) // 2 + 1
     away = np.maximum.accumulate(difference)
     lags = np.arange(1, len(difference) - 1)
@@ -78,18 +80,6 @@ def _candidate_lags(x: Array, step: float) -> list[int]:
     found = lags[dips & (difference[1:-1] < AWAY) & (away[1:-1] > AWAY)]
     found = found[(found >= shortest) & (found <= longest)]
     return [int(lag) for lag in found[:20]]
-
-
-def _difference(x: Array) -> Array:
-    """Computes the mean over rows and joints of (x(t + L) - x(t))^2 / 2 for lags L up to just over half the length."""
-    rows = len(x)
-    spectrum = np.fft.rfft(x, 2 * rows, axis=0)
-    product = np.fft.irfft(np.abs(spectrum) ** 2, axis=0)[: rows // 2 + 2].sum(axis=1)
-    energy = np.concatenate([[0.0], np.cumsum((x**2).sum(axis=1))])
-    lags = np.arange(len(product))
-    both = energy[rows - lags] + energy[rows] - energy[lags]
-    result: Array = (both - 2 * product) / (2 * x.shape[1] * (rows - lags))
-    return result
 
 
 def _examine(x: Array, lag: int, reach: int, step: float) -> Cycle | None:

@@ -14,6 +14,7 @@ from estimation.diagnosis.hypothesis_tests.fitted_effects import FittedEffect
 from estimation.diagnosis.hypothesis_tests.problem import Problem
 from estimation.diagnosis.joint_fits.extended_fit import ExtendedFit
 from estimation.diagnosis.searches.selection import SelectedEffect
+from estimation.uncertainty.quantiles import NORMAL_95
 from robots.robot import Robot
 from robots.terms.base import force_unit, length_unit
 from robots.terms.discrepancies.patterns import PREFIX
@@ -135,9 +136,9 @@ def _parameters(
         if isinstance(own, Coefficient) and abs(value) <= largest and not np.isfinite(error):
             # A column that is zero in these logs, such as a knot of a short drift.
             continue
-        interval = (value - 1.96 * error, value + 1.96 * error)
+        interval = (value - NORMAL_95 * error, value + NORMAL_95 * error)
         if isinstance(own, Shape) and own.scale == "log" and np.isfinite(error) and value > 0:
-            factor = float(np.exp(1.96 * error / value))
+            factor = float(np.exp(NORMAL_95 * error / value))
             interval = (value / factor, value * factor)
         rough = isinstance(own, Shape) and (_roughly(own, value, interval) or _stopped(own, value))
         # Values outside these bounds are physically impossible.

@@ -14,13 +14,15 @@ from estimation.diagnosis.calibration import MAX_ERROR_RATIO, MIN_FIT_GAIN, MIN_
 from estimation.diagnosis.hypothesis_tests.problem import Problem
 from estimation.diagnosis.recordings.log_reading import Recording
 from estimation.regressions.parameter_priors import GaussianPrior
+from estimation.uncertainty.blocks import moving_block_sums
+from estimation.uncertainty.correlations import correlation_rows
+from estimation.uncertainty.quantiles import CHI2_95, TAIL
 from robots.common.plain import several
 
 Array = NDArray[np.float64]
 
 PARTS = 5  # stretches into which a log is split
 RESAMPLES = 500  # bootstrap samples of an interval
-SURELY = 1.96  # standard errors of a contradiction
 BLOCK = 1.0  # shortest block [s]; longer ones have five times the correlation time of the errors
 
 
@@ -109,42 +111,30 @@ class HeldOutErrors:
         """
         rows = len(self.t)
         block = int(min(max(round(self._block() / self.step), 1), max(rows // 4, 1)))
-        level = np.maximum(self._rms(self.measured), 1e-300)
-        sums = []
-        for model in (before, after):
-            squares = np.vstack([np.zeros((1, len(level))), np.cumsum(self.errors[model] ** 2 * self.counts, axis=0)])
-            sums.append((squares[block:] - squares[:-block])[:, list(joints)])
-        counted = np.vstack([np.zeros((1, len(level))), np.cumsum(self.counts, axis=0)])
-        counted = (counted[block:] - counted[:-block])[:, list(joints)]
-        starts = rng.integers(0, rows - block + 1, (RESAMPLES, max(1, rows // block)))
-        count = np.maximum(counted[starts].sum(axis=1), 1)
-        old, new = (np.sqrt(part[starts].sum(axis=1) / count) for part in sums)
-        falls = ((old - new) / level[list(joints)]).mean(axis=1)
-        low, high = np.quantile(falls, [0.025, 0.975])
+        own = list(joints)
+        level, counts = np.maximum(self._rms(self.measured), 1e-300)[own], self.counts[:, own]
+        squares = [self.errors[model][:, own] ** 2 * counts for model in (before, after)]
+        sums = moving_block_sums(np.hstack([*squares, counts]), block, RESAMPLES, rng)
+        old, new, counted = np.split(sums, 3, axis=1)
+        falls = ((np.sqrt(old / np.maximum(counted, 1)) - np.sqrt(new / np.maximum(counted, 1))) / level).mean(axis=1)
+        low, high = np.quantile(falls, [TAIL, 1 - TAIL])
         return float(low), float(high)
 
     def surely_worse(self, model: int) -> bool:
         """Whether the held-out rows significantly contradict the effect that a model lacks.
 
         If the effect is true, its chi2 grows by g'g + 2 g'e on the held-out rows: g is its torque there beside the
-        base model, e the noise. This falls below -1.96^2 noise variances with a probability of 2.5 % at most, for any
-        g.
+        base model, e the noise. This falls below -`CHI2_95` noise variances with a probability of 2.5 % at most,
+        for any g.
 
         Args:
             model: index of the model without the effect.
         """
-        return self.growth[model] < -(SURELY**2)
+        return self.growth[model] < -CHI2_95
 
     def _block(self) -> float:
         """Computes the length of a bootstrap block [s] from the correlation time of the errors."""
-        times = []
-        for column in self.errors[-1].T:
-            series = column - column.mean()
-            power = np.abs(np.fft.rfft(series, 2 * len(series))) ** 2
-            correlation = np.fft.irfft(power)[: len(series)]
-            below = np.flatnonzero(correlation < correlation[0] / np.e) if correlation[0] > 0 else np.zeros(1)
-            times.append(float(below[0]) * self.step if len(below) else 0.0)
-        return max(BLOCK, 5 * max(times))
+        return max(BLOCK, 5 * self.step * max(correlation_rows(column) for column in self.errors[-1].T))
 
 
 def cross_validation_errors(problem: Problem, effects: Sequence[Array], pull: GaussianPrior) -> HeldOutErrors:

@@ -11,10 +11,12 @@ from scipy.interpolate import CubicSpline
 from scipy.stats import t as student
 
 from estimation.diagnosis.calibration import MIN_COMPLIANCE_ENERGY
-from estimation.diagnosis.findings import Finding, Parameter
+from estimation.diagnosis.findings import Finding, Gain, Parameter
 from estimation.diagnosis.recordings.log_reading import Recording
-from estimation.diagnosis.validations.jackknife import blocks_of, gain_by_blocks, independent_rows, jackknife
 from estimation.models.extension import Extension
+from estimation.uncertainty.blocks import block_numbers, jackknife_errors
+from estimation.uncertainty.correlations import effective_rows
+from estimation.uncertainty.quantiles import student_95
 from robots.signals import Log
 from robots.terms.base import force_unit, length_unit
 from robots.terms.effect_bases.unknown_rotor import KNOWN
@@ -27,6 +29,7 @@ Array = NDArray[np.float64]
 EFFECT = "joint_elasticity"
 ALIGNED = 2  # iterations of the encoder delay
 STIFFEST = 1e-12  # compliance below which a gear is rigid [rad/(N m) or m/N]
+FEWEST, MOST, BLOCK = 10, 30, 4.0  # least and largest number of blocks, length of a block in between [s]
 
 
 @dataclass(frozen=True, eq=False)
@@ -166,12 +169,12 @@ def _test_joint(
     hidden = own.load - alone @ _solve(alone, own.load)
     if not hidden @ hidden > MIN_COMPLIANCE_ENERGY * np.sum((own.load - own.load.mean()) ** 2):
         return None
-    blocks = blocks_of(own.t)
+    blocks = _blocks(own.t)
     values = _solve(whole, w)
     folds = [_solve(whole[~b], w[~b]) for b in blocks]
-    error = jackknife(np.stack(folds))
+    error = jackknife_errors(np.stack(folds))
     freedom = len(blocks) - 1
-    quantile = float(student.ppf(0.975, freedom))
+    quantile = student_95(freedom)
     p_value = min(tests * float(student.sf(values[-1] / max(error[-1], 1e-300), freedom)), 1.0)
     if not (values[-1] > STIFFEST and p_value <= false_alarm):
         return None
@@ -184,12 +187,12 @@ def _test_joint(
     else:
         one, two = _solve(alone, w), values
         level, both = other.deflection, np.column_stack([other.rest, other.load])
-        errors = [(level[b] - other.rest[b] @ one, level[b] - both[b] @ two) for b in blocks_of(other.t)]
-    gain = gain_by_blocks(errors, level)
+        errors = [(level[b] - other.rest[b] @ one, level[b] - both[b] @ two) for b in _blocks(other.t)]
+    gain = _gain(errors, level)
     if gain.ci95[1] < 0:
         return None
     residual = w - whole @ values
-    count = independent_rows(residual)
+    count = effective_rows(residual)
     squares = [float(np.sum((w - X @ _solve(X, w)) ** 2)) for X in (alone, np.column_stack([alone, own.rival]))]
     better, worse = (count * float(np.log(s / (residual @ residual))) for s in squares)
     robot = now.robot
@@ -222,6 +225,27 @@ def _test_joint(
         before=-(residual + own.load * values[-1]),
         after=-residual,
     )
+
+
+def _blocks(t: Array) -> list[NDArray[np.bool_]]:
+    """Cuts rows at times (M,) [s] into consecutive blocks of about equal size; returns a mask (M,) of each."""
+    count = int(np.clip((len(t) * float(np.median(np.diff(t)))) / BLOCK, FEWEST, MOST))
+    number = block_numbers(len(t), count)
+    return [number == k for k in range(count)]
+
+
+def _gain(errors: Sequence[tuple[Array, Array]], level: Array) -> Gain:
+    """Computes the fall of the error over the gear deflection's standard deviation, with its 95 % interval.
+
+    `errors` are, per block, those without and with the effect, each (M_b,); `level` is the deflection (M,).
+    """
+    squares = np.array([[float(one @ one), float(two @ two), float(len(one))] for one, two in errors])
+    sums = np.vstack([squares.sum(axis=0), squares.sum(axis=0) - squares])
+    shares = np.sqrt(sums[:, :2] / sums[:, 2:]) / max(float(level.std()), 1e-300)
+    before, after = shares[0].tolist()
+    falls = -np.diff(shares[1:], axis=1)[:, 0]
+    reach = student_95(len(falls) - 1) * float(jackknife_errors(falls))
+    return Gain(nrmse_before=before, nrmse_after=after, ci95=(before - after - reach, before - after + reach))
 
 
 def _solve(X: Array, w: Array) -> Array:

@@ -11,10 +11,10 @@ from numpy.typing import NDArray
 from estimation.diagnosis.base_models.baseline import SCALES
 from estimation.diagnosis.hypothesis_tests.problem import Problem
 from estimation.diagnosis.validations.gain_intervals import PARTS, HeldOutErrors
-from estimation.identifications.transfer import band_of
 from estimation.models.model import Model
 from estimation.predictions.prediction import Prediction, predict
 from estimation.regressions.preparation import torque_of
+from estimation.uncertainty.quantiles import band_of
 from robots.common.plain import all_finite, number
 from robots.signals import Log
 from robots.terms import FrictionTerm

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from estimation.uncertainty.quantiles import robust_deviation
 from robots.signals import Log, Motion
 from robots.terms.friction import SLOWEST
 
@@ -15,7 +16,6 @@ NOISY = 3.0
 # Speed [rad/s or m/s] from which a joint slides: below it friction may be static.
 SLIDING = 10 * SLOWEST
 # Standard deviation of a normal distribution over the median size.
-NORMAL = 1.4826
 # Least share of white noise that a smoothing is taken to remove: without any, nothing shows how large it is.
 LEAST_REMOVED = 0.05
 
@@ -34,7 +34,7 @@ def smoothed_noise(log: Log, motion: Motion, cutoff: float) -> Array:
     nyquist = 0.5 / float(np.median(np.diff(motion.t)))
     passed = min(cutoff, nyquist)
     raw = np.column_stack([np.interp(motion.t, log.t, column) for column in log.q.T])
-    removed = NORMAL * np.median(np.abs(raw - motion.q), axis=0)
+    removed = robust_deviation(raw - motion.q)
     white = removed / np.sqrt(max(1.0 - passed / nyquist, LEAST_REMOVED))
     return np.asarray(white * 2.0 * np.pi * np.sqrt(passed**3 / (3.0 * nyquist)))
 
@@ -42,7 +42,7 @@ def smoothed_noise(log: Log, motion: Motion, cutoff: float) -> Array:
 def logged_noise(dq: Array) -> Array:
     """Gives the standard deviation (n,) of the white noise of logged velocities (N, n), by their third differences."""
     # The squares of the coefficients 1, 3, 3, 1 add to 20.
-    return np.asarray(NORMAL * np.median(np.abs(np.diff(dq, n=3, axis=0)), axis=0) / np.sqrt(20.0))
+    return robust_deviation(np.diff(dq, n=3, axis=0)) / np.sqrt(20.0)
 
 
 def sliding_speed(noise: Array) -> Array:

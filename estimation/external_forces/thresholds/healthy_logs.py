@@ -19,6 +19,7 @@ from estimation.external_forces.thresholds.error_models import fit_error_model
 from estimation.external_forces.thresholds.observations import lag_of, observe, observe_robustly
 from estimation.external_forces.thresholds.rate_checks import RateCheck
 from estimation.models.model import Model
+from estimation.uncertainty.quantiles import robust_deviation
 from robots.common.errors import InputError
 from robots.common.stretches import joined_spans
 
@@ -29,7 +30,7 @@ Flags = NDArray[np.bool_]
 MOST_ROWS = 4000
 ROUNDS = 8
 # Where the first round cuts residuals off, and a normal distribution's standard deviation over its median size.
-WINSOR, NORMAL = 3.0, 1.4826
+WINSOR = 3.0
 
 
 def calibrate_signals(
@@ -166,7 +167,7 @@ def _rows(signals: Signals, rows: slice) -> Signals:
 
 def _winsorised(residual: Array, counts: Flags) -> Array:
     """Cuts residuals (N, n) off at three robust standard deviations."""
-    level = WINSOR * NORMAL * np.median(np.abs(residual[counts]), axis=0)
+    level = WINSOR * robust_deviation(residual[counts])
     return np.clip(residual, -level, level)
 
 

@@ -6,11 +6,8 @@ from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 from typing import Any
 
-from scipy.stats import chi2
-
+from estimation.uncertainty.quantiles import count_interval
 from robots.common.plain import finite
-
-CONFIDENCE = 0.95
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -29,12 +26,11 @@ class RateCheck:
 
     @property
     def interval(self) -> tuple[float, float]:
-        """95 % interval of the rate an hour by the exact Poisson distribution (Garwood 1936)."""
+        """95 % interval of the rate an hour by the exact Poisson distribution."""
         if not self.hours > 0.0:
             return 0.0, float("inf")
-        tail = (1.0 - CONFIDENCE) / 2.0
-        low = chi2.ppf(tail, 2 * self.alarms) / 2.0 if self.alarms else 0.0
-        return float(low / self.hours), float(chi2.ppf(1.0 - tail, 2 * self.alarms + 2) / 2.0 / self.hours)
+        low, high = count_interval(self.alarms)
+        return low / self.hours, high / self.hours
 
     @property
     def confirmed(self) -> bool:

@@ -13,8 +13,8 @@ from estimation.gate.quick_fits.cutoff_choice import CHOICE_ROWS
 from estimation.gate.quick_fits.gravity_rows import HEAVY, LINK, gravity_rows
 from estimation.gate.quick_fits.joint_columns import OWN
 from estimation.gate.quick_fits.joint_fit import OWN_RIDGE
-from estimation.gate.quick_fits.whole_fit import solve_scaled
 from estimation.gate.stages.fitted import Fitted
+from estimation.linear_algebra.scaled import solve_ridge
 from estimation.regressions.parameter_priors import link_spreads
 
 Array = NDArray[np.float64]
@@ -132,7 +132,7 @@ def _evidence_of(fitted: Fitted, joint: int, kept: NDArray[np.intp], heavy: Arra
     near = np.arange(-3 * COMMON, 3 * COMMON + STEP, STEP)
     friction = fit.Y[kept, -OWN + 1 : -1] @ fit.values[-OWN + 1 : -1]
     others = np.delete(fit.Y[kept], np.s_[-OWN + 1 : -1], axis=1)
-    friction = friction - others @ solve_scaled(others.T @ others, others.T @ friction, OWN_RIDGE)
+    friction = friction - others @ solve_ridge(others.T @ others, others.T @ friction, OWN_RIDGE)
     return JointEvidence(
         joint=joint,
         factors=factors,

@@ -14,8 +14,9 @@ from estimation.gate.context import Context, Stage
 from estimation.gate.finding import Finding
 from estimation.gate.quick_fits.cutoff_choice import CHOICE_ROWS
 from estimation.gate.quick_fits.joint_fit import Rows
-from estimation.gate.quick_fits.whole_fit import RIDGES, Moments, fit_all
+from estimation.gate.quick_fits.whole_fit import RIDGES, fit_all
 from estimation.gate.stages.fitted import Fitted
+from estimation.regressions.blocks import Blocks
 from robots.robot import Robot
 
 Array = NDArray[np.float64]
@@ -69,13 +70,13 @@ class _InvertedFits:
         self._robot, self._rows, self._spread = fitted.robot, fitted.rows, fitted.logged_spread
         self._joints = np.flatnonzero(self._spread > 0)
 
-    def moments(self, sign: Array, most: int) -> Moments:
+    def moments(self, sign: Array, most: int) -> Blocks:
         """Gives the normal equations on some rows, positions times a sign (n,)."""
         thin = (part.thinned(max(1, len(self._rows.q) // most)) for part in self._rows.excerpts)
         inverted = (replace(part, q=part.q * sign, dq=part.dq * sign, ddq=part.ddq * sign) for part in thin)
         return Rows.of(self._robot, tuple(inverted)).moments(self._joints, raw=True)
 
-    def cost(self, moments: Moments, ridges: Sequence[float] = RIDGES) -> float:
+    def cost(self, moments: Blocks, ridges: Sequence[float] = RIDGES) -> float:
         """Gives the mean log of the held-out error."""
         unexplained = fit_all(moments, self._spread, ridges).unexplained[self._joints]
         return float(np.mean(np.log(np.clip(unexplained, 1e-9, 1.0))))

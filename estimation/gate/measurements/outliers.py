@@ -2,10 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
+from dataclasses import replace
+
 import numpy as np
 from numpy.typing import NDArray
+from scipy.interpolate import CubicSpline
 
 from estimation.gate.measurements.columns import Columns
+from estimation.gate.measurements.timing import FEWEST
+from robots.signals import Log
 
 Array = NDArray[np.float64]
 Rows = NDArray[np.intp]
@@ -90,6 +96,28 @@ def isolated_rows(columns: Columns, outliers: dict[tuple[str, int], Rows]) -> Ro
     samples = columns.q.shape[1]
     rows = [found for found in outliers.values() if are_isolated(found, samples)]
     return np.unique(np.concatenate(rows)) if rows else np.empty(0, dtype=np.intp)
+
+
+def interpolated(log: Log, kinds: Collection[str] = ("q", "tau", "current")) -> Log:
+    """Replaces isolated outliers in each column by interpolation; the times of the rows stay.
+
+    Args:
+        log: with unwrapped angles.
+        kinds: which columns.
+    """
+    values: dict[str, Array] = {}
+    for (prefix, joint), rows in find_outliers(Columns.of(log)).items():
+        kind = "current" if prefix == "i" else prefix
+        known = np.setdiff1d(np.arange(len(log)), rows)
+        if kind not in kinds or not are_isolated(rows, len(log)) or len(known) < FEWEST:
+            continue
+        column = values.setdefault(kind, np.array(getattr(log, kind)))[:, joint]
+        if prefix == "q":
+            # A straight line would cut the corner of a motion by more than an encoder step.
+            column[rows] = CubicSpline(log.t[known], column[known])(log.t[rows])
+        else:
+            column[rows] = np.interp(log.t[rows], log.t[known], column[known])
+    return replace(log, **values) if values else log  # type: ignore[arg-type]
 
 
 def _returns(steps: Array, rows: Rows) -> Array:

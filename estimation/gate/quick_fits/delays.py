@@ -9,7 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from estimation.gate.quick_fits.joint_fit import OWN_RIDGE, JointFit, Rows
-from estimation.gate.quick_fits.whole_fit import solve_scaled
+from estimation.linear_algebra.scaled import solve_ridge
+from estimation.uncertainty.blocks import clustered_errors
 
 Array = NDArray[np.float64]
 
@@ -96,7 +97,7 @@ class _Search:
             Y, tau = rows.joints[joint].Y[kept[counted]], rows.near_torques(shifts, joint, stride)[:, counted]
             tau -= tau.mean(axis=1, keepdims=True)
             cross, square = Y.T @ tau.T, np.einsum("st,st->s", tau, tau)
-            left = square - np.einsum("ks,ks->s", cross, solve_scaled(Y.T @ Y, cross, OWN_RIDGE))
+            left = square - np.einsum("ks,ks->s", cross, solve_ridge(Y.T @ Y, cross, OWN_RIDGE))
             self._starts[joint] = int(np.argmin(left / np.maximum(square, 1e-300)))
 
     def error(self, joint: int, k: int) -> float:
@@ -163,7 +164,7 @@ def _refined(rows: Rows, fit: JointFit, joint: int, search: _Search) -> Delay:
     residual = tau - fit.Y @ (fit.inverse @ (fit.Y.T @ tau))
     scores = rows.block_sums(slope * residual, fit.counted)
     curvature = float(slope @ slope)
-    error = float(np.sqrt(scores @ scores)) / curvature if curvature > 0 else np.inf
+    error = float(clustered_errors(scores)) / curvature if curvature > 0 else np.inf
     return Delay(value, error, float(1 - np.sqrt(_remaining(fit, tau) / zero)) if zero > 0 else 0.0, sticks)
 
 

@@ -13,8 +13,10 @@ from numpy.typing import NDArray
 from estimation.gate.quick_fits.excerpts import Excerpt
 from estimation.gate.quick_fits.joint_columns import OWN, JointColumns, joined, under_gravity
 from estimation.gate.quick_fits.rigid_body import joint_rows, rigid_body, used_columns
-from estimation.gate.quick_fits.whole_fit import Moments, solve_scaled
+from estimation.linear_algebra.scaled import solve_ridge
 from estimation.preprocessing import rows_at_rest
+from estimation.regressions.blocks import Blocks
+from estimation.uncertainty.blocks import block_numbers, clustered_errors
 from robots.robot import Robot
 
 Array = NDArray[np.float64]
@@ -58,9 +60,7 @@ class JointFit:
         """
         direction = weights / self.scale
         value = float(direction @ self.values)
-        blocks = len(self.scores)
-        influence = self.scores @ (self.inverse @ direction)
-        return value, float(np.sqrt(influence @ influence * blocks / max(blocks - 1, 1)))
+        return value, float(clustered_errors(self.scores @ (self.inverse @ direction)))
 
 
 @dataclass(frozen=True, eq=False)
@@ -109,7 +109,7 @@ class Rows:
             excerpts = [part.thinned(stride) for part in excerpts]
         q, dq, ddq = (np.concatenate([getattr(part, name) for part in excerpts]) for name in ("q", "dq", "ddq"))
         rows = len(q)
-        block = np.minimum((np.arange(rows) * BLOCKS) // rows, BLOCKS - 1)
+        block = block_numbers(rows, BLOCKS)
         speed = np.sqrt(np.mean(dq**2, axis=0))
         own = np.zeros_like(ddq) if static else ddq
         bodies, used = joint_rows(robot, q, np.zeros_like(dq) if static else dq, own), used_columns(robot)
@@ -167,10 +167,10 @@ class Rows:
         counted = ~self.rest[:, joint] if moving else np.ones(len(self.q), dtype=bool)
         Y, tau = own.Y[counted], self.torque(joint)[counted]
         gram = Y.T @ Y
-        values = solve_scaled(gram, Y.T @ tau, OWN_RIDGE)
+        values = solve_ridge(gram, Y.T @ tau, OWN_RIDGE)
         residual = tau - Y @ values
         scores = self.block_sums(Y * residual[:, None], counted)
-        inverse = solve_scaled(gram, np.eye(len(gram)), OWN_RIDGE)
+        inverse = solve_ridge(gram, np.eye(len(gram)), OWN_RIDGE)
         return JointFit(Y, own.scale, own.used, values, inverse, residual, scores, counted)
 
     def block_sums(self, values: Array, counted: NDArray[np.bool_]) -> Array:
@@ -187,7 +187,7 @@ class Rows:
         joints = tuple(replace(own, Y=np.where(self.rest[:, j, None], 0.0, own.Y)) for j, own in enumerate(self.joints))
         return replace(self, joints=joints)
 
-    def moments(self, joints: NDArray[np.intp], *, raw: bool = False, moving: bool = False) -> Moments:
+    def moments(self, joints: NDArray[np.intp], *, raw: bool = False, moving: bool = False) -> Blocks:
         """Sums the normal equations of some joints, fold by fold.
 
         Args:
@@ -199,7 +199,7 @@ class Rows:
             return self.in_motion()._sums(joints, raw, ~self.rest)
         return self._sums(joints, raw, np.ones(self.q.shape, dtype=bool))
 
-    def _sums(self, joints: NDArray[np.intp], raw: bool, counted: NDArray[np.bool_]) -> Moments:
+    def _sums(self, joints: NDArray[np.intp], raw: bool, counted: NDArray[np.bool_]) -> Blocks:
         chosen = tuple(map(int, joints))
         gram, scale, places = self._gram(chosen)
         n, folds, p = gram.shape[:3]
@@ -213,7 +213,7 @@ class Rows:
                 cross[joint, k, place] = factor * (own.Y[rows].T @ tau[rows])[acts]
                 square[joint, k] = float(tau[rows] @ tau[rows])
         count = np.array([counted[rows].sum(axis=0) for rows in self._folds], dtype=float).T
-        return Moments(gram, cross, square, count)
+        return Blocks(gram, cross, square, count)
 
     def _gram(self, joints: tuple[int, ...]) -> tuple[Array, Array, dict[int, tuple[Places, Places]]]:
         """Sums the Gram matrices of the columns that are not zero, scaled to unit mean square over these joints.

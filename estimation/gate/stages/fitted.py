@@ -11,9 +11,10 @@ from estimation.gate.quick_fits.cutoff_choice import CHOICE_ROWS
 from estimation.gate.quick_fits.delays import Delay, estimate_delays
 from estimation.gate.quick_fits.joint_fit import JointFit, Rows
 from estimation.gate.quick_fits.joint_physics import JointPhysics, joint_physics, mean_inertias
-from estimation.gate.quick_fits.whole_fit import HOPELESS, Moments, WholeFit, fit_all
+from estimation.gate.quick_fits.whole_fit import HOPELESS, WholeFit, fit_all
 from estimation.gate.stages.cleaned import Cleaned
 from estimation.gate.stages.smoothed import Smoothed
+from estimation.regressions.blocks import Blocks
 
 Array = NDArray[np.float64]
 
@@ -51,7 +52,7 @@ class Fitted:
         return np.array([self.rows.torque(j).std() if self.logged_spread[j] > 0 else 0.0 for j in range(self.robot.n)])
 
     @cached_property
-    def moments(self) -> Moments:
+    def moments(self) -> Blocks:
         """Normal equations of the smoothed torques."""
         return self.rows.moments(self._joints)
 

@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from estimation.identifications.fit import MOST_ROWS, STRETCHES
-from estimation.identifications.transfer import BAND
 from estimation.regressions.preparation import Rows
+from estimation.uncertainty.quantiles import BAND
 from robots.signals import Motion
 
 Array = NDArray[np.float64]

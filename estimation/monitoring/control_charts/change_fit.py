@@ -9,11 +9,9 @@ from numpy.typing import NDArray
 from scipy.linalg import solve_triangular
 
 from estimation.monitoring.control_charts.level_filter import CORRELATION_TIME
+from estimation.uncertainty.quantiles import CHI2_95
 
 Array = NDArray[np.float64]
-
-# Twice the log likelihood that a 95 % interval of one parameter loses (chi-square of one degree of freedom).
-CHI_95 = 3.841
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -40,7 +38,7 @@ class StepFit:
 
     def interval(self) -> tuple[int, int]:
         """The first and last window of a 95 % interval for the beginning (profile likelihood)."""
-        likely = np.flatnonzero(self.gains >= self.gains.max() - CHI_95)
+        likely = np.flatnonzero(self.gains >= self.gains.max() - CHI2_95)
         return int(likely[0]), int(likely[-1])
 
 

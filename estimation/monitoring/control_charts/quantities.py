@@ -7,12 +7,12 @@ from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import chi2
 
 from estimation.monitoring.control_charts.change_fit import StepFit, fit_steps
 from estimation.monitoring.control_charts.charts import Chart
 from estimation.monitoring.control_charts.level_filter import LevelFilter
 from estimation.monitoring.settings import PAUSE
+from estimation.uncertainty.quantiles import chi2_limit
 
 Array = NDArray[np.float64]
 
@@ -30,7 +30,7 @@ START = 0.05
 
 def start_limit(count: int) -> float:
     """Chi-square of one degree of freedom that none of some healthy quantities exceeds at the start."""
-    return float(chi2.isf(START / count, 1))
+    return chi2_limit(START, tests=count)
 
 
 @dataclass(frozen=True, eq=False)
@@ -106,7 +106,7 @@ class Quantity:
         begins = self.after_pauses()
         if not len(begins):
             return False
-        return bool(self.steps(begins).exceeding(self.margin).max() > chi2.isf(1.0 / self.chart.run_length, 1))
+        return bool(self.steps(begins).exceeding(self.margin).max() > chi2_limit(1.0 / self.chart.run_length))
 
     def after_pauses(self) -> NDArray[np.intp]:
         """Indices of the samples that follow a pause."""

@@ -44,12 +44,6 @@ def cusum_threshold(allowance: float, run_length: float, correlation: float = 0.
     )
 
 
-def ewma_deviation(weight: float, correlation: float = 0.0) -> float:
-    """Standard deviation of an EWMA, y = (1 - w) y + w x, of a standard normal AR(1) sequence in steady state."""
-    keep = 1 - weight
-    return float(np.sqrt(weight / (2 - weight) * (1 + keep * correlation) / (1 - keep * correlation)))
-
-
 def ewma_run_length(threshold: float, weight: float, correlation: float = 0.0) -> float:
     """Mean steps between crossings of a two-sided threshold by an EWMA of a standard normal AR(1) sequence.
 

@@ -6,15 +6,14 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.signal import lfilter
 
+from estimation.linear_algebra.scaled import inverse
 from estimation.monitoring.windows.baseline import Directions
-from estimation.uncertainty.autoregressive import autocovariance, levinson
+from estimation.uncertainty.autoregressive import autocovariance, levinson, whitened
+from estimation.uncertainty.quantiles import NORMAL_MEDIAN
 
 Array = NDArray[np.float64]
 
-# Median of the square of a standard normal variable.
-NORMAL_MEDIAN = 0.4549
 HIGHEST_ORDER = 12
 # Rows below this share of the usual speed say more of presliding than of friction.
 SLOWEST = 0.03
@@ -193,16 +192,14 @@ def _solve(
     for j in range(n):
         a = colour.coefficients[j]
         columns = np.column_stack([directions.friction[:, j], np.ones(len(y)), directions.payload[:, j, :], y[:, j]])
-        white = lfilter(np.concatenate([[1.0], -a]), [1.0], columns, axis=0) if len(a) else columns
+        white = whitened(columns, a)
         chosen = _usable(live[:, j], len(a))
         white = white[chosen]
         X, target = white[:, :-1], white[:, -1]
         index = np.concatenate([[j, n + j], np.arange(2 * n, size)]).astype(int)
         H[np.ix_(index, index)] += X.T @ X / colour.variances[j]
         g[index] += X.T @ target / colour.variances[j]
-    root = 1 / np.sqrt(np.diag(H))
-    inverse = np.linalg.inv(H * root[:, None] * root) * root[:, None] * root
-    covariance = (inverse + inverse.T) / 2
+    covariance = inverse(H)
     return covariance @ g, covariance, prior
 
 
@@ -216,13 +213,9 @@ def _usable(live: NDArray[np.bool_], order: int) -> NDArray[np.bool_]:
 
 def _colour(residual: Array, live: NDArray[np.bool_]) -> tuple[Array, Array]:
     rows = np.maximum(live.sum(axis=0), 1).astype(float)
-    masked = np.where(live, residual, 0.0)
-    lags = min(HIGHEST_ORDER, len(residual) - 1)
-    found = np.stack([autocovariance(masked[:, j], rows[j], lags) for j in range(residual.shape[1])])
-    padded = np.zeros((len(found), HIGHEST_ORDER + 1))
-    padded[:, : found.shape[1]] = found
-    padded[:, 0] = np.maximum(padded[:, 0], np.finfo(float).tiny)
-    return padded, rows
+    found = autocovariance(np.where(live, residual, 0.0), rows, HIGHEST_ORDER)
+    found[:, 0] = np.maximum(found[:, 0], np.finfo(float).tiny)
+    return found, rows
 
 
 def _burst(t: Array, residual: Array, live: NDArray[np.bool_], colour: Colour) -> tuple[float, float, Array, Array]:
@@ -234,7 +227,7 @@ def _burst(t: Array, residual: Array, live: NDArray[np.bool_], colour: Colour) -
     n = residual.shape[1]
     white = np.zeros_like(residual)
     for j, a in enumerate(colour.coefficients):
-        filtered = lfilter(np.concatenate([[1.0], -a]), [1.0], residual[:, j])
+        filtered = whitened(residual[:, j], a)
         chosen = _usable(live[:, j], len(a))
         # The sum of whitened values over the root of their number is normal for noise, and large for a short force.
         white[chosen, j] = filtered[chosen] / np.sqrt(colour.variances[j])
@@ -246,5 +239,5 @@ def _burst(t: Array, residual: Array, live: NDArray[np.bool_], colour: Colour) -
     chi = (sums**2).sum(axis=1)
     worst = int(np.argmax(chi))
     # Of the median: a short force fills few blocks.
-    scatter = np.sqrt(np.maximum(np.median(sums**2, axis=0) / NORMAL_MEDIAN, 1.0))
+    scatter = np.sqrt(np.maximum(np.median(sums**2, axis=0) / NORMAL_MEDIAN**2, 1.0))
     return float(t[min(worst * length + length // 2, len(t) - 1)]), float(chi[worst]), sums[worst], scatter

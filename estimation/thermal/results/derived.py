@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from estimation.thermal.results.curvature import CurvedFit, curved_factor, curved_slope, curved_steady_state
 from estimation.thermal.transcriptions.information import Information
-from estimation.uncertainty.normal import NORMAL_95
+from estimation.uncertainty.quantiles import NORMAL_95
 from robots.thermal import ThermalModel
 
 Array = NDArray[np.float64]

@@ -7,11 +7,12 @@ from numpy.typing import NDArray
 
 from estimation.thermal.transcriptions.solve import solve
 from estimation.thermal.transcriptions.transcription import Solution, Transcription
+from estimation.uncertainty.quantiles import normal_quantile
 
 Array = NDArray[np.float64]
 
-# Fall of the log likelihood at a one-sided 95 % bound: 1.645^2 / 2.
-FALL = 1.353
+# Fall of the log likelihood at a one-sided 95 % bound.
+FALL = normal_quantile(0.95) ** 2 / 2
 # Bisections of the logarithm: the bound is found to 2 %.
 STEPS = 7
 # Where the rest is at its bounds, IPOPT goes on for ever about a cost that it has long found.

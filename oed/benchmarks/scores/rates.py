@@ -6,9 +6,8 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.stats import beta, binom, norm
 
-LEVEL = 0.95
+from estimation.uncertainty.quantiles import NORMAL_95, median_interval, share_interval
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -26,12 +25,7 @@ class Rate:
     @property
     def interval(self) -> tuple[float, float] | None:
         """The interval; None without a case."""
-        if not self.tries:
-            return None
-        tail = (1 - LEVEL) / 2
-        lower = 0.0 if self.hits == 0 else float(beta.ppf(tail, self.hits, self.tries - self.hits + 1))
-        upper = 1.0 if self.hits == self.tries else float(beta.ppf(1 - tail, self.hits + 1, self.tries - self.hits))
-        return lower, upper
+        return share_interval(self.hits, self.tries) if self.tries else None
 
     def text(self) -> str:
         """Writes counts and interval, such as ``7 of 8 (47 to 100 %)``."""
@@ -64,12 +58,7 @@ class Median:
     @property
     def interval(self) -> tuple[float, float] | None:
         """The interval by order statistics; None where there are too few values for one."""
-        n = len(self.values)
-        below = int(binom.ppf((1 - LEVEL) / 2, n, 0.5)) if n else 0
-        # The k smallest and k largest values are left out, k the largest number with the probability that is allowed.
-        while below > 0 and 2 * binom.cdf(below - 1, n, 0.5) > 1 - LEVEL:
-            below -= 1
-        return (self.values[below - 1], self.values[n - below]) if below > 0 else None
+        return median_interval(self.values)
 
     def text(self) -> str:
         """Writes median, interval and count."""
@@ -105,7 +94,7 @@ class Mean:
         """The interval; None with one value."""
         if len(self.values) < 2:
             return None
-        half = float(norm.ppf((1 + LEVEL) / 2) * np.std(self.values, ddof=1) / np.sqrt(len(self.values)))
+        half = float(NORMAL_95 * np.std(self.values, ddof=1) / np.sqrt(len(self.values)))
         return self.value - half, self.value + half
 
     def text(self) -> str:

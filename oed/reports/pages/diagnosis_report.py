@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from estimation.diagnosis.calibration import CLOSE_RIVAL_BIC
 from estimation.diagnosis.results.diagnosis import Diagnosis
+from estimation.uncertainty.quantiles import NORMAL_95
 from oed.reports.animations.animation import Animation
 from oed.reports.pages.diagnosis_actions import findings_in, verdict_of
 from oed.reports.pages.diagnosis_limits import limits_section
@@ -23,7 +24,7 @@ from oed.reports.rendering.page import Cell, Fact, Page, Section, Table
 from oed.reports.rendering.picture import Picture
 from oed.reports.rendering.provenance import footer
 from oed.reports.rendering.saving import save_page
-from oed.reports.rendering.significant import NORMAL_95, significant
+from oed.reports.rendering.significant import significant
 from robots.common.files import ResultFolder
 from robots.common.plain import percent, two_digits
 from robots.signals import Log

@@ -6,11 +6,12 @@ import numpy as np
 
 from estimation.payloads import PayloadEstimate, Quantity
 from estimation.payloads.result import METHODS
+from estimation.uncertainty.quantiles import NORMAL_95
 from oed.reports.pictures.parameter_pictures import error_bars_picture
 from oed.reports.rendering.page import Cell, Fact, Page, Section, Table, findings_of
 from oed.reports.rendering.provenance import footer, recordings_of
 from oed.reports.rendering.saving import save_page
-from oed.reports.rendering.significant import NORMAL_95, significant
+from oed.reports.rendering.significant import significant
 from robots.common.files import ResultFolder
 
 NAMES = {"mass": "mass", **{f"centre_{axis}": f"centre of mass, {axis}" for axis in "xyz"}}

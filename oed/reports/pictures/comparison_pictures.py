@@ -7,10 +7,10 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from numpy.typing import ArrayLike
 
+from estimation.uncertainty.quantiles import NORMAL_95
 from oed.reports.rendering.joint_units import joint_titles, joint_units
 from oed.reports.rendering.palette import joint_role, sequence_role
 from oed.reports.rendering.picture import Line, Panel, Picture, Series
-from oed.reports.rendering.significant import NORMAL_95
 from robots.signals import FloatArray
 
 SMALLEST_P = 1e-12

@@ -7,9 +7,9 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from estimation.uncertainty.quantiles import NORMAL_95
 from oed.reports.rendering.joint_units import joint_titles
 from oed.reports.rendering.picture import Line, Panel, Picture, Series
-from oed.reports.rendering.significant import NORMAL_95
 from robots.common.errors import InputError
 
 Array = NDArray[np.float64]

@@ -7,11 +7,11 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import ArrayLike
 
+from estimation.uncertainty.quantiles import NORMAL_95
 from oed.reports.rendering.gaps import break_at_pauses
 from oed.reports.rendering.joint_units import joint_titles, joint_units
 from oed.reports.rendering.palette import sequence_role
 from oed.reports.rendering.picture import Line, Panel, Picture, Series, Span
-from oed.reports.rendering.significant import NORMAL_95
 from robots.signals import FloatArray
 
 Windows = Sequence[tuple[float, float]]

@@ -7,10 +7,10 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from estimation.uncertainty.quantiles import NORMAL_95
 from oed.reports.rendering.gaps import break_at_pauses
 from oed.reports.rendering.joint_units import joint_titles
 from oed.reports.rendering.picture import Line, Panel, Picture, Series, Span
-from oed.reports.rendering.significant import NORMAL_95
 
 # Points that a panel shows.
 SHOWN = 800

@@ -7,10 +7,11 @@ from collections.abc import Callable, Mapping, Sequence
 import numpy as np
 from numpy.typing import ArrayLike
 
+from estimation.uncertainty.quantiles import NORMAL_95
 from oed.reports.rendering.joint_units import joint_titles, joint_units
 from oed.reports.rendering.palette import joint_role, sequence_role
 from oed.reports.rendering.picture import Line, Panel, Picture, Series
-from oed.reports.rendering.significant import NORMAL_95, significant, with_error
+from oed.reports.rendering.significant import significant, with_error
 from robots.common.errors import InputError
 from robots.signals import FloatArray
 

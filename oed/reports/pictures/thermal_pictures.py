@@ -9,11 +9,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from estimation.thermal import RunFit, ThermalEstimate
+from estimation.uncertainty.quantiles import NORMAL_95
 from oed.reports.rendering.gaps import break_at_pauses
 from oed.reports.rendering.joint_units import joint_titles, joint_units
 from oed.reports.rendering.palette import sequence_role
 from oed.reports.rendering.picture import Line, Panel, Picture, Series
-from oed.reports.rendering.significant import NORMAL_95
 from oed.reports.rendering.thinning import thin_indices
 from robots.signals import Log
 from robots.thermal import cold_friction

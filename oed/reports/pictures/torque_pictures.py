@@ -7,11 +7,13 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import ArrayLike
 
+from estimation.uncertainty.correlations import autocorrelation
+from estimation.uncertainty.quantiles import NORMAL_95
 from oed.reports.rendering.gaps import break_at_pauses
 from oed.reports.rendering.joint_units import joint_titles, joint_units
 from oed.reports.rendering.palette import joint_role
 from oed.reports.rendering.picture import Band, Line, Panel, Picture, Series
-from oed.reports.rendering.significant import NORMAL_95, percent, significant
+from oed.reports.rendering.significant import percent, significant
 from robots.common.errors import InputError
 from robots.signals import FloatArray
 
@@ -178,29 +180,6 @@ def residual_picture(
     )
 
 
-def autocorrelation(values: ArrayLike, lags: int) -> FloatArray:
-    """Estimates the autocorrelation of a uniform series, leaving out pairs with a gap.
-
-    Args:
-        values: the series, (N,), NaN where there is none.
-        lags: the longest lag, in samples.
-
-    Returns:
-        Correlations at lags 0 to ``lags``, (lags + 1,); all NaN of a constant series.
-    """
-    series = np.asarray(values, dtype=np.float64)
-    known = np.isfinite(series)
-    if not known.any():
-        return np.full(lags + 1, np.nan)
-    centred = np.where(known, series - series[known].mean(), 0.0)
-    size = 1 << int(2 * len(series)).bit_length()
-    sums = np.fft.irfft(np.abs(np.fft.rfft(centred, size)) ** 2, size)[: lags + 1]
-    pairs = np.rint(np.fft.irfft(np.abs(np.fft.rfft(known.astype(float), size)) ** 2, size)[: lags + 1])
-    if sums[0] <= 0.0:
-        return np.full(lags + 1, np.nan)
-    return np.where(pairs > 0, sums / np.maximum(pairs, 1.0), np.nan) / (sums[0] / pairs[0])
-
-
 def _histogram(errors: FloatArray, title: str, unit: str, role: str) -> Panel:
     known = errors[np.isfinite(errors)]
     if len(known) == 0:
@@ -224,7 +203,7 @@ def _histogram(errors: FloatArray, title: str, unit: str, role: str) -> Panel:
 def _memory(errors: FloatArray, title: str, period: float, role: str) -> Panel:
     lags = min(LAGS, len(errors) - 1)
     times: FloatArray = period * np.arange(lags + 1, dtype=np.float64)
-    correlation = autocorrelation(errors, lags)
+    correlation = autocorrelation(errors, lags, by_pairs=True)
     bound = NORMAL_95 / np.sqrt(max(int(np.isfinite(errors).sum()), 1))
     return Panel(
         title=f"{title} memory",

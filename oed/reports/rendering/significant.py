@@ -4,9 +4,6 @@ from __future__ import annotations
 
 import math
 
-NORMAL_95 = 1.96
-"""Standard errors to either side of a value that its 95 % interval reaches."""
-
 MINIMUM_EXPONENT = -4
 """Below 10 to this power, a number is written with an exponent."""
 

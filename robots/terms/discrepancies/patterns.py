@@ -232,13 +232,6 @@ def is_of_time(effect: object) -> bool:
     )
 
 
-def is_plain(effect: object) -> bool:
-    """Returns whether a pattern is simple and resembles one specific cause."""
-    return isinstance(effect, (EndStop, GainStep, Step, PayloadDrift)) or (
-        isinstance(effect, Pattern) and effect.kind == "ageing"
-    )
-
-
 def is_oscillation(effect: object) -> bool:
     """Returns whether a pattern oscillates in time, independent of the motion; its phase in other logs is unknown."""
     return isinstance(effect, Pattern) and effect.kind in SWAYING

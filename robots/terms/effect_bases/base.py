@@ -112,8 +112,8 @@ class Effect(ABC):
     def ties(self, coefficients: Array) -> tuple[tuple[int, int, float], ...]:
         """Lists pairs of a coefficient and a shape parameter that describe the same quantity.
 
-        Each entry is the coefficient's index, the shape parameter's index, and the standard deviation of their
-        difference.
+        Each entry is the coefficient's index, the shape parameter's index, and the half-width of the 95 % interval of
+        their difference.
         """
         return ()
 

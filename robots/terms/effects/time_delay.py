@@ -37,7 +37,7 @@ class Late(Effect):
 
     def ties(self, coefficients: Array) -> tuple[tuple[int, int, float], ...]:
         """Ties the delay at reversals to the delay elsewhere: the range of `near` is taken as 95 %."""
-        return ((0, 0, 0.5 * (APART - 1.0 / APART) / 1.96 * float(abs(coefficients[0]))),)
+        return ((0, 0, 0.5 * (APART - 1.0 / APART) * float(abs(coefficients[0]))),)
 
     def is_plausible(self, robot: Robot, joint: Place, coefficients: Array, shape: tuple[float, ...] = ()) -> bool:
         """Rejects a delay at the end of the range that the delay at reversals allows."""

@@ -6,7 +6,7 @@ import pytest
 from estimation import identify, predict
 from estimation.estimators import WeightedLeastSquares
 from estimation.identifications.comparison import VELOCITY_SCALES, Comparison
-from estimation.identifications.transfer import Transfer, band_of
+from estimation.identifications.transfer import Transfer
 from estimation.identifications.trials import Candidates
 from estimation.preprocessing import LowPass
 from estimation.regressions.preparation import prepare
@@ -82,14 +82,6 @@ def test_a_torque_by_position_is_taken_where_there_is_one(arm, arm_log):
     size = np.hypot([values["sin2_1"], values["sin2_2"]], [values["cos2_1"], values["cos2_2"]])
     np.testing.assert_allclose(size, 0.15 * clean.tau.std(axis=0), rtol=0.3)
     assert not identify(arm, replace(clean, tau=clean.tau + pull), position=False).choice.position
-
-
-def test_a_band_holds_its_share():
-    """The half-width is the quantile of the errors that are known."""
-    errors = np.abs(np.random.default_rng(0).normal(size=(20_000, 2)))
-    np.testing.assert_allclose(band_of(errors), 1.96, rtol=0.03)
-    errors[:, 1] = np.nan
-    assert np.isnan(band_of(errors)[1])
 
 
 @pytest.mark.slow

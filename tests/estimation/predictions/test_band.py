@@ -64,7 +64,7 @@ def test_friction_beyond_the_fitted_speeds_widens_the_band(model: Model) -> None
     at = {share: friction(bent, share * FITTED)[0] for share in (0.5, 1.0, 2.0, 3.0)}
     slope = (at[1.0] - at[0.5]) / (0.5 * FITTED)
     expected = [abs(at[share] - at[1.0] - slope * (share - 1) * FITTED) for share in (3.0, 3.0, 2.0)]
-    np.testing.assert_allclose(half[:, 0], np.hypot(0.2, 1.96 * np.array(expected)), rtol=1e-6)
+    np.testing.assert_allclose(half[:, 0], np.hypot(0.2, 1.959964 * np.array(expected)), rtol=1e-6)
     np.testing.assert_allclose(half[:, 1], 0.1, rtol=1e-6)
     assert (half[:, 0] > 0.25).all()
 

@@ -6,6 +6,7 @@ import numpy as np
 
 from estimation.comparisons import ModelComparison
 from estimation.comparisons.friction_changes import interval_of, percent_of
+from estimation.uncertainty.quantiles import NORMAL_95
 from oed.reports.pages.comparisons.comparison_tables import (
     drift_table,
     merged_table,
@@ -24,7 +25,6 @@ from oed.reports.rendering.page import Cell, Fact, Finding, Page, Section, Table
 from oed.reports.rendering.picture import Picture
 from oed.reports.rendering.provenance import Recording, footer
 from oed.reports.rendering.saving import save_page
-from oed.reports.rendering.significant import NORMAL_95
 from robots.common.files import ResultFolder
 
 # Curves in one panel, and panels of parameters over the runs.

@@ -17,7 +17,7 @@ from robots.signals import Log
 from robots.terms.discrepancies.clock_drift import ClockDrift
 from robots.terms.discrepancies.families import FAMILIES
 from robots.terms.discrepancies.gain_step import GainStep
-from robots.terms.discrepancies.patterns import is_of_time, is_plain
+from robots.terms.discrepancies.patterns import is_of_time
 from robots.terms.effects import Situation, situation
 from robots.terms.effects.time_delay import lateness
 
@@ -61,7 +61,6 @@ def test_both_are_found_by_their_names_and_know_only_time(arm: Robot) -> None:
     assert isinstance(find_effect(ClockDrift.name), ClockDrift)
     assert is_of_time(GainStep())
     assert is_of_time(ClockDrift())
-    assert is_plain(GainStep())
     assert ClockDrift().joints(arm) == ()
     assert ClockDrift().joints(load_robot("ur10")) == (None,)
 

@@ -16,7 +16,7 @@ from robots.regressor import default_model
 from robots.robot import Robot
 from robots.signals import Log
 from robots.terms.discrepancies.intermittent_torque import IntermittentTorque, PeriodicTorque
-from robots.terms.discrepancies.patterns import is_of_time, is_plain
+from robots.terms.discrepancies.patterns import is_of_time
 from robots.terms.effects import Situation, situation
 from tests.estimation.diagnosis.pinocchio_chains import chain_of
 
@@ -114,7 +114,6 @@ def test_a_spell_is_no_change_for_good(moved: Situation) -> None:
     assert isinstance(find_effect(PeriodicTorque.name), PeriodicTorque)
     assert is_of_time(IntermittentTorque())
     assert is_of_time(PeriodicTorque())
-    assert not is_plain(IntermittentTorque())
     assert PeriodicTorque().joints(moved.robot) == (None,)
     assert (
         max(duration for _, duration in IntermittentTorque().grid(moved, 1))

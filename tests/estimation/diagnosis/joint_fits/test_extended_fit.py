@@ -213,7 +213,7 @@ def test_what_is_one_quantity_reported_twice_is_known_as_well_as_the_other(varia
 @pytest.mark.parametrize("name", ["time_delay", "current_lag"])
 def test_a_delay_and_its_reversals_differ_by_what_a_factor_allows(name: str) -> None:
     """A factor of 1.6 around 2 ms, 1.25 to 3.2 ms, counts as a 95 % interval."""
-    ((coefficient, shape, apart),) = EFFECTS[name].ties(np.array([2e-3]))
+    ((coefficient, shape, half),) = EFFECTS[name].ties(np.array([2e-3]))
     assert (coefficient, shape) == (0, 0)
-    assert apart == pytest.approx((3.2e-3 - 1.25e-3) / 2 / 1.96)
+    assert half == pytest.approx((3.2e-3 - 1.25e-3) / 2)
     assert EFFECTS["stribeck"].ties(np.array([1.0])) == ()

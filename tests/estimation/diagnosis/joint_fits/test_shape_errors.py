@@ -53,7 +53,7 @@ def test_a_velocity_is_as_uncertain_as_its_exponent_lets_it_be(
     wanted, narrow = (
         np.abs(np.log(velocities[curve.max() - curve < BOUND] / velocity)).max() for curve in (profile, held)
     )
-    reported = 1.96 * shape_errors(problem, member, nothing)[0] / velocity
+    reported = 1.959964 * shape_errors(problem, member, nothing)[0] / velocity
     assert reported == pytest.approx(wanted, abs=0.03)
     assert reported > 1.2 * narrow
     assert abs(np.log(velocity / SPEED)) < reported
@@ -101,10 +101,10 @@ def test_a_moment_while_the_drive_is_at_its_limit_may_be_anywhere_there(
     for moment, wanted in (
         (begins + 0.05, ends - begins - 0.05),
         (ends + 0.02, ends + 0.02 - begins),
-        (float(recording.t[away[0]]), 1.96 * 0.01),
+        (float(recording.t[away[0]]), 1.959964 * 0.01),
     ):
         there = replace(step, shape=(moment,))
-        assert 1.96 * widen_change_times(problem, there, [limit], [0.01])[0] == pytest.approx(wanted)
+        assert 1.959964 * widen_change_times(problem, there, [limit], [0.01])[0] == pytest.approx(wanted)
         other = replace(there, hypothesis=Hypothesis(EFFECTS["friction_step"], 2))
         assert widen_change_times(problem, other, [limit], [0.01]) == [0.01]
         assert widen_change_times(problem, there, [there], [0.01]) == [0.01]
@@ -125,7 +125,7 @@ def test_a_moment_while_the_arm_stands_may_be_anywhere_there(
     )
     there = replace(push, shape=(begins + 0.1, 1.0, 0.5, 0.0, 0.0))
     start, duration, *rest = widen_change_times(problem, there, [], [0.01, 0.02, 0.03, 0.0])
-    assert 1.96 * start == pytest.approx(ends - begins - 0.1)
+    assert 1.959964 * start == pytest.approx(ends - begins - 0.1)
     assert duration == start
     assert rest == [0.03, 0.0]
     before = replace(push, shape=(begins - 0.2, 1.0, 0.5, 0.0))
@@ -149,7 +149,7 @@ def test_a_change_between_two_logs_may_have_come_at_any_time_there(
         middle = spread_over_pauses(problem, replace(step, shape=(moment,)), [])
         assert middle.shape[0] == pytest.approx((ends + begins) / 2, abs=0.02)
         (error,) = widen_change_times(problem, middle, [], [0.01])
-        assert 1.96 * error == pytest.approx((begins - ends) / 2, abs=0.02)
+        assert 1.959964 * error == pytest.approx((begins - ends) / 2, abs=0.02)
     before = replace(step, shape=(ends - 1.0,))
     assert spread_over_pauses(problem, before, []) is before
     # A contact has its own start and end.

@@ -68,7 +68,7 @@ def test_an_interval_holds_what_machines_may_have(arm: Robot) -> None:
     )
     fitted: Any = SimpleNamespace(model=SimpleNamespace(extensions=[extension]))
     torque, _, exponent = _parameters(arm, member, fitted, 0, np.array([False, True, True]))
-    assert torque.ci95 == (0.0, pytest.approx(7.9 + 1.96 * 5.3))
+    assert torque.ci95 == (0.0, pytest.approx(7.9 + 1.959964 * 5.3))
     assert exponent.ci95[0] >= EFFECTS["stribeck"].shapes[1].lower
     assert not exponent.determined
 

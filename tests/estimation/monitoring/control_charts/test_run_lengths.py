@@ -6,7 +6,6 @@ import pytest
 from estimation.monitoring.control_charts.run_lengths import (
     cusum_run_length,
     cusum_threshold,
-    ewma_deviation,
     ewma_run_length,
     ewma_threshold,
 )
@@ -47,7 +46,9 @@ def test_ewma_crosses_at_the_stated_rate(rho):
     Some 4,500 crossings, correlated in clusters, leave 3 % of noise; three standard deviations are 9 %.
     """
     weight = 0.1
-    threshold = ewma_threshold(weight, 1000.0, rho) * ewma_deviation(weight, rho)
+    # Standard deviation of an EWMA of a standard normal AR(1) sequence in steady state.
+    deviation = np.sqrt(weight / (2 - weight) * (1 + (1 - weight) * rho) / (1 - (1 - weight) * rho))
+    threshold = ewma_threshold(weight, 1000.0, rho) * deviation
     level, before, crossings, seen = np.zeros(CHAINS), np.zeros(CHAINS, dtype=bool), 0, 0
     for step, x in enumerate(values(rho, 2)):
         level = level + weight * (x - level)

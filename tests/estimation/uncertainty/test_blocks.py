@@ -4,7 +4,14 @@ from __future__ import annotations
 
 import numpy as np
 
-from estimation.diagnosis.joint_fits.block_errors import widened_by_blocks
+from estimation.uncertainty.blocks import (
+    block_numbers,
+    circular_block_counts,
+    clustered_errors,
+    jackknife_errors,
+    moving_block_sums,
+    widened_by_blocks,
+)
 
 ROWS, FITS = 3000, 300
 
@@ -53,3 +60,37 @@ def test_correlations_stay_and_nothing_is_no_error() -> None:
     assert not wider[2].any()
     before, after = (c[0, 1] / np.sqrt(c[0, 0] * c[1, 1]) for c in (covariance, wider))
     np.testing.assert_allclose(after, before, rtol=1e-12)
+
+
+def test_the_jackknife_of_a_mean_is_its_standard_error() -> None:
+    """Of a mean over B blocks it is the blocks' standard deviation over sqrt(B), and so is the clustered error."""
+    blocks = np.random.default_rng(4).normal(size=(20, 3))
+    without = np.array([np.delete(blocks, k, axis=0).mean(axis=0) for k in range(20)])
+    expected = blocks.std(axis=0, ddof=1) / np.sqrt(20)
+    np.testing.assert_allclose(jackknife_errors(without), expected, rtol=1e-12)
+    np.testing.assert_allclose(clustered_errors((blocks - blocks.mean(axis=0)) / 20), expected, rtol=1e-12)
+
+
+def test_blocks_are_consecutive_and_of_equal_size() -> None:
+    """Each of 7 blocks of 50 rows has 7 or 8 of them."""
+    numbers = block_numbers(50, 7)
+    assert (np.diff(numbers) >= 0).all()
+    assert set(np.bincount(numbers)) == {7, 8}
+
+
+def test_moving_blocks_scatter_as_a_mean_of_correlated_rows_does() -> None:
+    """Sums over rows that are equal in groups of 10 scatter as those of the groups, and single rows would not."""
+    rng = np.random.default_rng(5)
+    rows = np.repeat(rng.normal(size=400), 10)[:, None]
+    sums = moving_block_sums(rows, 100, 2000, rng)
+    # The 400 groups know the scatter to 3.5 %, blocks of ten groups to a tenth.
+    assert abs(sums.std() / (10 * np.sqrt(400)) - 1) < 0.15
+    assert sums.shape == (2000, 1)
+
+
+def test_circular_blocks_hold_consecutive_pieces() -> None:
+    """Each resample has as many pieces as the data, of whole blocks that may pass the end."""
+    counts = circular_block_counts(12, 4, 50, np.random.default_rng(6))
+    assert (counts.sum(axis=1) == 12).all()
+    # 12 pieces in blocks of 4: a resample of three blocks touches at most three runs of pieces.
+    assert (((counts > 0) & (np.roll(counts, 1, axis=1) == 0)).sum(axis=1) <= 3).all()

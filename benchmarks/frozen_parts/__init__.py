@@ -1,0 +1,1 @@
+"""Parts of the frozen sets: what is run, and how two runs are compared."""
