@@ -34,13 +34,18 @@ WindowOption = Annotated[
 StartToleranceOption = Annotated[
     float, typer.Option("--start-tolerance", help="Farthest pose from the first point [rad or m].")
 ]
-NoPingOption = Annotated[bool, typer.Option("--no-ping", help="Send no pings: some controllers know none.")]
+PingOption = Annotated[
+    bool,
+    typer.Option(
+        "--ping/--no-ping", help="Ping the motion port. Some drivers, as Fanuc's, read pings as points and move."
+    ),
+]
 SpeedOption = Annotated[
     float, typer.Option("--speed", help="How many times faster than real time the controller to test against plays.")
 ]
 LINK_OPTIONS = (
     *("transport", "motion_port", "state_port", "byte_order", "real_bytes", "handshake"),
-    *("points", "download", "window", "patience", "start_tolerance", "no_ping", "speed"),
+    *("points", "download", "window", "patience", "start_tolerance", "ping", "speed"),
 )
 """Parameters that concern the way to a controller."""
 

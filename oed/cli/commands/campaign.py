@@ -16,8 +16,8 @@ from oed.cli.links import (
     DownloadOption,
     HandshakeOption,
     MotionPortOption,
-    NoPingOption,
     PatienceOption,
+    PingOption,
     PointsOption,
     RealBytesOption,
     SpeedOption,
@@ -115,7 +115,7 @@ def campaign(
     window: WindowOption = 1,
     patience: PatienceOption = 2.0,
     start_tolerance: StartToleranceOption = 0.01,
-    no_ping: NoPingOption = False,
+    ping: PingOption = False,
     speed: SpeedOption = 1.0,
     out: OutOption = Path("campaign"),
     tip: TipOption = None,
@@ -213,7 +213,7 @@ def campaign(
                 window=window,
                 patience=patience,
                 start_tolerance=start_tolerance,
-                ping=not no_ping,
+                ping=ping,
             )
             try:
                 with terminate_as_interrupt():

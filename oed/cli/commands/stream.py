@@ -15,8 +15,8 @@ from oed.cli.links import (
     HandshakeOption,
     HostOption,
     MotionPortOption,
-    NoPingOption,
     PatienceOption,
+    PingOption,
     PointsOption,
     RealBytesOption,
     StartToleranceOption,
@@ -62,12 +62,12 @@ def stream(
     patience: PatienceOption = 2.0,
     start_tolerance: StartToleranceOption = 0.01,
     robot_id: Annotated[int, typer.Option("--robot-id", help="Number of the robot at its controller.")] = 0,
-    no_ping: NoPingOption = False,
+    ping: PingOption = False,
     ignore_status: Annotated[
         bool, typer.Option("--ignore-status", help="Start in spite of a reported error, e-stop or manual mode.")
     ] = False,
     dry_run: Annotated[
-        bool, typer.Option("--dry-run", help="Check trajectory, controller and pose; send no point.")
+        bool, typer.Option("--dry-run", help="Check trajectory, controller and pose; only listen.")
     ] = False,
     tip: TipOption = None,
     joints: JointsOption = None,
@@ -94,7 +94,7 @@ def stream(
             window=window,
             reply_time=reply_time,
             patience=patience,
-            ping=not no_ping,
+            ping=ping,
             start_tolerance=start_tolerance,
             ignore_status=ignore_status,
             robot_id=robot_id,

@@ -18,7 +18,7 @@ class StreamOptions:
         window: points on their way at once. More than one needs a controller whose replies repeat the point.
         reply_time: by UDP, a point without reply is sent again after so long [s].
         patience: longest wait for a reply, for feedback, or for the end of the motion [s].
-        ping: whether to ping; the thesis' program takes a ping for a point.
+        ping: whether to ping. Drivers that read packets of a fixed size take pings for points, and move.
         start_tolerance: farthest pose from the first point [rad or m].
         ignore_status: start in spite of a reported error, emergency stop or manual mode.
         download_rate: points a second of a download by UDP.
@@ -30,7 +30,7 @@ class StreamOptions:
     window: int = 1
     reply_time: float = 0.1
     patience: float = 2.0
-    ping: bool = True
+    ping: bool = False
     start_tolerance: float = 0.01
     ignore_status: bool = False
     download_rate: float = 2000.0

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Mapping
+from contextlib import ExitStack
 from dataclasses import asdict
 from os import PathLike, fspath
 from typing import Any
@@ -15,7 +16,8 @@ from oed.controllers.clients.ending import Ending
 from oed.controllers.clients.options import StreamOptions
 from oed.controllers.clients.requests import Requests
 from oed.controllers.clients.result import StreamResult
-from oed.controllers.errors import ControllerError, PointRefusedError
+from oed.controllers.clients.traffic import Traffic
+from oed.controllers.errors import ControllerError, NoReplyError, PointRefusedError
 from oed.controllers.interrupts import signals_held
 from oed.controllers.links import Endpoint, open_link
 from oed.controllers.recording.clock import ClockAnchor
@@ -33,6 +35,9 @@ from robots.signals import Motion
 from robots.version import VERSION
 
 CLEAR = "clear it at the controller, move the robot to the start of the trajectory, and play it again"
+
+CLOSES = 0.1
+"""How long a link that is closed at once is waited for [s]."""
 
 PINGS = 9
 """Pings from which the delay is measured."""
@@ -70,7 +75,7 @@ def stream(
         anchor: the end of the log whose clock this one continues.
         needs_torque: refuse a controller whose feedback carries neither torque nor current.
         file: the trajectory's file, for messages.
-        dry_run: check everything, send no point and write nothing.
+        dry_run: check everything that feedback shows, send nothing but pings that are asked for, and write nothing.
         force: whether an existing log may be replaced.
         progress: listener.
 
@@ -95,11 +100,16 @@ def stream(
             raise InputError("no log file for the feedback", remedy="give one")
         check_log_path(log, force)
     recorder = Recorder(
-        open_link(endpoint, endpoint.state_port), robot, endpoint.form, options.patience, endpoint.connect_time
+        open_link(endpoint, endpoint.state_port),
+        robot,
+        endpoint.form,
+        options.patience,
+        endpoint.connect_time,
+        answers=not dry_run,
     )
     source = f"feedback of {endpoint.place(endpoint.state_port)}"
     known = {"robot": robot.name, "source": source, "tool": VERSION, **(header or {})}
-    requests: Requests | None = None
+    traffic = Traffic()
     begin, ended = time.monotonic(), "interrupted"
     failure: OedError | None = None
     try:
@@ -110,41 +120,46 @@ def stream(
                 "the robot is moving", remedy="wait for the end of its motion; another client may be playing it"
             )
         check_start(motion.q[0], pose[: robot.n], options.start_tolerance)
-        with open_link(endpoint, endpoint.motion_port) as link:
-            if needs_torque and not recorder.has_torque:
-                raise ControllerError(
-                    f"the feedback of {endpoint.place(endpoint.state_port)} carries neither torque nor current",
-                    remedy="a controller program must send them (message type 9015)",
-                )
-            requests = Requests(link, endpoint.form, options)
-            for number in range(PINGS if options.ping else 0):
-                requests.ping(None if number else max(options.patience, endpoint.connect_time))
+        if needs_torque and not recorder.has_torque:
+            raise ControllerError(
+                f"the feedback of {endpoint.place(endpoint.state_port)} carries neither torque nor current",
+                remedy="a controller program must send them (message type 9015)",
+            )
+        with ExitStack() as links:
+            requests = None
+            # A motion port may belong to a driver that moves on what it does not know, or drops its client.
+            if options.ping or not dry_run:
+                link = links.enter_context(open_link(endpoint, endpoint.motion_port))
+                # A port that serves another client closes the link, or says something.
+                link.receive(CLOSES)
+                requests = Requests(link, endpoint.form, options, traffic)
+                for number in range(PINGS if options.ping else 0):
+                    requests.ping(None if number else max(options.patience, endpoint.connect_time))
             if not options.ignore_status and status_problem(recorder.status) is not None:
                 # The error of an interrupted motion ends with the link of the next client.
                 check_status(recorder.renewed_status(), endpoint.place(endpoint.state_port))
             if not dry_run:
                 assert log is not None
-                recorder.begin(log, known, anchor=anchor, delay=requests.traffic.delay, force=force)
+                assert requests is not None
+                recorder.begin(log, known, anchor=anchor, delay=traffic.delay, force=force)
                 begin = time.monotonic()
                 try:
                     _play(motion, robot, requests, recorder, options, progress)
                 finally:
                     with signals_held():
-                        if not requests.traffic.stopped:
+                        if traffic.begun and not traffic.stopped:
                             requests.stop()
         ended = "done"
     except OedError as error:
         failure, ended = error, error.problem
     finally:
         duration = time.monotonic() - begin
-        delay = requests.traffic.delay if requests else None
-        traffic = requests.traffic if requests else None
         final = {
             "complete": ended == "done",
             "ended": ended,
-            "sent_points": traffic.sent if traffic else 0,
-            "resent_points": traffic.resent if traffic else 0,
-            "message_delay": delay,
+            "sent_points": traffic.sent,
+            "resent_points": traffic.resent,
+            "message_delay": traffic.delay,
         }
         with signals_held():
             try:
@@ -154,21 +169,20 @@ def stream(
         # The terminal may be lost: the log comes first.
         progress.finish()
     if failure is not None:
-        stop = "" if requests and requests.traffic.stopped else "the controller did not confirm the stop"
+        stop = "the controller did not confirm the stop" if traffic.begun and not traffic.stopped else ""
         raise with_rows(failure, recorder.rows, log, stop)
-    assert requests is not None
     if recorder.lowest is not None and recorder.highest is not None:
-        warn_of_other_robot(robot, recorder.lowest, recorder.highest)
+        warn_of_other_robot(robot, recorder.lowest, recorder.highest, motion.q)
     return StreamResult(
         robot=robot.name,
         place=endpoint.place(endpoint.motion_port),
         points=len(motion),
-        sent=requests.traffic.sent,
-        resent=requests.traffic.resent,
-        unexpected=requests.traffic.unexpected,
+        sent=traffic.sent,
+        resent=traffic.resent,
+        unexpected=traffic.unexpected,
         duration=duration,
-        delay=delay,
-        stopped=requests.traffic.stopped,
+        delay=traffic.delay,
+        stopped=traffic.stopped,
         log="" if dry_run else fspath(log or ""),
         rows=recorder.rows,
         feedback=recorder.statistics.summary(),
@@ -203,6 +217,14 @@ def _play(
         longest = float(np.diff(motion.t).max()) if len(motion) > 1 else 0.0
         try:
             requests.stream(points, watch, lambda count: progress.update(float(count)), longest)
+        except NoReplyError as error:
+            # No reply comes at a full buffer; a controller that is gone falls silent at both ports.
+            if time.monotonic() - recorder.last_heard > options.patience / 2:
+                raise
+            raise ControllerError(
+                f"the controller takes no points: {error.problem}, but its feedback arrives",
+                remedy="its buffer does not empty: check drives, mode, the running program and the motion port",
+            ) from error
         except PointRefusedError as error:
             requests.stop()
             # The reply comes before the next report of the state, which says why.

@@ -9,7 +9,7 @@ from contextlib import suppress
 
 from oed.controllers.clients.options import StreamOptions
 from oed.controllers.clients.traffic import Request, Traffic
-from oed.controllers.errors import ControllerError, LinkError, PointRefusedError, ProtocolError
+from oed.controllers.errors import ControllerError, LinkError, NoReplyError, PointRefusedError, ProtocolError
 from oed.controllers.links import Link
 from oed.exports.simple_message import (
     Bare,
@@ -40,11 +40,12 @@ class Requests:
         link: to the motion port.
         form: of the messages.
         options: of the stream.
+        traffic: what happens is counted there.
     """
 
-    def __init__(self, link: Link, form: WireFormat, options: StreamOptions) -> None:
+    def __init__(self, link: Link, form: WireFormat, options: StreamOptions, traffic: Traffic | None = None) -> None:
         self.link = link
-        self.traffic = Traffic()
+        self.traffic = traffic or Traffic()
         self._form = form
         self._options = options
         self._last_sent = 0.0
@@ -68,8 +69,6 @@ class Requests:
                 try:
                     frame = self._received(left, strict=True)
                 except MessageError as error:
-                    if self.link.reliable:
-                        raise ProtocolError(f"{self.link.place} speaks another protocol: {error}") from error
                     wrong = str(error)
                     continue
                 if frame is not None and frame.comm == Comm.REPLY and frame.message.kind == Kind.PING:
@@ -82,7 +81,7 @@ class Requests:
             raise ProtocolError(f"{self.link.place} speaks another protocol or format: {wrong}")
         raise (LinkError if self.traffic.pings else ProtocolError)(
             f"{self.link.place} does not answer a ping",
-            remedy="check host and motion port; a controller that knows no pings needs --no-ping",
+            remedy="check host and motion port; a controller may know no pings: leave out --ping",
         )
 
     def keep_alive(self) -> None:
@@ -107,7 +106,8 @@ class Requests:
 
         Raises:
             PointRefusedError: a point that is refused.
-            LinkError: no reply within the patience, or a closed connection.
+            NoReplyError: no reply within the patience.
+            LinkError: a closed connection, or another protocol.
         """
         waiting: OrderedDict[int, Request] = OrderedDict()
         source = iter(points)
@@ -131,6 +131,8 @@ class Requests:
                     self.traffic.unexpected += 1
                 else:
                     request = waiting.pop(number)
+                    if request.tries == 1:
+                        self.traffic.shortest = min(self.traffic.shortest, now - request.first)
                     self.traffic.sent += 1
                     advance(self.traffic.sent)
                     if not known:
@@ -195,6 +197,7 @@ class Requests:
 
     def _send(self, waiting: OrderedDict[int, Request], point: FullPoint | Point) -> None:
         data = self._form.encode(Frame(point, Comm.REQUEST))
+        self.traffic.begun = True
         self._put(data)
         self._last_sent = now = time.monotonic()
         waiting[point.sequence] = Request(data, now, now)
@@ -214,6 +217,7 @@ class Requests:
             numbered = Point(
                 sequence=number, positions=point.positions, velocity=point.velocity, duration=point.duration
             )
+        self.traffic.begun = True
         self._put(self._form.encode(Frame(numbered, Comm.TOPIC)))
         self._last_sent = time.monotonic()
         self.traffic.sent += 1
@@ -242,28 +246,15 @@ class Requests:
         """Sends again what was not answered, up to the patience."""
         for number, request in waiting.items():
             if now - request.first > patience:
-                self._give_up(number, now - request.first)
+                raise NoReplyError(
+                    f"no reply to point {number} for {now - request.first:.1f} s from {self.link.place}",
+                    remedy="check the controller and the network",
+                )
             if not self.link.reliable and now - request.sent >= self._options.reply_time:
                 self._put(request.data)
                 request.sent = now
                 request.tries += 1
                 self.traffic.resent += 1
-
-    def _give_up(self, number: int, waited: float) -> None:
-        alive = False
-        if self._options.ping:
-            with suppress(OedError):
-                self.ping(min(0.5, self._options.patience))
-                alive = True
-        if alive:
-            raise ControllerError(
-                f"the controller takes no points: no reply to point {number} for {waited:.1f} s, but it answers pings",
-                remedy="its buffer does not empty: check drives, mode, the running program and the motion port",
-            )
-        raise LinkError(
-            f"no reply to point {number} for {waited:.1f} s from {self.link.place}",
-            remedy="check the controller and the network",
-        )
 
     def _drain(self, most: int) -> None:
         """Waits for the replies to points that were sent again: without a body they look like those of later points."""
@@ -279,16 +270,18 @@ class Requests:
 
     def _received(self, timeout: float, *, strict: bool = False) -> Frame | None:
         """Waits for a message; a datagram that is none counts as unexpected."""
-        data = self.link.receive(timeout)
-        if data is None:
-            return None
-        if data == self._last_data:
-            raise ProtocolError(f"{self.link.place} sends back what it is sent: it is no simple_message controller")
         try:
+            data = self.link.receive(timeout)
+            if data is None:
+                return None
+            if data == self._last_data:
+                raise ProtocolError(f"{self.link.place} sends back what it is sent: it is no simple_message controller")
             return self._form.decode(data)
-        except MessageError:
+        except MessageError as error:
             self.traffic.unexpected += 1
-            if strict or self.link.reliable:
+            if self.link.reliable:
+                raise ProtocolError(f"{self.link.place} speaks another protocol: {error}") from error
+            if strict:
                 raise
             return None
 

@@ -43,10 +43,13 @@ class Recorder:
         form: of the messages.
         patience: longest silence [s].
         connect_time: how long the first feedback is waited for [s].
+        answers: whether requests of the controller are answered; otherwise nothing is sent to it.
     """
 
-    def __init__(self, link: Link, robot: Robot, form: WireFormat, patience: float, connect_time: float) -> None:
-        self._link, self._robot, self._form = link, robot, form
+    def __init__(
+        self, link: Link, robot: Robot, form: WireFormat, patience: float, connect_time: float, answers: bool = True
+    ) -> None:
+        self._link, self._robot, self._form, self._answers = link, robot, form, answers
         self._patience, self._connect_time = patience, connect_time
         self._lock = threading.Lock()
         self._end = threading.Event()
@@ -240,7 +243,7 @@ class Recorder:
 
     def _take(self, frame: Frame, now: float) -> None:
         message = frame.message
-        if frame.comm == Comm.REQUEST:
+        if frame.comm == Comm.REQUEST and self._answers:
             self._link.send(self._form.encode(Frame(_echo(message), Comm.REPLY, Reply.SUCCESS)))
         self.last_heard = now
         if isinstance(message, Status):

@@ -117,7 +117,7 @@ def test_thesis_feedback(robot, controllers, log: Path) -> None:
     """A controller that sends positions only, and no status, gives a log with times of arrival."""
     motion = swing(robot)
     _, endpoint = controllers(feedback="position", status=False, handshake=0xFF, speed=2.0)
-    stream(motion, robot, endpoint, log=log, options=PATIENT)
+    stream(motion, robot, endpoint, log=log, options=replace(PATIENT, ping=True))
     read = read_log(log, robot.n, torque=False)
     # Times are those of the measurement: of the arrival less half the round trip of a ping.
     assert 0 < read.metadata["delay_removed"] < 1.0
