@@ -34,6 +34,14 @@ WindowOption = Annotated[
 StartToleranceOption = Annotated[
     float, typer.Option("--start-tolerance", help="Farthest pose from the first point [rad or m].")
 ]
+ToleranceOption = Annotated[
+    str | None,
+    typer.Option(
+        "--tolerance",
+        help="Farthest feedback from the plan [rad or m], for all joints or each, or inf. Default: 0.05 rad, 0.02 m.",
+        show_default=False,
+    ),
+]
 PingOption = Annotated[
     bool,
     typer.Option(
@@ -45,7 +53,7 @@ SpeedOption = Annotated[
 ]
 LINK_OPTIONS = (
     *("transport", "motion_port", "state_port", "byte_order", "real_bytes", "handshake"),
-    *("points", "download", "window", "patience", "start_tolerance", "ping", "speed"),
+    *("points", "download", "window", "patience", "start_tolerance", "tolerance", "ping", "speed"),
 )
 """Parameters that concern the way to a controller."""
 
@@ -111,6 +119,17 @@ def refuse_without_host(context: typer.Context, host: str) -> None:
     if given:
         verb = "does" if len(given) == 1 else "do"
         raise InputError(f"{', '.join(given)} {verb} not apply without {host}", remedy=f"add {host} HOST")
+
+
+def path_tolerance(text: str | None) -> tuple[float, ...] | None:
+    """Reads ``--tolerance``; one number counts for all joints.
+
+    Raises:
+        InputError: the text is no list of numbers.
+    """
+    from oed.cli.options import numbers
+
+    return None if text is None else tuple(numbers("--tolerance", text) or ())
 
 
 def is_given(context: typer.Context, name: str) -> bool:

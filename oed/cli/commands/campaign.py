@@ -23,10 +23,12 @@ from oed.cli.links import (
     SpeedOption,
     StartToleranceOption,
     StatePortOption,
+    ToleranceOption,
     TransportOption,
     WindowOption,
     endpoint,
     is_given,
+    path_tolerance,
     refuse_without_host,
 )
 from oed.cli.options import (
@@ -115,6 +117,7 @@ def campaign(
     window: WindowOption = 1,
     patience: PatienceOption = 2.0,
     start_tolerance: StartToleranceOption = 0.01,
+    tolerance: ToleranceOption = None,
     ping: PingOption = False,
     speed: SpeedOption = 1.0,
     out: OutOption = Path("campaign"),
@@ -214,6 +217,8 @@ def campaign(
                 patience=patience,
                 start_tolerance=start_tolerance,
                 ping=ping,
+                tolerance=path_tolerance(tolerance),
+                speed=speed,
             )
             try:
                 with terminate_as_interrupt():

@@ -100,6 +100,16 @@ def controller(
         int | None, typer.Option("--restart-after", help="Restart after so many points.", show_default=False)
     ] = None,
     stuck: Annotated[bool, typer.Option("--stuck", help="Play nothing, so that the buffer never empties.")] = False,
+    path_fault: Annotated[
+        str,
+        typer.Option(
+            "--path-fault",
+            help="What the robot does wrong: none, swap, sign, half-speed, stall, offset or other-robot.",
+        ),
+    ] = "none",
+    path_fault_after: Annotated[
+        float, typer.Option("--path-fault-after", help="Begin with it so long after the start of a trajectory [s].")
+    ] = 0.0,
     seed: SeedOption = 0,
     tip: TipOption = None,
     joints: JointsOption = None,
@@ -135,6 +145,8 @@ def controller(
             e_stop_after=e_stop_after,
             restart_after=restart_after,
             stuck=stuck,
+            path=path_fault,  # type: ignore[arg-type]
+            path_after=path_fault_after,
             seed=seed,
         )
         options = ControllerOptions(

@@ -22,9 +22,11 @@ from oed.cli.links import (
     SpeedOption,
     StartToleranceOption,
     StatePortOption,
+    ToleranceOption,
     TransportOption,
     WindowOption,
     endpoint,
+    path_tolerance,
 )
 from oed.cli.options import (
     ClusterOption,
@@ -91,6 +93,7 @@ def loop(
     window: WindowOption = 1,
     patience: PatienceOption = 2.0,
     start_tolerance: StartToleranceOption = 0.01,
+    tolerance: ToleranceOption = None,
     ping: PingOption = False,
     speed: SpeedOption = 1.0,
     out: OutOption = Path("loop"),
@@ -143,6 +146,8 @@ def loop(
                         patience=patience,
                         start_tolerance=start_tolerance,
                         ping=ping,
+                        tolerance=path_tolerance(tolerance),
+                        speed=speed,
                     ),
                     speed=speed,
                     workers=workers,

@@ -21,9 +21,11 @@ from oed.cli.links import (
     RealBytesOption,
     StartToleranceOption,
     StatePortOption,
+    ToleranceOption,
     TransportOption,
     WindowOption,
     endpoint,
+    path_tolerance,
 )
 from oed.cli.options import (
     ROBOT,
@@ -62,6 +64,7 @@ def stream(
     patience: PatienceOption = 2.0,
     start_tolerance: StartToleranceOption = 0.01,
     robot_id: Annotated[int, typer.Option("--robot-id", help="Number of the robot at its controller.")] = 0,
+    tolerance: ToleranceOption = None,
     ping: PingOption = False,
     ignore_status: Annotated[
         bool, typer.Option("--ignore-status", help="Start in spite of a reported error, e-stop or manual mode.")
@@ -95,6 +98,7 @@ def stream(
             reply_time=reply_time,
             patience=patience,
             ping=ping,
+            tolerance=path_tolerance(tolerance),
             start_tolerance=start_tolerance,
             ignore_status=ignore_status,
             robot_id=robot_id,

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+import numpy as np
+
 from oed.exports.simple_message.points import PointType
 from robots.common.errors import InputError
 
@@ -20,6 +22,10 @@ class StreamOptions:
         patience: longest wait for a reply, for feedback, or for the end of the motion [s].
         ping: whether to ping. Drivers that read packets of a fixed size take pings for points, and move.
         start_tolerance: farthest pose from the first point [rad or m].
+        tolerance: farthest feedback from the plan [rad or m]: of all joints, or of each; infinity for a joint that is
+            not watched. 0.05 rad or 0.02 m by default.
+        timed: whether the controller plays in time. Otherwise only the path is watched.
+        speed: how many times faster than real time a controller to test against plays.
         ignore_status: start in spite of a reported error, emergency stop or manual mode.
         download_rate: points a second of a download by UDP.
         robot_id: which robot of the controller.
@@ -32,6 +38,9 @@ class StreamOptions:
     patience: float = 2.0
     ping: bool = False
     start_tolerance: float = 0.01
+    tolerance: float | tuple[float, ...] | None = None
+    timed: bool = True
+    speed: float = 1.0
     ignore_status: bool = False
     download_rate: float = 2000.0
     robot_id: int = 0
@@ -53,5 +62,9 @@ class StreamOptions:
             )
         if not 0 < self.start_tolerance < float("inf"):
             raise InputError(f"a start tolerance of {self.start_tolerance}", allowed="above 0 [rad or m]")
+        if self.tolerance is not None and not np.greater(self.tolerance, 0).all():
+            raise InputError(f"a tolerance of {self.tolerance}", allowed="above 0 [rad or m]")
+        if not self.speed > 0:
+            raise InputError(f"a speed of {self.speed}", allowed="above 0")
         if not self.download_rate > 0:
             raise InputError(f"a download rate of {self.download_rate}", allowed="above 0 points a second")

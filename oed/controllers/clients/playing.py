@@ -17,6 +17,7 @@ from oed.controllers.clients.options import StreamOptions
 from oed.controllers.clients.requests import Requests
 from oed.controllers.clients.result import StreamResult
 from oed.controllers.clients.traffic import Traffic
+from oed.controllers.clients.watching import tolerances, watch_of
 from oed.controllers.errors import ControllerError, NoReplyError, PointRefusedError
 from oed.controllers.interrupts import signals_held
 from oed.controllers.links import Endpoint, open_link
@@ -95,6 +96,7 @@ def stream(
     check_trajectory(motion, robot, metadata, file)
     if motion.n > JOINTS:
         raise InputError(f"{motion.n} joints", file=file, allowed=f"up to {JOINTS}, as simple_message has")
+    tolerances(robot, options.tolerance)
     if not dry_run:
         if log is None:
             raise InputError("no log file for the feedback", remedy="give one")
@@ -199,6 +201,8 @@ def _play(
     """Sends all points and waits for the end of the motion."""
     points = trajectory_points(motion, robot.limits, kind=options.points, robot_id=options.robot_id)
     ending = Ending(motion, recorder, options.start_tolerance, options.patience)
+    path = watch_of(motion, robot, options.tolerance, options.timed, 1.0 if recorder.stamped else options.speed)
+    recorder.watch = None if path is None else path.see
 
     def watch() -> None:
         recorder.check()

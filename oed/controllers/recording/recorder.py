@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import threading
 import time
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from os import PathLike
 from typing import Any
 
@@ -69,6 +69,9 @@ class Recorder:
         """The controller's time of the last feedback, or ours where it sends none [s]."""
         self.rest_since = self.last_heard = self._last_row = time.monotonic()
         self.error: OedError | None = None
+        self.watch: Callable[[float, Array], None] | None = None
+        """Sees time and positions of each row; what it raises, `check` raises, and the recording goes on."""
+        self._seen: OedError | None = None
         self.received = 0
         self.rows = 0
         """Rows of the log, once it has ended."""
@@ -107,8 +110,8 @@ class Recorder:
         Raises:
             OedError: a closed link, a full disk, a restarted controller, or a silent one.
         """
-        if self.error is not None:
-            raise self.error
+        if self.error is not None or self._seen is not None:
+            raise self.error or self._seen  # type: ignore[misc]
         silence = time.monotonic() - self._last_row
         if silence > self._patience and self._heard.is_set():
             # A state may come just after the last row; one that still comes later shows a live controller.
@@ -129,6 +132,11 @@ class Recorder:
         if self.lowest is None or self.highest is None:
             return False
         return float(np.abs(self.highest - self.lowest).max()) > tolerance
+
+    @property
+    def stamped(self) -> bool:
+        """Whether rows have times of the controller's clock."""
+        return self._feed.layout is not None and self._feed.layout.stamped
 
     @property
     def has_torque(self) -> bool:
@@ -261,6 +269,11 @@ class Recorder:
         if self.positions is None or np.abs(positions - self.positions).max() > REST:
             self.rest_since = now
         self.positions, self.stamp = positions, stamp
+        if self.watch is not None and self._seen is None:
+            try:
+                self.watch(stamp, positions[: self._robot.n])
+            except OedError as error:
+                self._seen = error
         self.lowest = positions if self.lowest is None else np.minimum(self.lowest, positions)
         self.highest = positions if self.highest is None else np.maximum(self.highest, positions)
         if self._log is None:

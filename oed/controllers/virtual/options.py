@@ -6,6 +6,8 @@ from dataclasses import dataclass, fields
 from typing import Literal
 
 from oed.controllers.links.base import HANDSHAKE
+from oed.controllers.virtual.path_faults import KINDS
+from oed.controllers.virtual.path_faults import Kind as PathKind
 from oed.exports.simple_message import DEFAULT, WireFormat
 from oed.exports.simple_message.kinds import MOTION_PORT, STATE_PORT
 from robots.common.errors import InputError
@@ -29,6 +31,8 @@ class Faults:
         e_stop_after: points after which an emergency stop is pressed.
         restart_after: points after which the controller restarts and forgets everything.
         stuck: no point is ever played, so the buffer never empties.
+        path: what the robot does with its path, see `PathFault`. The torque stays that of the path.
+        path_after: so long after the start of a trajectory [s].
         seed: of the faults.
     """
 
@@ -42,14 +46,20 @@ class Faults:
     e_stop_after: int | None = None
     restart_after: int | None = None
     stuck: bool = False
+    path: PathKind = "none"
+    path_after: float = 0.0
     seed: int = 0
 
     def __post_init__(self) -> None:
         """Checks the ranges.
 
         Raises:
-            InputError: a share outside 0 to 1, a negative time or number.
+            InputError: a share outside 0 to 1, a negative time or number, or an unknown fault of the path.
         """
+        if self.path not in KINDS:
+            raise InputError(f"a path fault {self.path!r}", allowed=", ".join(KINDS))
+        if not self.path_after >= 0:
+            raise InputError(f"path_after is {self.path_after}", allowed="0 s or more")
         for name in ("lose", "double", "late", "reorder"):
             if not 0 <= getattr(self, name) <= 1:
                 raise InputError(f"{name} is {getattr(self, name)}", allowed="a share, 0 to 1")
@@ -57,7 +67,7 @@ class Faults:
             raise InputError(f"late_by is {self.late_by}", allowed="0 to 60 s")
         for item in fields(self):
             value = getattr(self, item.name)
-            if item.name.endswith("_after") and value is not None and value < 0:
+            if item.name.endswith("_after") and item.name != "path_after" and value is not None and value < 0:
                 raise InputError(f"{item.name} is {value}", allowed="zero or more points")
 
     @property

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import Enum
 
 import numpy as np
@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from oed.controllers.virtual.buffer import Outcome, PointBuffer
 from oed.controllers.virtual.options import ControllerOptions
+from oed.controllers.virtual.path_faults import PathFault
 from oed.controllers.virtual.robot import VirtualRobot
 from oed.exports.simple_message import FullPoint, Point, Special
 
@@ -69,7 +70,9 @@ class Player:
         self._phase = Phase.IDLE
         self._error = 0
         self._last_accepted = 0.0
-        self._ticks = 0
+        self._ticks = self._elapsed = 0
+        self._path = PathFault(options.faults.path, options.faults.path_after)
+        self._last: Sample | None = None
         self._refilling = False
         self._numbers: list[int] = []
         self._ahead: list[Sample] = []
@@ -150,7 +153,8 @@ class Player:
         if self._phase == Phase.LOADING and not self._options.faults.stuck:
             waited = now - self._last_accepted > LOAD
             if self._buffer.end and (self._buffer.full or waited or self._buffer is self._download):
-                self._phase, self._ticks = Phase.PLAYING, 0
+                self._phase, self._ticks, self._elapsed, self._last = Phase.PLAYING, 0, 0, None
+                self._path.begin()
                 if self._robot is not None:
                     self._robot.begin(clock)
         if self._phase != Phase.PLAYING:
@@ -222,13 +226,20 @@ class Player:
 
     def _next(self) -> Sample | None:
         """Gives the next sample of the trajectory, or None at the end of the points."""
+        elapsed = self._elapsed * self._options.feedback_period
+        if self._last is not None and self._path.holds(elapsed):
+            self._elapsed += 1
+            return self._last
         if not self._ahead:
             self._look_ahead()
         if not self._ahead:
             return None
         self._buffer.pass_time(self._ticks * self._options.feedback_period)
         self._ticks += 1
-        return self._ahead.pop(0)
+        self._elapsed += 1
+        sample = self._ahead.pop(0)
+        self._last = replace(sample, q=self._path.moved(sample.q, elapsed))
+        return self._last
 
     def _look_ahead(self) -> None:
         period, buffer = self._options.feedback_period, self._buffer
