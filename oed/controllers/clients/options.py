@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
+from oed.controllers.drivers import Driver
 from oed.exports.simple_message.points import PointType
 from robots.common.errors import InputError
 
@@ -15,6 +17,7 @@ class StreamOptions:
     """How a trajectory is sent.
 
     Attributes:
+        driver: profile of the controller's program; None for what the other settings say.
         points: ``full`` for JOINT_TRAJ_PT_FULL, ``short`` for JOINT_TRAJ_PT.
         download: send all points at once without replies, instead of one after the other's reply.
         window: points on their way at once. More than one needs a controller whose replies repeat the point.
@@ -31,6 +34,7 @@ class StreamOptions:
         robot_id: which robot of the controller.
     """
 
+    driver: Driver | None = None
     points: PointType = "full"
     download: bool = False
     window: int = 1
@@ -45,12 +49,36 @@ class StreamOptions:
     download_rate: float = 2000.0
     robot_id: int = 0
 
+    @classmethod
+    def of(cls, driver: Driver, **changes: Any) -> StreamOptions:
+        """Makes the settings of a driver.
+
+        Args:
+            driver: its profile.
+            changes: other settings.
+
+        Raises:
+            InputError: a setting with which the driver does not do what is meant.
+        """
+        usual = {"points": driver.points, "download": driver.download, "timed": driver.timed}
+        return cls(driver=driver, **(usual | changes))
+
     def __post_init__(self) -> None:
         """Checks the settings.
 
         Raises:
-            InputError: an unknown type of points, or a number out of range.
+            InputError: an unknown type of points, a number out of range, or what a driver misreads.
         """
+        driver = self.driver
+        if driver is not None and self.ping and driver.pings != "answered":
+            does = "takes pings for points" if driver.pings == "point" else "ends at a ping"
+            raise InputError(f"{driver.title} {does}", remedy="leave out --ping")
+        if driver is not None and driver.points != self.points and driver.one_form:
+            raise InputError(
+                f"{driver.title} misreads points of type {self.points}",
+                allowed=f"{driver.points}",
+                remedy="leave out --points",
+            )
         if self.points not in ("full", "short"):
             raise InputError(f"points of type {self.points!r}", allowed="full or short")
         if not 1 <= self.window <= 64:

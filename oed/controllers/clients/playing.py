@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from oed.controllers.clients.checks import check_start, check_status, status_problem
+from oed.controllers.clients.checks import check_start, check_status, require_known_form, status_problem
 from oed.controllers.clients.ending import Ending
 from oed.controllers.clients.options import StreamOptions
 from oed.controllers.clients.requests import Requests
@@ -26,7 +26,7 @@ from oed.controllers.recording.log_file import check_log_path
 from oed.controllers.recording.recorder import Recorder
 from oed.controllers.recording.recording import with_rows
 from oed.controllers.recording.reported_joints import require_no_further_joints, warn_of_other_robot
-from oed.exports.simple_message import trajectory_points
+from oed.exports.simple_message import JointPosition, trajectory_points
 from oed.exports.simple_message.kinds import JOINTS
 from oed.exports.trajectory_checks import check_trajectory
 from robots.common.errors import InputError, OedError
@@ -97,6 +97,15 @@ def stream(
     if motion.n > JOINTS:
         raise InputError(f"{motion.n} joints", file=file, allowed=f"up to {JOINTS}, as simple_message has")
     tolerances(robot, options.tolerance)
+    most = None if options.driver is None else options.driver.most
+    if most is not None and len(motion) > most:
+        assert options.driver is not None
+        raise InputError(
+            f"{len(motion)} points",
+            file=file,
+            allowed=f"up to {most}, as {options.driver.title} holds",
+            remedy="play a trajectory with fewer points, or a program of `oed export` on the controller",
+        )
     if not dry_run:
         if log is None:
             raise InputError("no log file for the feedback", remedy="give one")
@@ -122,11 +131,12 @@ def stream(
                 "the robot is moving", remedy="wait for the end of its motion; another client may be playing it"
             )
         check_start(motion.q[0], pose[: robot.n], options.start_tolerance)
-        if needs_torque and not recorder.has_torque:
+        if needs_torque and not recorder.layout.effort:
             raise ControllerError(
                 f"the feedback of {endpoint.place(endpoint.state_port)} carries neither torque nor current",
                 remedy="a controller program must send them (message type 9015)",
             )
+        require_known_form(options, endpoint, recorder.layout.kind is JointPosition)
         with ExitStack() as links:
             requests = None
             # A motion port may belong to a driver that moves on what it does not know, or drops its client.
@@ -199,9 +209,10 @@ def _play(
     motion: Motion, robot: Robot, requests: Requests, recorder: Recorder, options: StreamOptions, progress: Progress
 ) -> None:
     """Sends all points and waits for the end of the motion."""
-    points = trajectory_points(motion, robot.limits, kind=options.points, robot_id=options.robot_id)
+    resting = options.driver.resting_velocity if options.driver is not None else 0.0
+    points = trajectory_points(motion, robot.limits, kind=options.points, robot_id=options.robot_id, resting=resting)
     ending = Ending(motion, recorder, options.start_tolerance, options.patience)
-    path = watch_of(motion, robot, options.tolerance, options.timed, 1.0 if recorder.stamped else options.speed)
+    path = watch_of(motion, robot, options.tolerance, options.timed, 1.0 if recorder.layout.stamped else options.speed)
     recorder.watch = None if path is None else path.see
 
     def watch() -> None:
@@ -214,6 +225,7 @@ def _play(
         watch()
         requests.keep_alive()
 
+    requests.start()
     progress.start("playing", float(len(motion)))
     if options.download:
         requests.download(points, watch, lambda count: progress.update(float(count)))

@@ -9,24 +9,35 @@ from contextlib import suppress
 
 from oed.controllers.clients.channel import Channel
 from oed.controllers.clients.options import StreamOptions
+from oed.controllers.clients.replies import Verdict, answer_of, confirms_stop, described, reason
 from oed.controllers.clients.traffic import Request, Traffic
-from oed.controllers.errors import NoReplyError, PointRefusedError
+from oed.controllers.errors import ControllerError, NoReplyError, PointRefusedError
 from oed.controllers.links import Link
 from oed.exports.simple_message import (
     Bare,
     Comm,
+    Command,
     Frame,
     FullPoint,
     Kind,
+    MotionControl,
+    MotionReply,
     Point,
-    Reply,
+    Result,
     Special,
+    Valid,
     WireFormat,
 )
 from robots.common.errors import OedError
 
 STOPS = 5
 """How often a stop that is not confirmed is sent."""
+
+BUSY = 0.002
+"""A driver that is busy with a point is asked again after so long [s]."""
+
+STARTS = 10.0
+"""How long drives may take to get power [s]."""
 
 TURN = 0.02
 """Longest wait between two looks at what else happens [s]."""
@@ -38,6 +49,38 @@ class Requests(Channel):
     def __init__(self, link: Link, form: WireFormat, options: StreamOptions, traffic: Traffic | None = None) -> None:
         super().__init__(link, form, options, traffic)
         self._unanswered = 0
+        self._came = ""
+
+    @property
+    def _kind(self) -> int:
+        return Kind.JOINT_TRAJ_PT_FULL if self._options.points == "full" else Kind.JOINT_TRAJ_PT
+
+    def start(self) -> None:
+        """Makes a driver ready that must be told to, as Motoman's: its drives get power.
+
+        Raises:
+            ControllerError: it does not become ready; the message says why.
+        """
+        driver = self._options.driver
+        if driver is None or not driver.commands:
+            return
+        order = MotionControl(robot_id=self._options.robot_id, command=Command.START)
+        self._put(self._form.encode(Frame(order, Comm.REQUEST)))
+        end = time.monotonic() + STARTS
+        while (left := end - time.monotonic()) > 0:
+            frame = self._received(left)
+            reply = None if frame is None else frame.message
+            if isinstance(reply, MotionReply) and reply.command == Command.START:
+                if reply.result == Result.SUCCESS:
+                    return
+                raise ControllerError(
+                    f"{driver.title} is not ready: it reports {reason(reply)}",
+                    remedy="clear it at the controller: remote and play mode, no alarm, no emergency stop",
+                )
+        raise ControllerError(
+            f"{driver.title} does not answer its start command for {STARTS:g} s",
+            remedy="check the motion port and --driver",
+        )
 
     def stream(
         self,
@@ -79,12 +122,13 @@ class Requests(Channel):
                 self._unanswered = max(self._unanswered - 1, 0)
                 number = self._answered(frame, waiting)
                 if number is None:
-                    self.traffic.unexpected += 1
+                    self.traffic.unexpected += bool(self._came)
                 else:
                     request = waiting.pop(number)
                     if request.tries == 1:
                         self.traffic.shortest = min(self.traffic.shortest, now - request.first)
                     self.traffic.sent += 1
+                    self._came = ""
                     advance(self.traffic.sent)
                     if not known:
                         known, window = True, 1 if isinstance(frame.message, Bare) else self._options.window
@@ -123,10 +167,14 @@ class Requests(Channel):
 
     def stop(self) -> bool:
         """Orders the robot to stop, several times if need be; says whether the controller confirmed it."""
-        if self._options.points == "full":
-            order: FullPoint | Point = FullPoint(
+        order: FullPoint | Point | MotionControl
+        if self._options.driver is not None and self._options.driver.commands:
+            order = MotionControl(robot_id=self._options.robot_id, command=Command.STOP)
+        elif self._options.points == "full":
+            order = FullPoint(
                 robot_id=self._options.robot_id,
                 sequence=Special.STOP,
+                valid=Valid.NONE,
                 time=0.0,
                 positions=(),
                 velocities=(),
@@ -143,7 +191,7 @@ class Requests(Channel):
                 end = time.monotonic() + (0.5 if self.link.reliable else self._options.reply_time)
                 while (left := end - time.monotonic()) > 0:
                     frame = self._received(left)
-                    if frame is None or frame.comm != Comm.REPLY or not _confirms_stop(frame, order):
+                    if frame is None or frame.comm != Comm.REPLY or not confirms_stop(frame, self._kind):
                         continue
                     if not isinstance(frame.message, Bare) or not doubtful:
                         self.traffic.stopped = True
@@ -187,25 +235,34 @@ class Requests(Channel):
         return min(TURN, max(0.0, oldest + self._options.reply_time - time.monotonic()))
 
     def _answered(self, frame: Frame, waiting: OrderedDict[int, Request]) -> int | None:
-        """Gives the number of the point that a reply is for; None for one that is not expected."""
-        if frame.message.kind != (Kind.JOINT_TRAJ_PT_FULL if self._options.points == "full" else Kind.JOINT_TRAJ_PT):
+        """Gives the number of the point that a reply confirms; None for one that confirms none."""
+        answer = answer_of(frame, self._kind)
+        number, oldest = answer.number, next(iter(waiting))
+        # Drivers need not repeat the number. By TCP replies come in the order of the points.
+        if number is None or (number <= 0 and number not in waiting and self.link.reliable):
+            number = oldest
+        if answer.verdict == Verdict.OTHER or number not in waiting:
+            self._came = described(frame)
             return None
-        number = next(iter(waiting)) if isinstance(frame.message, Bare) else frame.message.sequence  # type: ignore[union-attr]
-        if number not in waiting:
-            return None
-        if frame.reply != Reply.SUCCESS:
+        if answer.verdict == Verdict.REFUSED:
             raise PointRefusedError(
-                f"the controller refuses point {number}",
+                f"the controller refuses point {number}" + (f": it reports {answer.why}" if answer.why else ""),
                 remedy="see its display: a limit, an error, a lost point or an empty buffer are usual causes",
             )
+        if answer.verdict == Verdict.BUSY:
+            time.sleep(BUSY)
+            self._put(waiting[number].data)
+            waiting[number].tries += 1
+            return None
         return int(number)
 
     def _again(self, waiting: OrderedDict[int, Request], now: float, patience: float) -> None:
         """Sends again what was not answered, up to the patience."""
         for number, request in waiting.items():
             if now - request.first > patience:
+                came = f"; {self._came} came instead" if self._came else ""
                 raise NoReplyError(
-                    f"no reply to point {number} for {now - request.first:.1f} s from {self.link.place}",
+                    f"no reply to point {number} for {now - request.first:.1f} s from {self.link.place}{came}",
                     remedy="check the controller and the network",
                 )
             if not self.link.reliable and now - request.sent >= self._options.reply_time:
@@ -223,9 +280,3 @@ class Requests(Channel):
                 self._unanswered = max(self._unanswered - 1, 0)
                 self.traffic.unexpected += 1
                 most -= 1
-
-
-def _confirms_stop(frame: Frame, order: FullPoint | Point) -> bool:
-    if frame.message.kind != order.kind or frame.reply != Reply.SUCCESS:
-        return False
-    return isinstance(frame.message, Bare) or getattr(frame.message, "sequence", None) == Special.STOP

@@ -15,10 +15,19 @@ from oed.controllers.errors import LinkError, ProtocolError, RecordingError
 from oed.controllers.links import Link
 from oed.controllers.recording.clock import ClockAnchor
 from oed.controllers.recording.feed import Feed
-from oed.controllers.recording.feedback import coarse_clock
+from oed.controllers.recording.feedback import Layout, coarse_clock
 from oed.controllers.recording.log_file import FeedbackLog
 from oed.controllers.recording.statistics import Statistics
-from oed.exports.simple_message import Comm, Frame, Message, MessageError, Ping, Reply, Status, WireFormat
+from oed.exports.simple_message import (
+    Comm,
+    Frame,
+    Message,
+    MessageError,
+    Ping,
+    Reply,
+    Status,
+    WireFormat,
+)
 from robots.common.errors import OedError
 from robots.robot import Robot
 
@@ -134,14 +143,10 @@ class Recorder:
         return float(np.abs(self.highest - self.lowest).max()) > tolerance
 
     @property
-    def stamped(self) -> bool:
-        """Whether rows have times of the controller's clock."""
-        return self._feed.layout is not None and self._feed.layout.stamped
-
-    @property
-    def has_torque(self) -> bool:
-        """Whether the feedback carries torque or current."""
-        return self._feed.layout is not None and bool(self._feed.layout.effort)
+    def layout(self) -> Layout:
+        """What the feedback carries, once there is any."""
+        assert self._feed.layout is not None
+        return self._feed.layout
 
     def renewed_status(self) -> Status | None:
         """Waits for a state that is reported from now on; gives the last one where none comes in time."""

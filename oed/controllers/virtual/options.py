@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, fields
-from typing import Literal
+from typing import Any, Literal, get_args
 
+from oed.controllers.drivers import Driver
+from oed.controllers.drivers.base import Replies
 from oed.controllers.links.base import HANDSHAKE
 from oed.controllers.virtual.path_faults import KINDS
 from oed.controllers.virtual.path_faults import Kind as PathKind
@@ -81,6 +83,7 @@ class ControllerOptions:
     """How the controller behaves.
 
     Attributes:
+        driver: profile of the program that it stands for; None for what the other settings say.
         host: address to listen at.
         transport: udp or tcp.
         motion_port: takes points; 0 for any free one.
@@ -89,10 +92,11 @@ class ControllerOptions:
         handshake: the byte that opens a link by UDP.
         capacity: points that the buffer holds.
         feedback: ``position`` is the thesis' message, ``full`` has time, velocity and acceleration, ``torque`` also
-            torque (a type of our own).
+            torque (a type of our own); ``feedback`` has positions only, as Motoman's.
         feedback_period: between two feedback messages [s].
+        feedback_every: of so many periods one message is sent.
         status: whether status messages are sent, ten a second.
-        replies: ``bare`` is the thesis' reply without a body; ``echo`` repeats the point.
+        replies: see `Driver.replies`.
         speed: how many times faster than real time.
         wait_for_points: whether an empty buffer makes time stand still instead of being an error.
         state: ``ready``, or what keeps the controller from moving: ``error``, ``e-stop``, ``manual``, ``drives-off``.
@@ -100,6 +104,7 @@ class ControllerOptions:
         faults: what goes wrong.
     """
 
+    driver: Driver | None = None
     host: str = "127.0.0.1"
     transport: Literal["udp", "tcp"] = "udp"
     motion_port: int = MOTION_PORT
@@ -107,15 +112,39 @@ class ControllerOptions:
     form: WireFormat = DEFAULT
     handshake: int = HANDSHAKE
     capacity: int = CAPACITY
-    feedback: Literal["position", "full", "torque"] = "torque"
+    feedback: Literal["position", "feedback", "full", "torque"] = "torque"
     feedback_period: float = 0.004
+    feedback_every: int = 1
     status: bool = True
-    replies: Literal["bare", "echo"] = "bare"
+    replies: Replies = "bare"
     speed: float = 1.0
     wait_for_points: bool = False
     state: Literal["ready", "error", "e-stop", "manual", "drives-off"] = "ready"
     start_tolerance: float = 0.05
     faults: Faults = Faults()
+
+    @classmethod
+    def of(cls, driver: Driver, **changes: Any) -> ControllerOptions:
+        """Makes a controller that behaves as a driver does.
+
+        Args:
+            driver: its profile.
+            changes: other settings.
+
+        Raises:
+            InputError: see `ControllerOptions`.
+        """
+        usual = {
+            "transport": driver.transport,
+            "motion_port": driver.motion_port,
+            "state_port": driver.state_port,
+            "form": WireFormat(byte_order=driver.byte_order),
+            "capacity": driver.capacity,
+            "feedback": driver.feedback,
+            "feedback_every": max(round(driver.feedback_period / 0.004), 1),
+            "replies": driver.replies,
+        }
+        return cls(driver=driver, **(usual | changes))
 
     def __post_init__(self) -> None:
         """Checks the settings.
@@ -125,8 +154,8 @@ class ControllerOptions:
         """
         choices = {
             "transport": ("udp", "tcp"),
-            "feedback": ("position", "full", "torque"),
-            "replies": ("bare", "echo"),
+            "feedback": ("position", "feedback", "full", "torque"),
+            "replies": get_args(Replies),
             "state": ("ready", "error", "e-stop", "manual", "drives-off"),
         }
         for name, allowed in choices.items():

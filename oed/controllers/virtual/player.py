@@ -167,7 +167,7 @@ class Player:
             self.pose = sample.q
             return sample
         buffer = self._buffer
-        if buffer.at_rest:
+        if buffer.at_rest or self._stands:
             if now - self._last_accepted > LOAD:
                 self._phase = Phase.IDLE
                 self.played_trajectories += 1
@@ -182,7 +182,11 @@ class Player:
     @property
     def _exhausted(self) -> bool:
         buffer = self._buffer
-        return buffer.end > 0 and buffer.played == buffer.end and buffer.at_rest
+        return buffer.end > 0 and buffer.played == buffer.end and (buffer.at_rest or self._stands)
+
+    @property
+    def _stands(self) -> bool:
+        return self._options.driver is not None and self._options.driver.stands
 
     def _count(self, now: float) -> None:
         self.accepted += 1
@@ -218,6 +222,9 @@ class Player:
         if self._buffer is not buffer or number < 0:
             self.fail(GAP)
             return None
+        most = None if self._options.driver is None else self._options.driver.most
+        if most is not None and len(self._numbers) >= most - 1:
+            return Outcome.KNOWN
         outcome = buffer.accept(number, point)
         if outcome == Outcome.ACCEPTED:
             self.accepted += 1
@@ -247,7 +254,7 @@ class Player:
             return
         count = int(np.floor(buffer.points[-1].time / period + 1e-3)) + 1 - self._ticks
         # Points without velocities are not differentiated at the edge of what is known.
-        if buffer.points[-1].dq is None and not buffer.at_rest:
+        if buffer.points[-1].dq is None and not buffer.at_rest and not self._stands:
             count -= 2
         if count <= 0:
             return

@@ -18,6 +18,7 @@ from tests.oed.controllers.conftest import swing
 from tests.oed.controllers.drivers import REQUEST, FanucReader, FramedReader, Tap, points_seen
 
 HANDSHAKE = 0x8E
+SHORT = StreamOptions(points="short")
 ORDERS = {"little": "<", "big": ">"}
 
 
@@ -59,7 +60,7 @@ def test_dry_runs_only_listen(transport: str, order: str, robot) -> None:
     """The motion port is not even opened, and the state port gets no byte but the one that opens a link by UDP."""
     with Tap(transport, ORDERS[order]) as tap:
         place = place_of(tap, transport, order)
-        result = stream(swing(robot), robot, place, dry_run=True)
+        result = stream(swing(robot), robot, place, dry_run=True, options=SHORT)
         read_pose(robot, place)
     assert "nothing was sent" in result.summary()
     assert (tap.connections, tap.motion) == (0, b"")
@@ -72,14 +73,14 @@ def test_dry_runs_only_listen(transport: str, order: str, robot) -> None:
 def test_dry_runs_answer_no_requests(transport: str, robot) -> None:
     """The echo of a requested position is a joint point to a driver; a dry run leaves it out."""
     with Tap(transport, comm=REQUEST) as tap:
-        stream(swing(robot), robot, place_of(tap, transport), dry_run=True)
+        stream(swing(robot), robot, place_of(tap, transport), dry_run=True, options=SHORT)
     assert set(tap.state) <= {HANDSHAKE}
 
 
 @pytest.mark.slow
 def test_pings_are_sent_on_demand_only(robot) -> None:
     """Who asks a dry run for pings gets them: they are what an explicit ``ping`` means."""
-    options = StreamOptions(ping=True, patience=0.3)
+    options = StreamOptions(points="short", ping=True, patience=0.3)
     with Tap("tcp") as tap:
         place = replace(place_of(tap, "tcp"), connect_time=0.5)
         with pytest.raises(ProtocolError, match="does not answer a ping"):
@@ -93,7 +94,7 @@ def test_refused_starts_send_nothing(transport: str, robot, log: Path) -> None:
     """An emergency stop ends the command before any byte but the handshake reaches the motion port, stops included."""
     motion = swing(robot)
     with Tap(transport, e_stopped=True) as tap, pytest.raises(ControllerError, match="emergency stop"):
-        stream(motion, robot, place_of(tap, transport), log=log)
+        stream(motion, robot, place_of(tap, transport), log=log, options=SHORT)
     assert set(tap.motion) <= {HANDSHAKE}
     with Tap(transport) as tap:
         away = Motion(motion.t, motion.q + 0.2, motion.dq, motion.ddq)
@@ -110,3 +111,12 @@ def test_recordings_send_nothing(transport: str, robot, log: Path) -> None:
         record(robot, place_of(tap, transport), log, duration=0.3)
     assert (tap.connections, tap.motion) == (0, b"")
     assert set(tap.state) <= {HANDSHAKE}
+
+
+@pytest.mark.slow
+def test_full_points_need_a_known_driver(robot, log: Path) -> None:
+    """By TCP a controller that reports positions only may be Fanuc's, to which a full point is two: it gets none."""
+    with Tap("tcp") as tap, pytest.raises(InputError, match=r"state its driver .*or send short points"):
+        stream(swing(robot), robot, place_of(tap, "tcp"), log=log)
+    assert tap.motion == b""
+    assert not log.exists()
