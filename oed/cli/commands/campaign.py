@@ -14,6 +14,7 @@ from oed.cli.console import Console
 from oed.cli.links import (
     ByteOrderOption,
     DownloadOption,
+    DriverOption,
     HandshakeOption,
     MotionPortOption,
     PatienceOption,
@@ -28,8 +29,8 @@ from oed.cli.links import (
     WindowOption,
     endpoint,
     is_given,
-    path_tolerance,
     refuse_without_host,
+    stream_options,
 )
 from oed.cli.options import (
     ClusterOption,
@@ -106,6 +107,7 @@ def campaign(
             show_default=False,
         ),
     ] = None,
+    driver: DriverOption = None,
     transport: TransportOption = "udp",
     motion_port: MotionPortOption = 11000,
     state_port: StatePortOption = 11002,
@@ -157,7 +159,7 @@ def campaign(
         described = robot_from(robot, tip, joints, lock, unlimited=unlimited)
         place = None
         if run is not None:
-            place = endpoint(run, transport, motion_port, state_port, byte_order, real_bytes, handshake)
+            place = endpoint(context, run)
         if place is not None and (out / "campaign.json").exists():
             if force:
                 raise InputError(
@@ -207,19 +209,9 @@ def campaign(
         summary = f"{result.summary()}\nwritten to {out.resolve()}"
         if place is not None:
             from oed.campaigns.runs import run_campaign
-            from oed.controllers import StreamOptions
             from oed.controllers.interrupts import terminate_as_interrupt
 
-            options = StreamOptions(
-                points=points,  # type: ignore[arg-type]
-                download=download,
-                window=window,
-                patience=patience,
-                start_tolerance=start_tolerance,
-                ping=ping,
-                tolerance=path_tolerance(tolerance),
-                speed=speed,
-            )
+            options = stream_options(context, speed=speed)
             try:
                 with terminate_as_interrupt():
                     played = run_campaign(

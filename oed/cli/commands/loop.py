@@ -12,6 +12,7 @@ from oed.cli.console import Console
 from oed.cli.links import (
     ByteOrderOption,
     DownloadOption,
+    DriverOption,
     HandshakeOption,
     HostOption,
     MotionPortOption,
@@ -26,7 +27,7 @@ from oed.cli.links import (
     TransportOption,
     WindowOption,
     endpoint,
-    path_tolerance,
+    stream_options,
 )
 from oed.cli.options import (
     ClusterOption,
@@ -50,6 +51,7 @@ from oed.cli.options import (
 
 
 def loop(
+    context: typer.Context,
     robot: RobotOption,
     host: HostOption,
     experiments: Annotated[
@@ -82,6 +84,7 @@ def loop(
     seed: SeedOption = 0,
     workers: WorkersOption = None,
     cluster: ClusterOption = None,
+    driver: DriverOption = None,
     transport: TransportOption = "udp",
     motion_port: MotionPortOption = 11000,
     state_port: StatePortOption = 11002,
@@ -115,13 +118,12 @@ def loop(
     console = Console(json=json, quiet=quiet)
     with console.working() as progress:
         from oed.campaigns.loops import LoopOptions, run_loop
-        from oed.controllers import StreamOptions
         from oed.controllers.interrupts import terminate_as_interrupt
         from oed.reports import save_diagnosis_report, save_loop_report
         from robots.common.files import ResultFolder
 
         described = robot_from(robot, tip, joints, lock, unlimited=unlimited)
-        place = endpoint(host, transport, motion_port, state_port, byte_order, real_bytes, handshake)
+        place = endpoint(context, host)
         try:
             with executor_from(workers, cluster) as executor, terminate_as_interrupt():
                 result = run_loop(
@@ -139,16 +141,7 @@ def loop(
                         collision=collision,
                         seed=seed,
                     ),
-                    stream_options=StreamOptions(
-                        points=points,  # type: ignore[arg-type]
-                        download=download,
-                        window=window,
-                        patience=patience,
-                        start_tolerance=start_tolerance,
-                        ping=ping,
-                        tolerance=path_tolerance(tolerance),
-                        speed=speed,
-                    ),
+                    stream_options=stream_options(context, speed=speed),
                     speed=speed,
                     workers=workers,
                     executor=executor,

@@ -10,6 +10,7 @@ import typer
 from oed.cli.console import Console
 from oed.cli.links import (
     ByteOrderOption,
+    DriverOption,
     HandshakeOption,
     HostOption,
     PatienceOption,
@@ -31,12 +32,14 @@ from oed.cli.options import (
 
 
 def record(
+    context: typer.Context,
     robot: RobotOption,
     host: HostOption,
     log: Annotated[Path, typer.Option("--log", help="Log file to write, .csv.")] = Path("log.csv"),
     duration: Annotated[
         float | None, typer.Option("--duration", help="Stop after so long [s]. Default: Ctrl-C.", show_default=False)
     ] = None,
+    driver: DriverOption = None,
     transport: TransportOption = "udp",
     state_port: StatePortOption = 11002,
     byte_order: ByteOrderOption = "little",
@@ -59,7 +62,7 @@ def record(
         from oed.controllers import record as listen
         from oed.controllers.interrupts import terminate_as_interrupt
 
-        place = endpoint(host, transport, 11000, state_port, byte_order, real_bytes, handshake)
+        place = endpoint(context, host)
         described = robot_from(robot, tip, joints, lock)
         with terminate_as_interrupt():
             result = listen(described, place, log, duration=duration, patience=patience, force=force, progress=progress)

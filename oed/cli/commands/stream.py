@@ -12,6 +12,7 @@ from oed.cli.console import Console
 from oed.cli.links import (
     ByteOrderOption,
     DownloadOption,
+    DriverOption,
     HandshakeOption,
     HostOption,
     MotionPortOption,
@@ -25,7 +26,7 @@ from oed.cli.links import (
     TransportOption,
     WindowOption,
     endpoint,
-    path_tolerance,
+    stream_options,
 )
 from oed.cli.options import (
     ROBOT,
@@ -40,6 +41,7 @@ from oed.cli.options import (
 
 
 def stream(
+    context: typer.Context,
     trajectory: Annotated[Path, typer.Argument(help="A trajectory.csv.", show_default=False)],
     host: HostOption,
     log: Annotated[Path, typer.Option("--log", help="Log file to write, .csv.")] = Path("log.csv"),
@@ -49,6 +51,7 @@ def stream(
             "--robot", help=f"The robot: {ROBOT}. Default: the robot named in the trajectory file.", show_default=False
         ),
     ] = None,
+    driver: DriverOption = None,
     transport: TransportOption = "udp",
     motion_port: MotionPortOption = 11000,
     state_port: StatePortOption = 11002,
@@ -85,24 +88,12 @@ def stream(
     """
     console = Console(json=json, quiet=quiet)
     with console.working() as progress:
-        from oed.controllers import StreamOptions
         from oed.controllers import stream as play
         from oed.controllers.interrupts import terminate_as_interrupt
         from oed.exports import read_trajectory
 
-        place = endpoint(host, transport, motion_port, state_port, byte_order, real_bytes, handshake)
-        options = StreamOptions(
-            points=points,  # type: ignore[arg-type]
-            download=download,
-            window=window,
-            reply_time=reply_time,
-            patience=patience,
-            ping=ping,
-            tolerance=path_tolerance(tolerance),
-            start_tolerance=start_tolerance,
-            ignore_status=ignore_status,
-            robot_id=robot_id,
-        )
+        place = endpoint(context, host)
+        options = stream_options(context, reply_time=reply_time, ignore_status=ignore_status, robot_id=robot_id)
         motion, metadata = read_trajectory(trajectory)
         described = robot_of_file(robot, metadata, trajectory, tip, joints, lock)
         try:
