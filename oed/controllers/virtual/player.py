@@ -167,15 +167,15 @@ class Player:
             self.pose = sample.q
             return sample
         buffer = self._buffer
+        if self._options.wait_for_points and not buffer.at_rest and now - self._last_accepted < GONE:
+            # Piece by piece: one point at a time would cost a simulation each.
+            self._refilling = True
+            return None
         if buffer.at_rest or self._stands:
             if now - self._last_accepted > LOAD:
                 self._phase = Phase.IDLE
                 self.played_trajectories += 1
             return self._stand(heard)
-        if self._options.wait_for_points and now - self._last_accepted < GONE:
-            # Piece by piece: one point at a time would cost a simulation each.
-            self._refilling = True
-            return None
         self.fail(UNDERRUN)
         return self._stand(heard)
 
