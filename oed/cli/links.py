@@ -21,6 +21,12 @@ DriverOption = Annotated[
         show_default=False,
     ),
 ]
+ExternalAxesOption = Annotated[
+    bool,
+    typer.Option(
+        "--external-axes", help="The controller has axes behind those of the robot: they stay where they are."
+    ),
+]
 TransportOption = Annotated[str, typer.Option("--transport", help="udp or tcp.")]
 MotionPortOption = Annotated[int, typer.Option("--motion-port", help="Port that takes points.")]
 StatePortOption = Annotated[int, typer.Option("--state-port", help="Port that gives feedback.")]

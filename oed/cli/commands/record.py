@@ -11,6 +11,7 @@ from oed.cli.console import Console
 from oed.cli.links import (
     ByteOrderOption,
     DriverOption,
+    ExternalAxesOption,
     HandshakeOption,
     HostOption,
     PatienceOption,
@@ -46,6 +47,7 @@ def record(
     real_bytes: RealBytesOption = 4,
     handshake: HandshakeOption = "0x8E",
     patience: PatienceOption = 2.0,
+    external_axes: ExternalAxesOption = False,
     tip: TipOption = None,
     joints: JointsOption = None,
     lock: LockOption = None,
@@ -65,5 +67,14 @@ def record(
         place = endpoint(context, host)
         described = robot_from(robot, tip, joints, lock)
         with terminate_as_interrupt():
-            result = listen(described, place, log, duration=duration, patience=patience, force=force, progress=progress)
+            result = listen(
+                described,
+                place,
+                log,
+                duration=duration,
+                patience=patience,
+                external_axes=external_axes,
+                force=force,
+                progress=progress,
+            )
     console.result(result.summary(), result.to_dict())

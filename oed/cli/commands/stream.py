@@ -13,6 +13,7 @@ from oed.cli.links import (
     ByteOrderOption,
     DownloadOption,
     DriverOption,
+    ExternalAxesOption,
     HandshakeOption,
     HostOption,
     MotionPortOption,
@@ -61,6 +62,13 @@ def stream(
     points: PointsOption = "full",
     download: DownloadOption = False,
     window: WindowOption = 1,
+    period: Annotated[
+        float | None,
+        typer.Option(
+            "--period", help="Time between two points [s]. Default: that of the trajectory.", show_default=False
+        ),
+    ] = None,
+    external_axes: ExternalAxesOption = False,
     reply_time: Annotated[
         float, typer.Option("--reply-time", help="UDP: send a point again after so long without a reply [s].")
     ] = 0.1,
@@ -91,10 +99,15 @@ def stream(
         from oed.controllers import stream as play
         from oed.controllers.interrupts import terminate_as_interrupt
         from oed.exports import read_trajectory
+        from oed.exports.forms.sampling import at_period
 
         place = endpoint(context, host)
-        options = stream_options(context, reply_time=reply_time, ignore_status=ignore_status, robot_id=robot_id)
+        options = stream_options(
+            context, reply_time=reply_time, ignore_status=ignore_status, robot_id=robot_id, external_axes=external_axes
+        )
         motion, metadata = read_trajectory(trajectory)
+        if period is not None:
+            motion = at_period(motion, period)
         described = robot_of_file(robot, metadata, trajectory, tip, joints, lock)
         try:
             with terminate_as_interrupt():

@@ -32,6 +32,8 @@ class StreamOptions:
         ignore_status: start in spite of a reported error, emergency stop or manual mode.
         download_rate: points a second of a download by UDP.
         robot_id: which robot of the controller.
+        external_axes: whether the controller has axes behind those of the robot. Points hold them where they are
+            reported; otherwise such a controller is refused.
     """
 
     driver: Driver | None = None
@@ -48,6 +50,7 @@ class StreamOptions:
     ignore_status: bool = False
     download_rate: float = 2000.0
     robot_id: int = 0
+    external_axes: bool = False
 
     @classmethod
     def of(cls, driver: Driver, **changes: Any) -> StreamOptions:

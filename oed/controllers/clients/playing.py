@@ -104,7 +104,7 @@ def stream(
             f"{len(motion)} points",
             file=file,
             allowed=f"up to {most}, as {options.driver.title} holds",
-            remedy="play a trajectory with fewer points, or a program of `oed export` on the controller",
+            remedy="play it with a longer --period, or a program of `oed export` on the controller",
         )
     if not dry_run:
         if log is None:
@@ -125,7 +125,8 @@ def stream(
     failure: OedError | None = None
     try:
         pose = recorder.wait_for_feedback()
-        require_no_further_joints(pose[robot.n :], robot)
+        if not options.external_axes:
+            require_no_further_joints(pose[robot.n :], robot)
         if not options.ignore_status and recorder.is_moving(options.start_tolerance):
             raise ControllerError(
                 "the robot is moving", remedy="wait for the end of its motion; another client may be playing it"
@@ -209,8 +210,17 @@ def _play(
     motion: Motion, robot: Robot, requests: Requests, recorder: Recorder, options: StreamOptions, progress: Progress
 ) -> None:
     """Sends all points and waits for the end of the motion."""
+    # Zero is a place to go to, for an axis that there is.
+    further = tuple(recorder.positions[robot.n :].tolist()) if recorder.positions is not None else ()
     resting = options.driver.resting_velocity if options.driver is not None else 0.0
-    points = trajectory_points(motion, robot.limits, kind=options.points, robot_id=options.robot_id, resting=resting)
+    points = trajectory_points(
+        motion,
+        robot.limits,
+        kind=options.points,
+        robot_id=options.robot_id,
+        resting=resting,
+        further=further,
+    )
     ending = Ending(motion, recorder, options.start_tolerance, options.patience)
     path = watch_of(motion, robot, options.tolerance, options.timed, 1.0 if recorder.layout.stamped else options.speed)
     recorder.watch = None if path is None else path.see

@@ -66,7 +66,7 @@ class Recorder:
         self._log: FeedbackLog | None = None
         self._feed = Feed(robot.n, form)
         self._offset, self._clock = 0.0, "controller"
-        self.statistics = Statistics()
+        self.statistics = Statistics(link.reliable)
         self.status: Status | None = None
         self._status_count = 0
         self.positions: Array | None = None
@@ -191,7 +191,7 @@ class Recorder:
             known["clock_offset"] = offset + late
         log = FeedbackLog(path, layout.columns, layout.units(units), known, digits=layout.digits, force=force)
         with self._lock:
-            self.statistics = Statistics()
+            self.statistics = Statistics(self._link.reliable)
             self.statistics.stamped = layout.stamped
             self._feed.forget()
             self._offset = offset

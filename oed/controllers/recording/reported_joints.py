@@ -31,7 +31,7 @@ def require_no_further_joints(unused: Array, robot: Robot) -> None:
         raise InputError(
             f"the controller reports a joint {joint}, {robot.name} has {robot.n}",
             joint=joint,
-            remedy="the controller is of another robot: correct --robot",
+            remedy="the controller is of another robot: correct --robot; or these are external axes: --external-axes",
         )
 
 

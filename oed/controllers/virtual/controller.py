@@ -20,22 +20,24 @@ from oed.controllers.virtual.player import REPORTED, Outcome, Player
 from oed.controllers.virtual.ports import Client, Port
 from oed.controllers.virtual.robot import VirtualRobot
 from oed.exports.simple_message import (
-    Bare,
     Comm,
     Frame,
     FullPoint,
-    Kind,
     MessageError,
     Ping,
     Point,
     Reply,
     Special,
+    Valid,
 )
 from robots.common.errors import InputError
 from robots.plants import Plant, nominal_plant
 from robots.robot import Robot
 
 Array = NDArray[np.float64]
+
+NEEDED = Valid.TIME | Valid.POSITION
+"""What a point must state."""
 
 STATUS_PERIOD = 0.1
 WAITING = 256
@@ -90,6 +92,7 @@ class VirtualController:
     def _start_over(self, pose: Array) -> None:
         self._player = Player(pose, self._virtual, self.options)
         self._commands = MotomanProgram()
+        self._external = self.options.external
         self._waiting: dict[tuple[Client, int], Frame] = {}
         self._clock_ticks = self._sent = 0
         self._due_from = time.monotonic()
@@ -179,13 +182,7 @@ class VirtualController:
                 self._player.clear_error()
             self._send(port, client, answer)
             return
-        if client not in port.clients:
-            return
-        if len(data) == 1:
-            if port is self._motion and self.options.driver is not None and self.options.driver.one_handshake:
-                # The thesis' program stores the point again that it holds, and replies.
-                stale = Frame(Bare(kind=Kind.JOINT_TRAJ_PT_FULL), Comm.REPLY, Reply.SUCCESS)
-                self._send(port, client, self.options.form.encode(stale))
+        if client not in port.clients or len(data) == 1:
             return
         try:
             if port is self._motion and self._fixed is not None:
@@ -231,6 +228,12 @@ class VirtualController:
         if self._state_now != "ready":
             self._answer(client, frame, Reply.FAILURE)
             return
+        if isinstance(message, FullPoint) and message.valid & NEEDED != NEEDED:
+            self._answer(client, frame, Reply.FAILURE)
+            return
+        if self._external:
+            n = len(self._player.pose)
+            self._external = message.positions[n : n + len(self._external)]
         outcome = self._player.put(message, time.monotonic(), streaming=frame.comm == Comm.REQUEST)
         if outcome == Outcome.FULL:
             if len(self._waiting) < WAITING:
@@ -282,7 +285,8 @@ class VirtualController:
             self._clock_ticks += 1
             if self._state.clients and self._clock_ticks % self.options.feedback_every == 0:
                 self._sent += 1
-                data = self.options.form.encode(feedback_frame(sample, clock, self._sent, self.options.feedback))
+                feedback = feedback_frame(sample, clock, self._sent, self.options.feedback, self._external)
+                data = self.options.form.encode(feedback)
                 for client in list(self._state.clients):
                     self._send(self._state, client, data)
                 if self.options.status and clock >= self._status_due:

@@ -53,7 +53,7 @@ def motion_reply(asked: Message, result: Result, subcode: int = 0) -> Frame:
     )
 
 
-def feedback_frame(sample: Sample, clock: float, number: int, kind: str) -> Frame:
+def feedback_frame(sample: Sample, clock: float, number: int, kind: str, external: tuple[float, ...] = ()) -> Frame:
     """Reports what the robot does.
 
     Args:
@@ -61,8 +61,10 @@ def feedback_frame(sample: Sample, clock: float, number: int, kind: str) -> Fram
         clock: the controller's time [s].
         number: of the message.
         kind: see `ControllerOptions.feedback`.
+        external: positions of further axes.
     """
     q, dq, ddq = (tuple(values.tolist()) for values in (sample.q, sample.dq, sample.ddq))
+    q = (*q, *external)
     if kind == "position":
         return Frame(JointPosition(sequence=number, positions=q))
     if kind == "feedback":

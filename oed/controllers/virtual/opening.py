@@ -5,7 +5,7 @@ from __future__ import annotations
 from oed.controllers.virtual.fixed_packets import FixedPackets
 from oed.controllers.virtual.options import ControllerOptions
 from oed.controllers.virtual.ports import Port, TcpPort, UdpPort
-from oed.exports.simple_message import Splitter
+from oed.exports.simple_message import Bare, Comm, Frame, Kind, Reply, Splitter
 
 RECORDERS = 16
 """Clients of the state port."""
@@ -23,11 +23,13 @@ def open_ports(options: ControllerOptions) -> tuple[Port, Port]:
     if o.transport == "tcp":
         motion: Port = TcpPort(o.host, o.motion_port, lambda: cut(o.form), 1)
     else:
-        motion = UdpPort(o.host, o.motion_port, o.handshake, 1, once)
+        # The thesis' program stores the point again that it holds, and replies.
+        stale = o.form.encode(Frame(Bare(kind=Kind.JOINT_TRAJ_PT_FULL), Comm.REPLY, Reply.SUCCESS)) if once else None
+        motion = UdpPort(o.host, o.motion_port, o.handshake, 1, once, stale)
     try:
         if o.transport == "tcp":
             return motion, TcpPort(o.host, o.state_port, lambda: Splitter(o.form), RECORDERS)
-        return motion, UdpPort(o.host, o.state_port, o.handshake, 1 if once else RECORDERS, once)
+        return motion, UdpPort(o.host, o.state_port, o.handshake, 1 if once else RECORDERS, once, None)
     except BaseException:
         motion.close()
         raise

@@ -100,6 +100,7 @@ class ControllerOptions:
         speed: how many times faster than real time.
         wait_for_points: whether an empty buffer makes time stand still instead of being an error.
         state: ``ready``, or what keeps the controller from moving: ``error``, ``e-stop``, ``manual``, ``drives-off``.
+        external: where axes stand that the controller has behind those of the robot [rad or m].
         start_tolerance: farthest first point from the pose [rad or m].
         faults: what goes wrong.
     """
@@ -120,6 +121,7 @@ class ControllerOptions:
     speed: float = 1.0
     wait_for_points: bool = False
     state: Literal["ready", "error", "e-stop", "manual", "drives-off"] = "ready"
+    external: tuple[float, ...] = ()
     start_tolerance: float = 0.05
     faults: Faults = Faults()
 

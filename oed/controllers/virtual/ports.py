@@ -83,15 +83,16 @@ class UdpPort(Port):
         number: of the port; 0 for a free one.
         handshake: the byte that opens a link.
         most: clients at once; a further one waits until one is silent, or takes its place where `take_over`.
-        once: whether only the first handshake is answered. Any later datagram of one byte is no handshake then.
+        once: whether only the first handshake is answered as one.
+        stale: what its client gets for a later one; None for nothing.
     """
 
-    def __init__(self, host: str, number: int, handshake: int, most: int, once: bool = False) -> None:
+    def __init__(self, host: str, number: int, handshake: int, most: int, once: bool, stale: bytes | None) -> None:
         super().__init__(most)
         self._socket = listening(host, number, socket.SOCK_DGRAM)
         self._socket.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, BUFFER)
         self._byte = bytes([handshake])
-        self._once = once
+        self._once, self._stale = once, stale
         self.number = self._socket.getsockname()[1]
 
     def sockets(self) -> list[socket.socket]:
@@ -123,7 +124,7 @@ class UdpPort(Port):
             return data
         if client in self.clients:
             self.clients[client] = now
-        return None
+        return self._stale if data == self._byte and client in self.clients else None
 
     def send(self, client: Client, data: bytes) -> None:
         """Sends one datagram; a full buffer of the system loses it."""

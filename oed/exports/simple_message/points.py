@@ -17,7 +17,13 @@ PointType = Literal["full", "short"]
 
 
 def trajectory_points(
-    motion: Motion, limits: Limits | None = None, *, kind: PointType = "full", robot_id: int = 0, resting: float = 0.0
+    motion: Motion,
+    limits: Limits | None = None,
+    *,
+    kind: PointType = "full",
+    robot_id: int = 0,
+    resting: float = 0.0,
+    further: tuple[float, ...] = (),
 ) -> Iterator[FullPoint | Point]:
     """Makes the points of a motion, numbered from 0.
 
@@ -26,6 +32,7 @@ def trajectory_points(
         limits: velocity limits, for the share of points of the short type.
         kind: ``full`` for JOINT_TRAJ_PT_FULL, ``short`` for JOINT_TRAJ_PT.
         robot_id: which robot of the controller.
+        further: positions of axes behind those of the motion, in each point [rad or m].
         resting: share of the speed in short points at rest.
 
     Raises:
@@ -43,7 +50,7 @@ def trajectory_points(
                 robot_id=robot_id,
                 sequence=k,
                 time=time,
-                positions=tuple(q[k]),
+                positions=(*q[k], *further),
                 velocities=tuple(dq[k]),
                 accelerations=tuple(ddq[k]),
             )
@@ -55,4 +62,4 @@ def trajectory_points(
     share = np.where(share > 0, share, resting).tolist()
     durations = np.diff(t, prepend=0.0).tolist()
     for k in range(len(motion)):
-        yield Point(sequence=k, positions=tuple(q[k]), velocity=share[k], duration=durations[k])
+        yield Point(sequence=k, positions=(*q[k], *further), velocity=share[k], duration=durations[k])

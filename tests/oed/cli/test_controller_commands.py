@@ -200,6 +200,23 @@ def test_controllers_that_do_not_play(settings: Any, code: int, problem: str, ru
         assert f"{len(read_log(log, 2))} rows are in" in done.err
 
 
+def test_another_period(run, robot: Path, tmp_path: Path) -> None:
+    """A trajectory of 300 points fits into ABB's driver with a longer time between its points."""
+    described = load_robot(robot)
+    write_trajectory(tmp_path / "t.csv", swing(described))
+    options = ControllerOptions.of(driver_of("abb"), motion_port=0, state_port=0)
+    with VirtualController(described, options=options) as controller:
+        ports = ["--motion-port", controller.motion_port, "--state-port", controller.state_port]
+        line = ["stream", tmp_path / "t.csv", "--robot", robot, "--host", "127.0.0.1", "--driver", "abb", *ports]
+        log = ["--log", tmp_path / "log.csv", "--json"]
+        done = run(*line, *log)
+        assert done.code == 2
+        assert "300 points; allowed: up to 100, as ABB's driver holds" in done.err
+        done = run(*line, *log, "--period", 0.02)
+        assert done.code == 0, done.err
+        assert done.data["sent"] == controller.points == 61
+
+
 @pytest.mark.parametrize("driver", ["fanuc", "motoman"])
 def test_commands_with_a_driver(driver: str, run, robot: Path, tmp_path: Path) -> None:
     """With --driver the ports and forms need no options, but those that are stated count."""

@@ -252,3 +252,20 @@ def test_fanuc_reads_what_is_meant(robot, log: Path) -> None:
             stream(motion, robot, place, log=log, options=StreamOptions.of(fanuc, patience=0.5))
     np.testing.assert_allclose(np.array(reader.points)[:, : robot.n], motion.q, rtol=2e-7, atol=1e-9)
     assert reader.stops == 1
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("points", ["full", "short"])
+def test_external_axes_stay(points: Any, robot, log: Path) -> None:
+    """An axis behind those of the robot is refused, or held where it is; a point with a zero would move it."""
+    generic = DRIVERS["generic"]
+    with playing(robot, generic, external=(0.75, -0.25)) as (controller, place):
+        with pytest.raises(InputError, match=r"joint 3: the controller reports a joint 3.*--external-axes"):
+            stream(swing(robot), robot, place, log=log, options=StreamOptions.of(generic))
+        with pytest.raises(InputError, match="--external-axes"):
+            record(robot, place, log, duration=0.1)
+        options = StreamOptions.of(generic, points=points, external_axes=True, patience=10.0)
+        assert stream(swing(robot), robot, place, log=log, options=options).sent == 300
+        assert controller._external[:2] == (0.75, -0.25)
+        assert record(robot, place, log, duration=0.2, external_axes=True, force=True).rows > 5
+    assert read_log(log, robot.n, torque=False).q.shape[1] == robot.n
