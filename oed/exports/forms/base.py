@@ -55,6 +55,10 @@ class Form(ABC):
     period: ClassVar[float | None] = None
     has_samples: ClassVar[bool] = True
 
+    def period_of(self, robot: Robot) -> float | None:
+        """Gives the sample period that the controller of a robot needs [s]; None for that of the trajectory."""
+        return self.period
+
     @abstractmethod
     def write(self, motion: Motion, robot: Robot, options: ExportOptions, suffix: str) -> bytes:
         """Gives the content of the file.
