@@ -1,6 +1,6 @@
-"""Points a second, jitter of the feedback, streams under faults, watched paths, and hostile datagrams.
+"""Points a second, jitter of the feedback, streams under faults, drivers, watched paths, hostile datagrams.
 
-Everything stays on 127.0.0.1. Usage: ``python benchmarks/streaming.py [speed|faults|path|hostile] [--count N]``
+Everything stays on 127.0.0.1. Usage: ``python benchmarks/streaming.py [speed|faults|drivers|path|hostile]``
 """
 
 from __future__ import annotations
@@ -28,9 +28,11 @@ from estimation import read_log
 from oed.controllers import ControllerOptions, Endpoint, Faults, StreamOptions, VirtualController, stream
 from oed.controllers.clients.requests import Requests
 from oed.controllers.clients.watching import RADIANS
+from oed.controllers.drivers import DRIVERS
 from oed.controllers.links import open_link
 from oed.controllers.recording.recorder import Recorder
 from oed.controllers.virtual.path_faults import KINDS
+from oed.exports.forms.sampling import at_period
 from oed.exports.simple_message import (
     DEFAULT,
     Comm,
@@ -122,6 +124,34 @@ def watch_paths(robot: Robot, runs: int) -> None:
                             delays.append(stop_delay(read_log(log, robot.n, torque=False), motion))
             found = f", {max(delays):.3f} s after the robot left the tolerance at most" if delays else ""
             print(f"  feedback {feedback}, fault {path}: {dict(ends)}{found}", flush=True)
+
+
+def with_drivers(robot: Robot) -> None:
+    """Plays 2,000 points with each driver's profile, then has them stopped in the middle, refused, and played again."""
+    motion = swing(robot, 2000)
+    for name, driver in DRIVERS.items():
+        played = motion if driver.most is None else at_period(motion, motion.duration / (driver.most - 1))
+        options = StreamOptions.of(driver, patience=5.0)
+        for title, settings in (
+            ("played twice", {}),
+            ("leaves the plan", {"faults": Faults(path="offset", path_after=4.0)}),
+            ("emergency stop after 500 points", {"faults": Faults(e_stop_after=500)}),
+            ("emergency stop before", {"state": "e-stop"}),
+        ):
+            choices = ControllerOptions.of(driver, motion_port=0, state_port=0, **settings)  # type: ignore[arg-type]
+            with tempfile.TemporaryDirectory() as folder, VirtualController(robot, options=choices) as controller:
+                ports = {"motion_port": controller.motion_port, "state_port": controller.state_port}
+                place = Endpoint.of(driver, "127.0.0.1", handshake_interval=0.1, **ports)
+                text = ""
+                for _ in range(2 if title == "played twice" else 1):
+                    try:
+                        log = Path(folder) / "log.csv"
+                        result = stream(played, robot, place, log=log, options=options, force=True)
+                        text += f"{result.sent} of {result.points} points, stop confirmed: {result.stopped}; "
+                    except OedError as error:
+                        confirmed = "did not confirm" not in str(error)
+                        text += f"{error.problem}; stop confirmed: {confirmed}; {controller.points} points came; "
+                print(f"  {name}, {title}: {text}moves: {controller.player.moving}", flush=True)
 
 
 def stop_delay(log: Log, motion: Motion) -> float:
@@ -241,7 +271,7 @@ def attack_client(robot: Robot, count: int, end: float) -> None:
 def main() -> None:
     """Runs what is asked for."""
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("what", nargs="*", default=["speed", "faults", "path", "hostile"])
+    parser.add_argument("what", nargs="*", default=["speed", "faults", "drivers", "path", "hostile"])
     parser.add_argument("--count", type=int, default=1_000_000, help="datagrams")
     parser.add_argument("--points", type=int, default=25_000, help="points of a trajectory")
     parser.add_argument("--speed", type=float, default=10.0, help="times real time")
@@ -272,6 +302,8 @@ def main() -> None:
                     faults=faults,
                     replies=replies,
                 )
+        elif part == "drivers":
+            with_drivers(robot)
         elif part == "path":
             watch_paths(robot, args.runs)
         elif part == "hostile":
@@ -285,7 +317,7 @@ def main() -> None:
                 attack(third + 1, time.monotonic() + args.limit)
             print(f"peak memory {before:.3f} GB before, {peak_memory():.3f} GB after")
         else:
-            parser.error(f"{part}: speed, faults, path or hostile")
+            parser.error(f"{part}: speed, faults, drivers, path or hostile")
 
 
 if __name__ == "__main__":

@@ -23,6 +23,7 @@ from oed.controllers.interrupts import signals_held
 from oed.controllers.links import Endpoint, open_link
 from oed.controllers.recording.clock import ClockAnchor
 from oed.controllers.recording.log_file import check_log_path
+from oed.controllers.recording.pose import require_torque
 from oed.controllers.recording.recorder import Recorder
 from oed.controllers.recording.recording import with_rows
 from oed.controllers.recording.reported_joints import require_no_further_joints, warn_of_other_robot
@@ -132,11 +133,8 @@ def stream(
                 "the robot is moving", remedy="wait for the end of its motion; another client may be playing it"
             )
         check_start(motion.q[0], pose[: robot.n], options.start_tolerance)
-        if needs_torque and not recorder.layout.effort:
-            raise ControllerError(
-                f"the feedback of {endpoint.place(endpoint.state_port)} carries neither torque nor current",
-                remedy="a controller program must send them (message type 9015)",
-            )
+        if needs_torque:
+            require_torque(recorder.layout, endpoint)
         require_known_form(options, endpoint, recorder.layout.kind is JointPosition)
         with ExitStack() as links:
             requests = None
