@@ -50,6 +50,7 @@ class Requests(Channel):
         super().__init__(link, form, options, traffic)
         self._unanswered = 0
         self._came = ""
+        self._commands = options.driver is not None and options.driver.commands
 
     @property
     def _kind(self) -> int:
@@ -168,7 +169,7 @@ class Requests(Channel):
     def stop(self) -> bool:
         """Orders the robot to stop, several times if need be; says whether the controller confirmed it."""
         order: FullPoint | Point | MotionControl
-        if self._options.driver is not None and self._options.driver.commands:
+        if self._commands:
             order = MotionControl(robot_id=self._options.robot_id, command=Command.STOP)
         elif self._options.points == "full":
             order = FullPoint(
@@ -236,6 +237,8 @@ class Requests(Channel):
 
     def _answered(self, frame: Frame, waiting: OrderedDict[int, Request]) -> int | None:
         """Gives the number of the point that a reply confirms; None for one that confirms none."""
+        # Who replies so refuses a stop that is a point.
+        self._commands = self._commands or isinstance(frame.message, MotionReply)
         answer = answer_of(frame, self._kind)
         number, oldest = answer.number, next(iter(waiting))
         # Drivers need not repeat the number. By TCP replies come in the order of the points.

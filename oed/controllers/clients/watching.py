@@ -132,12 +132,22 @@ class TimedWatch(Watch):
         planned.see(-SPAN, self._plan[0])
         starts = (planned.see(STEP * k, q) for k, q in enumerate(self._plan))
         self._begins = next((start for start in starts if start is not None), None)
-        reach = LAG + DRIFT * motion.duration
-        self._lags = STEP * np.arange(-int(np.ceil(reach / STEP)), int(np.ceil(reach / STEP)) + 1)
-        # Lags that fit equally well, as of a joint that stands: the one of the start counts.
-        self._misfit = np.outer(1e-6 * self._lags**2, np.ones(motion.n))
+        self._duration = motion.duration
+        self._reach = LAG
+        self._lags: Array = np.zeros(1)
+        self._misfit: Array = np.zeros((1, motion.n))
         self._zero: float | None = None
         self._last = 0.0
+
+    def _begin(self, zero: float, s: float) -> None:
+        """Begins at the time (zero) at which the plan begins on the feedback's clock [s]."""
+        self._zero, self._last = zero, s
+        # The first movement is seen late by a message or two.
+        self._reach = LAG + 2 * self._onset.step
+        count = int(np.ceil((self._reach + DRIFT * self._duration) / STEP))
+        self._lags = STEP * np.arange(-count, count + 1, dtype=np.float64)
+        # Lags that fit equally well, as of a joint that stands: the one of the start counts.
+        self._misfit = np.outer(1e-6 * self._lags**2, np.ones(self._plan.shape[1]))
 
     def _nearest(self, s: float, q: Array) -> tuple[Array, Array] | None:
         s *= self._rate
@@ -146,7 +156,8 @@ class TimedWatch(Watch):
             if start is None:
                 return None
             assert self._begins is not None
-            self._zero, self._last = start - self._begins, s
+            self._begin(start - self._begins, s)
+        assert self._zero is not None
         now = s - self._zero
         times = now - self._lags
         places = np.clip(times / STEP, 0, len(self._plan) - 1)
@@ -155,9 +166,9 @@ class TimedWatch(Watch):
         plan = (1 - share) * self._plan[left] + share * self._plan[left + 1]
         self._misfit *= np.exp((self._last - s) / MEMORY)
         self._last = s
-        best = np.where(np.abs(self._lags)[:, None] <= LAG + DRIFT * now, self._misfit, np.inf).argmin(axis=0)
         # A message that came late counts no more than one at the edge.
         self._misfit += np.minimum(np.abs(q - plan), self._tolerance / 5) ** 2
+        best = np.where(np.abs(self._lags)[:, None] <= self._reach + DRIFT * now, self._misfit, np.inf).argmin(axis=0)
         joints = np.arange(len(q))
         return plan[best, joints], times[best]
 
@@ -205,6 +216,11 @@ class _Onset:
         self._noise = noise
         self._rest: Array | None = None
         self._begun: float | None = None
+
+    @property
+    def step(self) -> float:
+        """Time between two of the last rows [s]."""
+        return (self._recent[-1][0] - self._recent[0][0]) / max(len(self._recent) - 1, 1)
 
     def see(self, s: float, q: Array) -> float | None:
         """Takes positions (n,) at a time [s]; gives the time of the onset once it is known."""

@@ -175,15 +175,17 @@ Serve = Callable[[bytes], bytes]
 
 
 @contextmanager
-def answering(serve: Serve) -> Iterator[tuple[int, list[bytes]]]:
-    """A motion port of raw sockets: each point of 68 bytes gets the answer of a function."""
+def answering(serve: Serve, framed: bool = False) -> Iterator[tuple[int, list[bytes]]]:
+    """A motion port of raw sockets: each message of 68 bytes, or of its length, gets the answer of a function."""
     listener = socket.create_server(("127.0.0.1", 0))
     got: list[bytes] = []
 
     def run() -> None:
         connection, _ = listener.accept()
         with connection:
-            while data := connection.recv(68, socket.MSG_WAITALL):
+            while data := connection.recv(4 if framed else 68, socket.MSG_WAITALL):
+                if framed:
+                    data += connection.recv(struct.unpack("<i", data)[0], socket.MSG_WAITALL)
                 got.append(data)
                 connection.sendall(serve(data))
 
@@ -221,6 +223,28 @@ def test_replies_of_other_drivers(serve: Serve, robot, log: Path) -> None:
         with pytest.raises(ControllerError, match="has not begun to move"):
             stream(motion, robot, place, log=log, options=options)
     assert [struct.unpack_from("<i", data, 16)[0] for data in got] == [*range(100), -4]
+
+
+@pytest.mark.slow
+def test_who_replies_as_motoman_is_stopped_by_command(robot, log: Path) -> None:
+    """Motoman's driver refuses a point with the number of a stop: its replies show that a command is needed."""
+    stops = []
+
+    def serve(data: bytes) -> bytes:
+        kind, number = struct.unpack_from("<i", data, 4)[0], struct.unpack_from("<i", data, 20)[0]
+        if kind == 14:
+            return struct.pack("<9i10f", 72, 2002, 3, 1, 0, number, 14, 0, 0, *[0.0] * 10)
+        stops.append(struct.unpack_from("<4i3i", data))
+        return struct.pack("<9i10f", 72, 2002, 3, 1, 0, 0, 200111, 0, 0, *[0.0] * 10)
+
+    with Tap("tcp") as tap, answering(serve, framed=True) as (port, got):
+        place = Endpoint(host="127.0.0.1", transport="tcp", motion_port=port, state_port=tap.state_port)
+        options = StreamOptions.of(DRIVERS["generic"], points="full", patience=0.5)
+        with pytest.raises(ControllerError, match="has not begun to move") as caught:
+            stream(swing(robot, 100, 0.04), robot, place, log=log, options=options)
+    assert "did not confirm the stop" not in str(caught.value)
+    assert len(got) == 101
+    assert [(stop[1], stop[6]) for stop in stops] == [(2001, 200111)]
 
 
 @pytest.mark.slow

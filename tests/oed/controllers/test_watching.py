@@ -126,6 +126,19 @@ def other_robot(q: Array, before: int, rng: np.random.Generator) -> Array:
 FAULTS: list[Callable[[Array, int, np.random.Generator], Array]] = [swap, sign, half_speed, stall, offset, other_robot]
 
 
+def test_slow_feedback() -> None:
+    """Feedback that comes once a second ends no clean run, though it shows the first movement late."""
+    for seed in range(30):
+        rng = np.random.default_rng(seed)
+        motion = plan(rng)
+        slow = Motion(4 * motion.t, motion.q, motion.dq / 4, motion.ddq / 16)
+        machine = Machine(rng, motion)
+        machine.t = 4 * machine.t
+        watch = TimedWatch(slow, np.full(N, TOLERANCE), UNITS)
+        for place in range(int(rng.integers(1000)) % 250, len(machine.t), 250):
+            watch.see(machine.start + machine.t[place], machine.q[place])
+
+
 @pytest.mark.parametrize("stamped", [True, False])
 @pytest.mark.parametrize("fault", FAULTS)
 def test_faults_end_the_motion(fault: Callable[..., Array], stamped: bool) -> None:
