@@ -1,6 +1,6 @@
-"""Points a second over loopback, jitter of the feedback, streams under faults, and a million hostile datagrams.
+"""Points a second, jitter of the feedback, streams under faults, drivers, watched paths, hostile datagrams.
 
-Everything stays on 127.0.0.1. Usage: ``python benchmarks/streaming.py [speed|faults|hostile] [--count N] [--limit S]``
+Everything stays on 127.0.0.1. Usage: ``python benchmarks/streaming.py [speed|faults|drivers|path|hostile]``
 """
 
 from __future__ import annotations
@@ -14,6 +14,7 @@ import tempfile
 import threading
 import time
 import warnings
+from collections import Counter
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -26,8 +27,12 @@ from benchmarks.memory import peak_memory
 from estimation import read_log
 from oed.controllers import ControllerOptions, Endpoint, Faults, StreamOptions, VirtualController, stream
 from oed.controllers.clients.requests import Requests
+from oed.controllers.clients.watching import RADIANS
+from oed.controllers.drivers import DRIVERS
 from oed.controllers.links import open_link
 from oed.controllers.recording.recorder import Recorder
+from oed.controllers.virtual.path_faults import KINDS
+from oed.exports.forms.sampling import at_period
 from oed.exports.simple_message import (
     DEFAULT,
     Comm,
@@ -43,7 +48,7 @@ from oed.exports.simple_message import (
 from robots.common.errors import OedError
 from robots.loading import load_robot
 from robots.robot import Robot
-from robots.signals import Motion
+from robots.signals import Log, Motion
 
 PERIOD = 0.004
 BURST = 100
@@ -89,6 +94,73 @@ def play(robot: Robot, motion: Motion, transport: str, options: StreamOptions, *
         read = read_log(log, robot.n)
         moving = np.flatnonzero(np.abs(read.q - motion.q[0]).max(axis=1) > 1e-6)
         print(f"    time stamps in order: {bool((np.diff(read.t) > 0).all())}, rows in motion: {np.ptp(moving) + 1}")
+
+
+def watch_paths(robot: Robot, runs: int) -> None:
+    """Plays runs without a fault and with each fault of the path, 5 % of the datagrams late by 50 ms."""
+    motion = swing(robot, 750)
+    options = StreamOptions(window=32, patience=5.0)
+    for feedback in ("full", "position"):
+        for path in KINDS:
+            ends: Counter[str] = Counter()
+            delays = []
+            for seed in range(runs if path == "none" else max(runs // 10, 1)):
+                faults = Faults(late=0.05, late_by=0.05, seed=seed, path=path, path_after=1.0)
+                choices = ControllerOptions(
+                    motion_port=0, state_port=0, feedback=feedback, replies="echo", capacity=200, faults=faults
+                )
+                with tempfile.TemporaryDirectory() as folder, VirtualController(robot, options=choices) as controller:
+                    endpoint = Endpoint(
+                        host="127.0.0.1", motion_port=controller.motion_port, state_port=controller.state_port
+                    )
+                    log = Path(folder) / "log.csv"
+                    try:
+                        stream(motion, robot, endpoint, log=log, options=options)
+                        ends["played"] += 1
+                    except OedError as error:
+                        stopped = "left the plan" in error.problem
+                        ends["stopped" if stopped else error.problem] += 1
+                        if stopped and feedback == "full":
+                            delays.append(stop_delay(read_log(log, robot.n, torque=False), motion))
+            found = f", {max(delays):.3f} s after the robot left the tolerance at most" if delays else ""
+            print(f"  feedback {feedback}, fault {path}: {dict(ends)}{found}", flush=True)
+
+
+def with_drivers(robot: Robot) -> None:
+    """Plays 2,000 points with each driver's profile, then has them stopped in the middle, refused, and played again."""
+    motion = swing(robot, 2000)
+    for name, driver in DRIVERS.items():
+        played = motion if driver.most is None else at_period(motion, motion.duration / (driver.most - 1))
+        options = StreamOptions.of(driver, patience=5.0)
+        for title, settings in (
+            ("played twice", {}),
+            ("leaves the plan", {"faults": Faults(path="offset", path_after=4.0)}),
+            ("emergency stop after 500 points", {"faults": Faults(e_stop_after=500)}),
+            ("emergency stop before", {"state": "e-stop"}),
+        ):
+            choices = ControllerOptions.of(driver, motion_port=0, state_port=0, **settings)  # type: ignore[arg-type]
+            with tempfile.TemporaryDirectory() as folder, VirtualController(robot, options=choices) as controller:
+                ports = {"motion_port": controller.motion_port, "state_port": controller.state_port}
+                place = Endpoint.of(driver, "127.0.0.1", handshake_interval=0.1, **ports)
+                text = ""
+                for _ in range(2 if title == "played twice" else 1):
+                    try:
+                        log = Path(folder) / "log.csv"
+                        result = stream(played, robot, place, log=log, options=options, force=True)
+                        text += f"{result.sent} of {result.points} points, stop confirmed: {result.stopped}; "
+                    except OedError as error:
+                        confirmed = "did not confirm" not in str(error)
+                        text += f"{error.problem}; stop confirmed: {confirmed}; {controller.points} points came; "
+                print(f"  {name}, {title}: {text}moves: {controller.player.moving}", flush=True)
+
+
+def stop_delay(log: Log, motion: Motion) -> float:
+    """Time from the first row beyond the usual tolerance to the end of the log [s]; rows are samples of the motion."""
+    moved = int((np.abs(log.q - motion.q[0]).max(axis=1) > 1e-6).argmax())
+    sample = int(np.abs(motion.q[:200] - log.q[moved]).max(axis=1).argmin())
+    numbers = np.clip(sample + np.rint((log.t - log.t[moved]) / PERIOD).astype(int), 0, len(motion) - 1)
+    away = np.abs(log.q - motion.q[numbers]).max(axis=1) > RADIANS
+    return float(log.t[-1] - log.t[away.argmax()])
 
 
 def wait_until(done: Callable[[], bool]) -> None:
@@ -199,10 +271,11 @@ def attack_client(robot: Robot, count: int, end: float) -> None:
 def main() -> None:
     """Runs what is asked for."""
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("what", nargs="*", default=["speed", "faults", "hostile"])
+    parser.add_argument("what", nargs="*", default=["speed", "faults", "drivers", "path", "hostile"])
     parser.add_argument("--count", type=int, default=1_000_000, help="datagrams")
     parser.add_argument("--points", type=int, default=25_000, help="points of a trajectory")
     parser.add_argument("--speed", type=float, default=10.0, help="times real time")
+    parser.add_argument("--runs", type=int, default=100, help="watched runs without a fault; a tenth with each")
     parser.add_argument("--limit", type=float, default=300.0, help="time limit of each part [s]")
     args = parser.parse_args()
     warnings.simplefilter("ignore")
@@ -229,6 +302,10 @@ def main() -> None:
                     faults=faults,
                     replies=replies,
                 )
+        elif part == "drivers":
+            with_drivers(robot)
+        elif part == "path":
+            watch_paths(robot, args.runs)
         elif part == "hostile":
             before = peak_memory()
             third = args.count // 3
@@ -240,7 +317,7 @@ def main() -> None:
                 attack(third + 1, time.monotonic() + args.limit)
             print(f"peak memory {before:.3f} GB before, {peak_memory():.3f} GB after")
         else:
-            parser.error(f"{part}: speed, faults or hostile")
+            parser.error(f"{part}: speed, faults, drivers, path or hostile")
 
 
 if __name__ == "__main__":

@@ -2,16 +2,30 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 if TYPE_CHECKING:
-    from oed.controllers import Endpoint
+    from oed.controllers import ControllerOptions, Endpoint, StreamOptions
     from oed.exports.simple_message import WireFormat
 
 HostOption = Annotated[
     str, typer.Option("--host", help="Name or IP address of the robot controller.", show_default=False)
+]
+DriverOption = Annotated[
+    str | None,
+    typer.Option(
+        "--driver",
+        help="Program on the controller: efort, fanuc, motoman, abb or generic. Sets what no other option states.",
+        show_default=False,
+    ),
+]
+ExternalAxesOption = Annotated[
+    bool,
+    typer.Option(
+        "--external-axes", help="The controller has axes behind those of the robot: they stay where they are."
+    ),
 ]
 TransportOption = Annotated[str, typer.Option("--transport", help="udp or tcp.")]
 MotionPortOption = Annotated[int, typer.Option("--motion-port", help="Port that takes points.")]
@@ -34,13 +48,26 @@ WindowOption = Annotated[
 StartToleranceOption = Annotated[
     float, typer.Option("--start-tolerance", help="Farthest pose from the first point [rad or m].")
 ]
-NoPingOption = Annotated[bool, typer.Option("--no-ping", help="Send no pings: some controllers know none.")]
+ToleranceOption = Annotated[
+    str | None,
+    typer.Option(
+        "--tolerance",
+        help="Farthest feedback from the plan [rad or m], for all joints or each, or inf. Default: 0.05 rad, 0.02 m.",
+        show_default=False,
+    ),
+]
+PingOption = Annotated[
+    bool,
+    typer.Option(
+        "--ping/--no-ping", help="Ping the motion port. Some drivers, as Fanuc's, read pings as points and move."
+    ),
+]
 SpeedOption = Annotated[
     float, typer.Option("--speed", help="How many times faster than real time the controller to test against plays.")
 ]
 LINK_OPTIONS = (
-    *("transport", "motion_port", "state_port", "byte_order", "real_bytes", "handshake"),
-    *("points", "download", "window", "patience", "start_tolerance", "no_ping", "speed"),
+    *("driver", "transport", "motion_port", "state_port", "byte_order", "real_bytes", "handshake"),
+    *("points", "download", "window", "patience", "start_tolerance", "tolerance", "ping", "speed"),
 )
 """Parameters that concern the way to a controller."""
 
@@ -70,24 +97,78 @@ def one_byte(text: str) -> int:
         raise InputError(f"--handshake {text}", allowed="one byte, such as 0x8E or 0xFF") from None
 
 
-def endpoint(
-    host: str, transport: str, motion_port: int, state_port: int, byte_order: str, real_bytes: int, handshake: str
-) -> Endpoint:
-    """Makes the endpoint that the options name.
+def endpoint(context: typer.Context, host: str) -> Endpoint:
+    """Makes the endpoint that the options of a command name.
 
     Raises:
         InputError: an option out of range.
     """
     from oed.controllers import Endpoint
+    from oed.controllers.drivers import driver_of
 
-    return Endpoint(
-        host=host,
-        transport=transport,  # type: ignore[arg-type]
-        motion_port=motion_port,
-        state_port=state_port,
-        form=wire_format(byte_order, real_bytes),
-        handshake=one_byte(handshake),
-    )
+    name = context.params["driver"]
+    settings = link_settings(context)
+    return Endpoint(host=host, **settings) if name is None else Endpoint.of(driver_of(name), host, **settings)
+
+
+def link_settings(context: typer.Context) -> dict[str, Any]:
+    """Gives the settings of a link that the options name: all of them, or with a driver those that are stated."""
+    found: dict[str, Any] = stated(context, "transport", "motion_port", "state_port")
+    driver = context.params["driver"]
+    if driver is None or stated(context, "byte_order", "real_bytes"):
+        found["form"] = wire_format(context.params["byte_order"], context.params["real_bytes"])
+    if stated(context, "handshake"):
+        found["handshake"] = one_byte(context.params["handshake"])
+    return found
+
+
+def stream_options(context: typer.Context, **settings: Any) -> StreamOptions:
+    """Makes the settings of a stream that the options of a command name.
+
+    Args:
+        context: of the command.
+        settings: those that only this command has.
+
+    Raises:
+        InputError: an option out of range, or one that a driver misreads.
+    """
+    from oed.controllers import StreamOptions
+    from oed.controllers.drivers import driver_of
+
+    shared = ("window", "patience", "start_tolerance", "ping")
+    settings |= {name: context.params[name] for name in shared} | stated(context, "points", "download")
+    settings["tolerance"] = path_tolerance(context.params["tolerance"])
+    name = context.params["driver"]
+    return StreamOptions(**settings) if name is None else StreamOptions.of(driver_of(name), **settings)
+
+
+def controller_options(context: typer.Context, **settings: Any) -> ControllerOptions:
+    """Makes the settings of the test controller that the options name.
+
+    Args:
+        context: of the command.
+        settings: those that no driver sets.
+
+    Raises:
+        InputError: an option out of range.
+    """
+    from oed.controllers import ControllerOptions
+    from oed.controllers.drivers import driver_of
+
+    settings |= link_settings(context) | stated(context, "capacity", "feedback", "feedback_period", "replies")
+    name = context.params["driver"]
+    return ControllerOptions(**settings) if name is None else ControllerOptions.of(driver_of(name), **settings)
+
+
+def stated(context: typer.Context, *names: str) -> dict[str, Any]:
+    """Gives the options that count: all where no driver is named, otherwise those that are not left to it."""
+    every = context.params["driver"] is None
+    sources = {name: context.get_parameter_source(name) for name in names if name in context.params}
+    return {
+        name: context.params[name]
+        for name, source in sources.items()
+        if every or (source is not None and source.name != "DEFAULT")
+    }
 
 
 def refuse_without_host(context: typer.Context, host: str) -> None:
@@ -106,6 +187,17 @@ def refuse_without_host(context: typer.Context, host: str) -> None:
     if given:
         verb = "does" if len(given) == 1 else "do"
         raise InputError(f"{', '.join(given)} {verb} not apply without {host}", remedy=f"add {host} HOST")
+
+
+def path_tolerance(text: str | None) -> tuple[float, ...] | None:
+    """Reads ``--tolerance``; one number counts for all joints.
+
+    Raises:
+        InputError: the text is no list of numbers.
+    """
+    from oed.cli.options import numbers
+
+    return None if text is None else tuple(numbers("--tolerance", text) or ())
 
 
 def is_given(context: typer.Context, name: str) -> bool:

@@ -23,5 +23,9 @@ class PointRefusedError(ControllerError):
     """The controller refuses a point; its state may say why."""
 
 
+class NoReplyError(LinkError):
+    """A point is not answered; whether the controller lives, its feedback says."""
+
+
 class RecordingError(InputError):
     """The log takes no more rows: the disk is full, or gone."""

@@ -61,7 +61,8 @@ def export_trajectory(
             remedy="rename it",
         )
     check_trajectory(motion, robot, metadata, file)
-    step = period if period is not None else chosen.period if chosen.period is not None else motion.period
+    step = period if period is not None else chosen.period_of(robot)
+    step = motion.period if step is None else step
     if step is None:
         raise InputError("the motion is not uniform in time", remedy="give a period (--period)")
     sampled = at_period(motion, step)

@@ -6,6 +6,7 @@ import os
 import time
 from collections.abc import Callable, Sequence
 from concurrent.futures import Executor
+from dataclasses import replace
 from os import PathLike
 from pathlib import Path
 
@@ -23,7 +24,7 @@ from oed.campaigns.loops.state import Experiment, LoopRun, LoopState, Recorded, 
 from oed.campaigns.runs.player import Player
 from oed.campaigns.runs.stage_progress import TitledProgress, rest
 from oed.campaigns.runs.state import run_lock
-from oed.controllers import Endpoint, StreamOptions
+from oed.controllers import Endpoint, StreamOptions, read_pose
 from oed.experiments import LimitOptions, SearchOptions
 from oed.experiments import design as design_experiment
 from oed.experiments.checks import velocity_share
@@ -85,8 +86,7 @@ def run_loop(
         LinkError: the controller cannot be reached, or falls silent.
         ControllerError: the controller is not ready, or the robot does not reach the end of a motion.
     """
-    if not speed > 0:
-        raise InputError(f"a speed of {speed}", allowed="above 0")
+    sent = replace(stream_options or StreamOptions(), speed=speed)
     place, chosen = Path(folder), options or LoopOptions()
     try:
         place.mkdir(parents=True, exist_ok=True)
@@ -101,8 +101,7 @@ def run_loop(
             state = LoopState(robot=identity(robot), settings=settings)
         else:
             state.require_same(robot, settings, place)
-        loop = _Loop(robot, endpoint, place, chosen, stream_options or StreamOptions(), state, speed, report, progress)
-        return loop.run(design, workers, executor)
+        return _Loop(robot, endpoint, place, chosen, sent, state, report, progress).run(design, workers, executor)
 
 
 class _Loop:
@@ -116,12 +115,11 @@ class _Loop:
         options: LoopOptions,
         stream_options: StreamOptions,
         state: LoopState,
-        speed: float,
         report: Callable[[Diagnosis, ResultFolder], None] | None,
         progress: Progress,
     ) -> None:
         self.robot, self.endpoint, self.folder, self.options = robot, endpoint, folder, options
-        self.stream_options, self.state, self.speed = stream_options, state, speed
+        self.stream_options, self.state, self.speed = stream_options, state, stream_options.speed
         self.report, self.progress = report, progress
 
     def run(self, design: str | PathLike[str] | None, workers: int | None, executor: Executor | None) -> LoopResult:
@@ -164,6 +162,8 @@ class _Loop:
 
     def _design(self, given: str | PathLike[str] | None, workers: int | None, executor: Executor | None) -> None:
         """Makes the first experiment: an excitation, or what a design's folder holds."""
+        if given is None:  # A design takes minutes: a controller without torque is refused before.
+            read_pose(self.robot, self.endpoint, self.stream_options.patience, needs_torque=True)
         made = given or design_experiment(
             self.robot,
             limits=LimitOptions(

@@ -14,20 +14,23 @@ from oed.cli.console import Console
 from oed.cli.links import (
     ByteOrderOption,
     DownloadOption,
+    DriverOption,
     HandshakeOption,
     MotionPortOption,
-    NoPingOption,
     PatienceOption,
+    PingOption,
     PointsOption,
     RealBytesOption,
     SpeedOption,
     StartToleranceOption,
     StatePortOption,
+    ToleranceOption,
     TransportOption,
     WindowOption,
     endpoint,
     is_given,
     refuse_without_host,
+    stream_options,
 )
 from oed.cli.options import (
     AssumeMassesOption,
@@ -113,6 +116,7 @@ def campaign(
             show_default=False,
         ),
     ] = None,
+    driver: DriverOption = None,
     transport: TransportOption = "udp",
     motion_port: MotionPortOption = 11000,
     state_port: StatePortOption = 11002,
@@ -124,7 +128,8 @@ def campaign(
     window: WindowOption = 1,
     patience: PatienceOption = 2.0,
     start_tolerance: StartToleranceOption = 0.01,
-    no_ping: NoPingOption = False,
+    tolerance: ToleranceOption = None,
+    ping: PingOption = False,
     speed: SpeedOption = 1.0,
     out: OutOption = Path("campaign"),
     tip: TipOption = None,
@@ -166,7 +171,7 @@ def campaign(
         described = robot_from(robot, tip, joints, lock, unlimited=unlimited, assume_masses=assume_masses)
         place = None
         if run is not None:
-            place = endpoint(run, transport, motion_port, state_port, byte_order, real_bytes, handshake)
+            place = endpoint(context, run)
         if place is not None and (out / "campaign.json").exists():
             if force:
                 raise InputError(
@@ -218,17 +223,9 @@ def campaign(
         summary = f"{result.summary()}\nwritten to {out.resolve()}"
         if place is not None:
             from oed.campaigns.runs import run_campaign
-            from oed.controllers import StreamOptions
             from oed.controllers.interrupts import terminate_as_interrupt
 
-            options = StreamOptions(
-                points=points,  # type: ignore[arg-type]
-                download=download,
-                window=window,
-                patience=patience,
-                start_tolerance=start_tolerance,
-                ping=not no_ping,
-            )
+            options = stream_options(context, speed=speed)
             try:
                 with terminate_as_interrupt():
                     played = run_campaign(

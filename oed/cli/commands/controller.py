@@ -11,13 +11,13 @@ import typer
 from oed.cli.console import Console
 from oed.cli.links import (
     ByteOrderOption,
+    DriverOption,
     HandshakeOption,
     MotionPortOption,
     RealBytesOption,
     StatePortOption,
     TransportOption,
-    one_byte,
-    wire_format,
+    controller_options,
 )
 from oed.cli.options import (
     AssumeMassesOption,
@@ -37,6 +37,7 @@ LATE = 0.05
 
 
 def controller(
+    context: typer.Context,
     robot: RobotOption,
     plant: Annotated[
         Path | None,
@@ -54,6 +55,7 @@ def controller(
             show_default=False,
         ),
     ] = None,
+    driver: DriverOption = None,
     transport: TransportOption = "udp",
     motion_port: MotionPortOption = 11000,
     state_port: StatePortOption = 11002,
@@ -101,6 +103,16 @@ def controller(
         int | None, typer.Option("--restart-after", help="Restart after so many points.", show_default=False)
     ] = None,
     stuck: Annotated[bool, typer.Option("--stuck", help="Play nothing, so that the buffer never empties.")] = False,
+    path_fault: Annotated[
+        str,
+        typer.Option(
+            "--path-fault",
+            help="What the robot does wrong: none, swap, sign, half-speed, stall, offset or other-robot.",
+        ),
+    ] = "none",
+    path_fault_after: Annotated[
+        float, typer.Option("--path-fault-after", help="Begin with it so long after the start of a trajectory [s].")
+    ] = 0.0,
     seed: SeedOption = 0,
     tip: TipOption = None,
     joints: JointsOption = None,
@@ -118,7 +130,7 @@ def controller(
     with console.working():
         import numpy as np
 
-        from oed.controllers import ControllerOptions, Faults, VirtualController
+        from oed.controllers import Faults, VirtualController
         from oed.controllers.interrupts import terminate_as_interrupt
         from oed.exports import read_trajectory
         from robots.common.errors import InputError
@@ -137,23 +149,12 @@ def controller(
             e_stop_after=e_stop_after,
             restart_after=restart_after,
             stuck=stuck,
+            path=path_fault,  # type: ignore[arg-type]
+            path_after=path_fault_after,
             seed=seed,
         )
-        options = ControllerOptions(
-            transport=transport,  # type: ignore[arg-type]
-            motion_port=motion_port,
-            state_port=state_port,
-            form=wire_format(byte_order, real_bytes),
-            handshake=one_byte(handshake),
-            capacity=capacity,
-            feedback=feedback,  # type: ignore[arg-type]
-            feedback_period=feedback_period,
-            status=status,
-            replies=replies,  # type: ignore[arg-type]
-            state=state,  # type: ignore[arg-type]
-            speed=speed,
-            wait_for_points=wait_for_points,
-            faults=faults,
+        options = controller_options(
+            context, status=status, state=state, speed=speed, wait_for_points=wait_for_points, faults=faults
         )
         described = robot_from(robot, tip, joints, lock, assume_masses=assume_masses)
         if pose is not None and pose.endswith(".csv"):
@@ -165,7 +166,11 @@ def controller(
         virtual = VirtualController(described, played, options=options, pose=stands, seed=seed)
         ports = f"motion port {virtual.motion_port}, state port {virtual.state_port}"
         if not quiet:
-            print(f"{described.name} at {options.host} ({transport.upper()}), {ports}", file=sys.stderr, flush=True)
+            print(
+                f"{described.name} at {options.host} ({options.transport.upper()}), {ports}",
+                file=sys.stderr,
+                flush=True,
+            )
         with terminate_as_interrupt():
             virtual.serve(duration)
     data = {

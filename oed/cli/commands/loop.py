@@ -12,19 +12,22 @@ from oed.cli.console import Console
 from oed.cli.links import (
     ByteOrderOption,
     DownloadOption,
+    DriverOption,
     HandshakeOption,
     HostOption,
     MotionPortOption,
-    NoPingOption,
     PatienceOption,
+    PingOption,
     PointsOption,
     RealBytesOption,
     SpeedOption,
     StartToleranceOption,
     StatePortOption,
+    ToleranceOption,
     TransportOption,
     WindowOption,
     endpoint,
+    stream_options,
 )
 from oed.cli.options import (
     ClusterOption,
@@ -52,6 +55,7 @@ from oed.cli.options import (
 
 
 def loop(
+    context: typer.Context,
     robot: RobotOption,
     host: HostOption,
     experiments: Annotated[
@@ -87,6 +91,7 @@ def loop(
     seed: SeedOption = 0,
     workers: WorkersOption = None,
     cluster: ClusterOption = None,
+    driver: DriverOption = None,
     transport: TransportOption = "udp",
     motion_port: MotionPortOption = 11000,
     state_port: StatePortOption = 11002,
@@ -98,7 +103,8 @@ def loop(
     window: WindowOption = 1,
     patience: PatienceOption = 2.0,
     start_tolerance: StartToleranceOption = 0.01,
-    no_ping: NoPingOption = False,
+    tolerance: ToleranceOption = None,
+    ping: PingOption = False,
     speed: SpeedOption = 1.0,
     out: OutOption = Path("loop"),
     tip: TipOption = None,
@@ -120,13 +126,12 @@ def loop(
     with console.working() as progress:
         from oed.campaigns.loops import LoopOptions, run_loop
         from oed.cli.spaces import surroundings_from
-        from oed.controllers import StreamOptions
         from oed.controllers.interrupts import terminate_as_interrupt
         from oed.reports import save_diagnosis_report, save_loop_report
         from robots.common.files import ResultFolder
 
         described = robot_from(robot, tip, joints, lock, unlimited=unlimited)
-        place = endpoint(host, transport, motion_port, state_port, byte_order, real_bytes, handshake)
+        place = endpoint(context, host)
         try:
             with executor_from(workers, cluster) as executor, terminate_as_interrupt():
                 result = run_loop(
@@ -145,14 +150,7 @@ def loop(
                         surroundings=surroundings_from(floor, no_floor, keep_out),
                         seed=seed,
                     ),
-                    stream_options=StreamOptions(
-                        points=points,  # type: ignore[arg-type]
-                        download=download,
-                        window=window,
-                        patience=patience,
-                        start_tolerance=start_tolerance,
-                        ping=not no_ping,
-                    ),
+                    stream_options=stream_options(context, speed=speed),
                     speed=speed,
                     workers=workers,
                     executor=executor,

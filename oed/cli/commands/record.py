@@ -10,6 +10,8 @@ import typer
 from oed.cli.console import Console
 from oed.cli.links import (
     ByteOrderOption,
+    DriverOption,
+    ExternalAxesOption,
     HandshakeOption,
     HostOption,
     PatienceOption,
@@ -31,18 +33,21 @@ from oed.cli.options import (
 
 
 def record(
+    context: typer.Context,
     robot: RobotOption,
     host: HostOption,
     log: Annotated[Path, typer.Option("--log", help="Log file to write, .csv.")] = Path("log.csv"),
     duration: Annotated[
         float | None, typer.Option("--duration", help="Stop after so long [s]. Default: Ctrl-C.", show_default=False)
     ] = None,
+    driver: DriverOption = None,
     transport: TransportOption = "udp",
     state_port: StatePortOption = 11002,
     byte_order: ByteOrderOption = "little",
     real_bytes: RealBytesOption = 4,
     handshake: HandshakeOption = "0x8E",
     patience: PatienceOption = 2.0,
+    external_axes: ExternalAxesOption = False,
     tip: TipOption = None,
     joints: JointsOption = None,
     lock: LockOption = None,
@@ -59,8 +64,17 @@ def record(
         from oed.controllers import record as listen
         from oed.controllers.interrupts import terminate_as_interrupt
 
-        place = endpoint(host, transport, 11000, state_port, byte_order, real_bytes, handshake)
+        place = endpoint(context, host)
         described = robot_from(robot, tip, joints, lock)
         with terminate_as_interrupt():
-            result = listen(described, place, log, duration=duration, patience=patience, force=force, progress=progress)
+            result = listen(
+                described,
+                place,
+                log,
+                duration=duration,
+                patience=patience,
+                external_axes=external_axes,
+                force=force,
+                progress=progress,
+            )
     console.result(result.summary(), result.to_dict())

@@ -12,18 +12,22 @@ from oed.cli.console import Console
 from oed.cli.links import (
     ByteOrderOption,
     DownloadOption,
+    DriverOption,
+    ExternalAxesOption,
     HandshakeOption,
     HostOption,
     MotionPortOption,
-    NoPingOption,
     PatienceOption,
+    PingOption,
     PointsOption,
     RealBytesOption,
     StartToleranceOption,
     StatePortOption,
+    ToleranceOption,
     TransportOption,
     WindowOption,
     endpoint,
+    stream_options,
 )
 from oed.cli.options import (
     ROBOT,
@@ -38,6 +42,7 @@ from oed.cli.options import (
 
 
 def stream(
+    context: typer.Context,
     trajectory: Annotated[Path, typer.Argument(help="A trajectory.csv.", show_default=False)],
     host: HostOption,
     log: Annotated[Path, typer.Option("--log", help="Log file to write, .csv.")] = Path("log.csv"),
@@ -47,6 +52,7 @@ def stream(
             "--robot", help=f"The robot: {ROBOT}. Default: the robot named in the trajectory file.", show_default=False
         ),
     ] = None,
+    driver: DriverOption = None,
     transport: TransportOption = "udp",
     motion_port: MotionPortOption = 11000,
     state_port: StatePortOption = 11002,
@@ -56,18 +62,26 @@ def stream(
     points: PointsOption = "full",
     download: DownloadOption = False,
     window: WindowOption = 1,
+    period: Annotated[
+        float | None,
+        typer.Option(
+            "--period", help="Time between two points [s]. Default: that of the trajectory.", show_default=False
+        ),
+    ] = None,
+    external_axes: ExternalAxesOption = False,
     reply_time: Annotated[
         float, typer.Option("--reply-time", help="UDP: send a point again after so long without a reply [s].")
     ] = 0.1,
     patience: PatienceOption = 2.0,
     start_tolerance: StartToleranceOption = 0.01,
     robot_id: Annotated[int, typer.Option("--robot-id", help="Number of the robot at its controller.")] = 0,
-    no_ping: NoPingOption = False,
+    tolerance: ToleranceOption = None,
+    ping: PingOption = False,
     ignore_status: Annotated[
         bool, typer.Option("--ignore-status", help="Start in spite of a reported error, e-stop or manual mode.")
     ] = False,
     dry_run: Annotated[
-        bool, typer.Option("--dry-run", help="Check trajectory, controller and pose; send no point.")
+        bool, typer.Option("--dry-run", help="Check trajectory, controller and pose; only listen.")
     ] = False,
     tip: TipOption = None,
     joints: JointsOption = None,
@@ -82,24 +96,18 @@ def stream(
     """
     console = Console(json=json, quiet=quiet)
     with console.working() as progress:
-        from oed.controllers import StreamOptions
         from oed.controllers import stream as play
         from oed.controllers.interrupts import terminate_as_interrupt
         from oed.exports import read_trajectory
+        from oed.exports.forms.sampling import at_period
 
-        place = endpoint(host, transport, motion_port, state_port, byte_order, real_bytes, handshake)
-        options = StreamOptions(
-            points=points,  # type: ignore[arg-type]
-            download=download,
-            window=window,
-            reply_time=reply_time,
-            patience=patience,
-            ping=not no_ping,
-            start_tolerance=start_tolerance,
-            ignore_status=ignore_status,
-            robot_id=robot_id,
+        place = endpoint(context, host)
+        options = stream_options(
+            context, reply_time=reply_time, ignore_status=ignore_status, robot_id=robot_id, external_axes=external_axes
         )
         motion, metadata = read_trajectory(trajectory)
+        if period is not None:
+            motion = at_period(motion, period)
         described = robot_of_file(robot, metadata, trajectory, tip, joints, lock)
         try:
             with terminate_as_interrupt():

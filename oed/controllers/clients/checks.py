@@ -5,7 +5,9 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from oed.controllers.clients.options import StreamOptions
 from oed.controllers.errors import ControllerError
+from oed.controllers.links import Endpoint
 from oed.exports.simple_message import Status
 from oed.exports.simple_message.kinds import MANUAL
 from robots.common.errors import InputError
@@ -46,6 +48,27 @@ def status_problem(status: Status | None) -> str | None:
     if status.motion_possible == 0:
         return "that motion is not possible"
     return None
+
+
+def require_known_form(options: StreamOptions, endpoint: Endpoint, positions_only: bool) -> None:
+    """Refuses full points to a controller that may take short ones only, as those of ABB and Fanuc.
+
+    Such a controller reads a full point, and a full stop, as several short points, and moves to zero.
+
+    Args:
+        options: of the stream.
+        endpoint: the controller.
+        positions_only: whether its feedback is JOINT_POSITION, as theirs is.
+
+    Raises:
+        InputError: full points by TCP to an unknown driver that reports positions only.
+    """
+    if options.driver is None and options.points == "full" and endpoint.transport == "tcp" and positions_only:
+        raise InputError(
+            "it is not known whether the controller takes full points: it reports positions only, as Fanuc's and ABB's "
+            "drivers do, which misread full points",
+            remedy="state its driver (--driver), or send short points (--points short)",
+        )
 
 
 def check_start(first: Array, reported: Array, tolerance: float) -> None:

@@ -4,26 +4,30 @@ from __future__ import annotations
 
 import time
 from collections.abc import Mapping
+from contextlib import ExitStack
 from dataclasses import asdict
 from os import PathLike, fspath
 from typing import Any
 
 import numpy as np
 
-from oed.controllers.clients.checks import check_start, check_status, status_problem
+from oed.controllers.clients.checks import check_start, check_status, require_known_form, status_problem
 from oed.controllers.clients.ending import Ending
 from oed.controllers.clients.options import StreamOptions
 from oed.controllers.clients.requests import Requests
 from oed.controllers.clients.result import StreamResult
-from oed.controllers.errors import ControllerError, PointRefusedError
+from oed.controllers.clients.traffic import Traffic
+from oed.controllers.clients.watching import tolerances, watch_of
+from oed.controllers.errors import ControllerError, NoReplyError, PointRefusedError
 from oed.controllers.interrupts import signals_held
 from oed.controllers.links import Endpoint, open_link
 from oed.controllers.recording.clock import ClockAnchor
 from oed.controllers.recording.log_file import check_log_path
+from oed.controllers.recording.pose import require_torque
 from oed.controllers.recording.recorder import Recorder
 from oed.controllers.recording.recording import with_rows
 from oed.controllers.recording.reported_joints import require_no_further_joints, warn_of_other_robot
-from oed.exports.simple_message import trajectory_points
+from oed.exports.simple_message import JointPosition, trajectory_points
 from oed.exports.simple_message.kinds import JOINTS
 from oed.exports.trajectory_checks import check_trajectory
 from robots.common.errors import InputError, OedError
@@ -33,6 +37,9 @@ from robots.signals import Motion
 from robots.version import VERSION
 
 CLEAR = "clear it at the controller, move the robot to the start of the trajectory, and play it again"
+
+CLOSES = 0.1
+"""How long a link that is closed at once is waited for [s]."""
 
 PINGS = 9
 """Pings from which the delay is measured."""
@@ -70,7 +77,7 @@ def stream(
         anchor: the end of the log whose clock this one continues.
         needs_torque: refuse a controller whose feedback carries neither torque nor current.
         file: the trajectory's file, for messages.
-        dry_run: check everything, send no point and write nothing.
+        dry_run: check everything that feedback shows, send nothing but pings that are asked for, and write nothing.
         force: whether an existing log may be replaced.
         progress: listener.
 
@@ -90,61 +97,80 @@ def stream(
     check_trajectory(motion, robot, metadata, file)
     if motion.n > JOINTS:
         raise InputError(f"{motion.n} joints", file=file, allowed=f"up to {JOINTS}, as simple_message has")
+    tolerances(robot, options.tolerance)
+    most = None if options.driver is None else options.driver.most
+    if most is not None and len(motion) > most:
+        assert options.driver is not None
+        raise InputError(
+            f"{len(motion)} points",
+            file=file,
+            allowed=f"up to {most}, as {options.driver.title} holds",
+            remedy="play it with a longer --period, or a program of `oed export` on the controller",
+        )
     if not dry_run:
         if log is None:
             raise InputError("no log file for the feedback", remedy="give one")
         check_log_path(log, force)
     recorder = Recorder(
-        open_link(endpoint, endpoint.state_port), robot, endpoint.form, options.patience, endpoint.connect_time
+        open_link(endpoint, endpoint.state_port),
+        robot,
+        endpoint.form,
+        options.patience,
+        endpoint.connect_time,
+        answers=not dry_run,
     )
     source = f"feedback of {endpoint.place(endpoint.state_port)}"
     known = {"robot": robot.name, "source": source, "tool": VERSION, **(header or {})}
-    requests: Requests | None = None
+    traffic = Traffic()
     begin, ended = time.monotonic(), "interrupted"
     failure: OedError | None = None
     try:
         pose = recorder.wait_for_feedback()
-        require_no_further_joints(pose[robot.n :], robot)
+        if not options.external_axes:
+            require_no_further_joints(pose[robot.n :], robot)
         if not options.ignore_status and recorder.is_moving(options.start_tolerance):
             raise ControllerError(
                 "the robot is moving", remedy="wait for the end of its motion; another client may be playing it"
             )
         check_start(motion.q[0], pose[: robot.n], options.start_tolerance)
-        with open_link(endpoint, endpoint.motion_port) as link:
-            if needs_torque and not recorder.has_torque:
-                raise ControllerError(
-                    f"the feedback of {endpoint.place(endpoint.state_port)} carries neither torque nor current",
-                    remedy="a controller program must send them (message type 9015)",
-                )
-            requests = Requests(link, endpoint.form, options)
-            for number in range(PINGS if options.ping else 0):
-                requests.ping(None if number else max(options.patience, endpoint.connect_time))
+        if needs_torque:
+            require_torque(recorder.layout, endpoint)
+        require_known_form(options, endpoint, recorder.layout.kind is JointPosition)
+        with ExitStack() as links:
+            requests = None
+            # A motion port may belong to a driver that moves on what it does not know, or drops its client.
+            if options.ping or not dry_run:
+                link = links.enter_context(open_link(endpoint, endpoint.motion_port))
+                # A port that serves another client closes the link, or says something.
+                link.receive(CLOSES)
+                requests = Requests(link, endpoint.form, options, traffic)
+                for number in range(PINGS if options.ping else 0):
+                    requests.ping(None if number else max(options.patience, endpoint.connect_time))
             if not options.ignore_status and status_problem(recorder.status) is not None:
                 # The error of an interrupted motion ends with the link of the next client.
                 check_status(recorder.renewed_status(), endpoint.place(endpoint.state_port))
             if not dry_run:
                 assert log is not None
-                recorder.begin(log, known, anchor=anchor, delay=requests.traffic.delay, force=force)
+                assert requests is not None
+                recorder.begin(log, known, anchor=anchor, delay=traffic.delay, force=force)
                 begin = time.monotonic()
                 try:
                     _play(motion, robot, requests, recorder, options, progress)
                 finally:
                     with signals_held():
-                        if not requests.traffic.stopped:
+                        if traffic.begun and not traffic.stopped:
                             requests.stop()
         ended = "done"
     except OedError as error:
         failure, ended = error, error.problem
     finally:
         duration = time.monotonic() - begin
-        delay = requests.traffic.delay if requests else None
-        traffic = requests.traffic if requests else None
         final = {
             "complete": ended == "done",
             "ended": ended,
-            "sent_points": traffic.sent if traffic else 0,
-            "resent_points": traffic.resent if traffic else 0,
-            "message_delay": delay,
+            "sent_points": traffic.sent,
+            "resent_points": traffic.resent,
+            "message_delay": traffic.delay,
         }
         with signals_held():
             try:
@@ -154,21 +180,20 @@ def stream(
         # The terminal may be lost: the log comes first.
         progress.finish()
     if failure is not None:
-        stop = "" if requests and requests.traffic.stopped else "the controller did not confirm the stop"
+        stop = "the controller did not confirm the stop" if traffic.begun and not traffic.stopped else ""
         raise with_rows(failure, recorder.rows, log, stop)
-    assert requests is not None
     if recorder.lowest is not None and recorder.highest is not None:
-        warn_of_other_robot(robot, recorder.lowest, recorder.highest)
+        warn_of_other_robot(robot, recorder.lowest, recorder.highest, motion.q)
     return StreamResult(
         robot=robot.name,
         place=endpoint.place(endpoint.motion_port),
         points=len(motion),
-        sent=requests.traffic.sent,
-        resent=requests.traffic.resent,
-        unexpected=requests.traffic.unexpected,
+        sent=traffic.sent,
+        resent=traffic.resent,
+        unexpected=traffic.unexpected,
         duration=duration,
-        delay=delay,
-        stopped=requests.traffic.stopped,
+        delay=traffic.delay,
+        stopped=traffic.stopped,
         log="" if dry_run else fspath(log or ""),
         rows=recorder.rows,
         feedback=recorder.statistics.summary(),
@@ -183,8 +208,20 @@ def _play(
     motion: Motion, robot: Robot, requests: Requests, recorder: Recorder, options: StreamOptions, progress: Progress
 ) -> None:
     """Sends all points and waits for the end of the motion."""
-    points = trajectory_points(motion, robot.limits, kind=options.points, robot_id=options.robot_id)
+    # Zero is a place to go to, for an axis that there is.
+    further = tuple(recorder.positions[robot.n :].tolist()) if recorder.positions is not None else ()
+    resting = options.driver.resting_velocity if options.driver is not None else 0.0
+    points = trajectory_points(
+        motion,
+        robot.limits,
+        kind=options.points,
+        robot_id=options.robot_id,
+        resting=resting,
+        further=further,
+    )
     ending = Ending(motion, recorder, options.start_tolerance, options.patience)
+    path = watch_of(motion, robot, options.tolerance, options.timed, 1.0 if recorder.layout.stamped else options.speed)
+    recorder.watch = None if path is None else path.see
 
     def watch() -> None:
         recorder.check()
@@ -196,6 +233,7 @@ def _play(
         watch()
         requests.keep_alive()
 
+    requests.start()
     progress.start("playing", float(len(motion)))
     if options.download:
         requests.download(points, watch, lambda count: progress.update(float(count)))
@@ -203,6 +241,14 @@ def _play(
         longest = float(np.diff(motion.t).max()) if len(motion) > 1 else 0.0
         try:
             requests.stream(points, watch, lambda count: progress.update(float(count)), longest)
+        except NoReplyError as error:
+            # No reply comes at a full buffer; a controller that is gone falls silent at both ports.
+            if time.monotonic() - recorder.last_heard > options.patience / 2:
+                raise
+            raise ControllerError(
+                f"the controller takes no points: {error.problem}, but its feedback arrives",
+                remedy="its buffer does not empty: check drives, mode, the running program and the motion port",
+            ) from error
         except PointRefusedError as error:
             requests.stop()
             # The reply comes before the next report of the state, which says why.

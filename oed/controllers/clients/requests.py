@@ -1,4 +1,4 @@
-"""Requests and their replies: pings, points with a window, and the stop."""
+"""Requests and their replies: points with a window, and the stop."""
 
 from __future__ import annotations
 
@@ -7,21 +7,25 @@ from collections import OrderedDict
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import suppress
 
+from oed.controllers.clients.channel import Channel
 from oed.controllers.clients.options import StreamOptions
+from oed.controllers.clients.replies import Verdict, answer_of, confirms_stop, described, reason
 from oed.controllers.clients.traffic import Request, Traffic
-from oed.controllers.errors import ControllerError, LinkError, PointRefusedError, ProtocolError
+from oed.controllers.errors import ControllerError, NoReplyError, PointRefusedError
 from oed.controllers.links import Link
 from oed.exports.simple_message import (
     Bare,
     Comm,
+    Command,
     Frame,
     FullPoint,
     Kind,
-    MessageError,
-    Ping,
+    MotionControl,
+    MotionReply,
     Point,
-    Reply,
+    Result,
     Special,
+    Valid,
     WireFormat,
 )
 from robots.common.errors import OedError
@@ -29,66 +33,55 @@ from robots.common.errors import OedError
 STOPS = 5
 """How often a stop that is not confirmed is sent."""
 
-TURN = 0.05
+BUSY = 0.002
+"""A driver that is busy with a point is asked again after so long [s]."""
+
+STARTS = 10.0
+"""How long drives may take to get power [s]."""
+
+TURN = 0.02
 """Longest wait between two looks at what else happens [s]."""
 
 
-class Requests:
-    """Sends requests over one link and looks at the replies.
+class Requests(Channel):
+    """Sends points and stops as requests and looks at the replies; see `Channel`."""
 
-    Args:
-        link: to the motion port.
-        form: of the messages.
-        options: of the stream.
-    """
+    def __init__(self, link: Link, form: WireFormat, options: StreamOptions, traffic: Traffic | None = None) -> None:
+        super().__init__(link, form, options, traffic)
+        self._unanswered = 0
+        self._came = ""
+        self._commands = options.driver is not None and options.driver.commands
 
-    def __init__(self, link: Link, form: WireFormat, options: StreamOptions) -> None:
-        self.link = link
-        self.traffic = Traffic()
-        self._form = form
-        self._options = options
-        self._last_sent = 0.0
-        self._last_data = b""
+    @property
+    def _kind(self) -> int:
+        return Kind.JOINT_TRAJ_PT_FULL if self._options.points == "full" else Kind.JOINT_TRAJ_PT
 
-    def ping(self, patience: float | None = None) -> float:
-        """Pings until an answer comes, and returns its round trip [s].
+    def start(self) -> None:
+        """Makes a driver ready that must be told to, as Motoman's: its drives get power.
 
         Raises:
-            ProtocolError: no ping was ever answered.
-            LinkError: no answer any more.
+            ControllerError: it does not become ready; the message says why.
         """
-        data = self._form.encode(Frame(Ping(), Comm.REQUEST))
-        end = time.monotonic() + (self._options.patience if patience is None else patience)
-        wrong: str | None = None
-        while time.monotonic() < end:
-            start = time.monotonic()
-            self._put(data)
-            until = min(end, start + (self._options.patience if self.link.reliable else self._options.reply_time))
-            while (left := until - time.monotonic()) > 0:
-                try:
-                    frame = self._received(left, strict=True)
-                except MessageError as error:
-                    if self.link.reliable:
-                        raise ProtocolError(f"{self.link.place} speaks another protocol: {error}") from error
-                    wrong = str(error)
-                    continue
-                if frame is not None and frame.comm == Comm.REPLY and frame.message.kind == Kind.PING:
-                    if frame.reply != Reply.SUCCESS:
-                        raise ControllerError(f"{self.link.place} refuses a ping")
-                    self.traffic.pings.append(time.monotonic() - start)
-                    self._last_sent = start
-                    return self.traffic.pings[-1]
-        if wrong is not None:
-            raise ProtocolError(f"{self.link.place} speaks another protocol or format: {wrong}")
-        raise (LinkError if self.traffic.pings else ProtocolError)(
-            f"{self.link.place} does not answer a ping",
-            remedy="check host and motion port; a controller that knows no pings needs --no-ping",
+        driver = self._options.driver
+        if driver is None or not driver.commands:
+            return
+        order = MotionControl(robot_id=self._options.robot_id, command=Command.START)
+        self._put(self._form.encode(Frame(order, Comm.REQUEST)))
+        end = time.monotonic() + STARTS
+        while (left := end - time.monotonic()) > 0:
+            frame = self._received(left)
+            reply = None if frame is None else frame.message
+            if isinstance(reply, MotionReply) and reply.command == Command.START:
+                if reply.result == Result.SUCCESS:
+                    return
+                raise ControllerError(
+                    f"{driver.title} is not ready: it reports {reason(reply)}",
+                    remedy="clear it at the controller: remote and play mode, no alarm, no emergency stop",
+                )
+        raise ControllerError(
+            f"{driver.title} does not answer its start command for {STARTS:g} s",
+            remedy="check the motion port and --driver",
         )
-
-    def keep_alive(self) -> None:
-        """Pings if nothing was sent for half a second, without waiting long."""
-        if self._options.ping and time.monotonic() - self._last_sent > 0.5:
-            self.ping()
 
     def stream(
         self,
@@ -107,7 +100,8 @@ class Requests:
 
         Raises:
             PointRefusedError: a point that is refused.
-            LinkError: no reply within the patience, or a closed connection.
+            NoReplyError: no reply within the patience.
+            LinkError: a closed connection, or another protocol.
         """
         waiting: OrderedDict[int, Request] = OrderedDict()
         source = iter(points)
@@ -126,12 +120,16 @@ class Requests:
             frame = self._received(self._next_turn(waiting))
             now = time.monotonic()
             if frame is not None and frame.comm == Comm.REPLY:
+                self._unanswered = max(self._unanswered - 1, 0)
                 number = self._answered(frame, waiting)
                 if number is None:
-                    self.traffic.unexpected += 1
+                    self.traffic.unexpected += bool(self._came)
                 else:
                     request = waiting.pop(number)
+                    if request.tries == 1:
+                        self.traffic.shortest = min(self.traffic.shortest, now - request.first)
                     self.traffic.sent += 1
+                    self._came = ""
                     advance(self.traffic.sent)
                     if not known:
                         known, window = True, 1 if isinstance(frame.message, Bare) else self._options.window
@@ -170,10 +168,14 @@ class Requests:
 
     def stop(self) -> bool:
         """Orders the robot to stop, several times if need be; says whether the controller confirmed it."""
-        if self._options.points == "full":
-            order: FullPoint | Point = FullPoint(
+        order: FullPoint | Point | MotionControl
+        if self._commands:
+            order = MotionControl(robot_id=self._options.robot_id, command=Command.STOP)
+        elif self._options.points == "full":
+            order = FullPoint(
                 robot_id=self._options.robot_id,
                 sequence=Special.STOP,
+                valid=Valid.NONE,
                 time=0.0,
                 positions=(),
                 velocities=(),
@@ -182,19 +184,27 @@ class Requests:
         else:
             order = Point(sequence=Special.STOP, positions=(), velocity=0.0, duration=0.0)
         data = self._form.encode(Frame(order, Comm.REQUEST))
+        # By UDP the late reply to a point, without a body, looks like that to a stop that is lost.
+        doubtful = 0 if self.link.reliable else min(self._unanswered, STOPS - 1)
         with suppress(OedError):
             for _ in range(1 if self.link.reliable else STOPS):
                 self._put(data)
                 end = time.monotonic() + (0.5 if self.link.reliable else self._options.reply_time)
                 while (left := end - time.monotonic()) > 0:
                     frame = self._received(left)
-                    if frame is not None and frame.comm == Comm.REPLY and _confirms_stop(frame, order):
+                    if frame is None or frame.comm != Comm.REPLY or not confirms_stop(frame, self._kind):
+                        continue
+                    if not isinstance(frame.message, Bare) or not doubtful:
                         self.traffic.stopped = True
                         return True
+                    doubtful -= 1
+                    break
         return False
 
     def _send(self, waiting: OrderedDict[int, Request], point: FullPoint | Point) -> None:
         data = self._form.encode(Frame(point, Comm.REQUEST))
+        self.traffic.begun = True
+        self._unanswered += 1
         self._put(data)
         self._last_sent = now = time.monotonic()
         waiting[point.sequence] = Request(data, now, now)
@@ -214,6 +224,7 @@ class Requests:
             numbered = Point(
                 sequence=number, positions=point.positions, velocity=point.velocity, duration=point.duration
             )
+        self.traffic.begun = True
         self._put(self._form.encode(Frame(numbered, Comm.TOPIC)))
         self._last_sent = time.monotonic()
         self.traffic.sent += 1
@@ -225,75 +236,50 @@ class Requests:
         return min(TURN, max(0.0, oldest + self._options.reply_time - time.monotonic()))
 
     def _answered(self, frame: Frame, waiting: OrderedDict[int, Request]) -> int | None:
-        """Gives the number of the point that a reply is for; None for one that is not expected."""
-        if frame.message.kind != (Kind.JOINT_TRAJ_PT_FULL if self._options.points == "full" else Kind.JOINT_TRAJ_PT):
+        """Gives the number of the point that a reply confirms; None for one that confirms none."""
+        # Who replies so refuses a stop that is a point.
+        self._commands = self._commands or isinstance(frame.message, MotionReply)
+        answer = answer_of(frame, self._kind)
+        number, oldest = answer.number, next(iter(waiting))
+        # Drivers need not repeat the number. By TCP replies come in the order of the points.
+        if number is None or (number <= 0 and number not in waiting and self.link.reliable):
+            number = oldest
+        if answer.verdict == Verdict.OTHER or number not in waiting:
+            self._came = described(frame)
             return None
-        number = next(iter(waiting)) if isinstance(frame.message, Bare) else frame.message.sequence  # type: ignore[union-attr]
-        if number not in waiting:
-            return None
-        if frame.reply != Reply.SUCCESS:
+        if answer.verdict == Verdict.REFUSED:
             raise PointRefusedError(
-                f"the controller refuses point {number}",
+                f"the controller refuses point {number}" + (f": it reports {answer.why}" if answer.why else ""),
                 remedy="see its display: a limit, an error, a lost point or an empty buffer are usual causes",
             )
+        if answer.verdict == Verdict.BUSY:
+            time.sleep(BUSY)
+            self._put(waiting[number].data)
+            waiting[number].tries += 1
+            return None
         return int(number)
 
     def _again(self, waiting: OrderedDict[int, Request], now: float, patience: float) -> None:
         """Sends again what was not answered, up to the patience."""
         for number, request in waiting.items():
             if now - request.first > patience:
-                self._give_up(number, now - request.first)
+                came = f"; {self._came} came instead" if self._came else ""
+                raise NoReplyError(
+                    f"no reply to point {number} for {now - request.first:.1f} s from {self.link.place}{came}",
+                    remedy="check the controller and the network",
+                )
             if not self.link.reliable and now - request.sent >= self._options.reply_time:
                 self._put(request.data)
+                self._unanswered += 1
                 request.sent = now
                 request.tries += 1
                 self.traffic.resent += 1
-
-    def _give_up(self, number: int, waited: float) -> None:
-        alive = False
-        if self._options.ping:
-            with suppress(OedError):
-                self.ping(min(0.5, self._options.patience))
-                alive = True
-        if alive:
-            raise ControllerError(
-                f"the controller takes no points: no reply to point {number} for {waited:.1f} s, but it answers pings",
-                remedy="its buffer does not empty: check drives, mode, the running program and the motion port",
-            )
-        raise LinkError(
-            f"no reply to point {number} for {waited:.1f} s from {self.link.place}",
-            remedy="check the controller and the network",
-        )
 
     def _drain(self, most: int) -> None:
         """Waits for the replies to points that were sent again: without a body they look like those of later points."""
         end = time.monotonic() + self._options.reply_time
         while most and (left := end - time.monotonic()) > 0:
             if self._received(left) is not None:
+                self._unanswered = max(self._unanswered - 1, 0)
                 self.traffic.unexpected += 1
                 most -= 1
-
-    def _put(self, data: bytes) -> None:
-        self._last_data = data
-        self.link.send(data)
-
-    def _received(self, timeout: float, *, strict: bool = False) -> Frame | None:
-        """Waits for a message; a datagram that is none counts as unexpected."""
-        data = self.link.receive(timeout)
-        if data is None:
-            return None
-        if data == self._last_data:
-            raise ProtocolError(f"{self.link.place} sends back what it is sent: it is no simple_message controller")
-        try:
-            return self._form.decode(data)
-        except MessageError:
-            self.traffic.unexpected += 1
-            if strict or self.link.reliable:
-                raise
-            return None
-
-
-def _confirms_stop(frame: Frame, order: FullPoint | Point) -> bool:
-    if frame.message.kind != order.kind or frame.reply != Reply.SUCCESS:
-        return False
-    return isinstance(frame.message, Bare) or getattr(frame.message, "sequence", None) == Special.STOP

@@ -21,13 +21,13 @@ class StreamResult:
         resent: how often a point was sent again.
         unexpected: replies that were late, came twice, or were no messages.
         duration: of the stream, until the robot stood [s].
-        delay: half the median round trip of a ping [s]; None without pings.
+        delay: see `Traffic.delay` [s].
         stopped: whether the stop at the end was confirmed.
         log: the file; empty for a dry run.
         rows: of the log.
         feedback: rate, loss and jitter.
         status: what the controller reports; empty where it reports nothing.
-        dry_run: whether nothing was sent.
+        dry_run: whether no point was sent.
         note: what went wrong without harm.
         anchor: end of the log, for one that continues its clock.
     """
@@ -56,7 +56,8 @@ class StreamResult:
     def summary(self) -> str:
         """Says in a few lines what happened."""
         if self.dry_run:
-            return f"{self.points} points of {self.robot} may be played at {self.place}; nothing was sent (dry run)"
+            sent = "nothing was sent" if self.delay is None else "only pings were sent"
+            return f"{self.points} points of {self.robot} may be played at {self.place}; {sent} (dry run)"
         rate = self.sent / self.duration if self.duration else 0.0
         lines = [
             f"{self.sent} of {self.points} points played at {self.place} in {self.duration:.1f} s "

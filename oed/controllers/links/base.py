@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
-from typing import Literal
+from typing import Any, Literal
 
+from oed.controllers.drivers import Driver
 from oed.exports.simple_message import DEFAULT, WireFormat
 from oed.exports.simple_message.kinds import MOTION_PORT, STATE_PORT
 from robots.common.errors import InputError
@@ -27,6 +28,8 @@ class Endpoint:
         handshake: the byte that opens a link by UDP.
         connect_time: how long to try [s].
         handshake_interval: between two handshakes [s].
+        one_address: by UDP, whether links come from one port of this computer each time, as a server needs that answers
+            the first handshake only.
     """
 
     host: str
@@ -37,6 +40,28 @@ class Endpoint:
     handshake: int = HANDSHAKE
     connect_time: float = 5.0
     handshake_interval: float = 1.0
+    one_address: bool = False
+
+    @classmethod
+    def of(cls, driver: Driver, host: str, **changes: Any) -> Endpoint:
+        """Makes the endpoint of a driver.
+
+        Args:
+            driver: its profile.
+            host: name or address of the controller.
+            changes: other settings.
+
+        Raises:
+            InputError: see `Endpoint`.
+        """
+        usual = {
+            "transport": driver.transport,
+            "motion_port": driver.motion_port,
+            "state_port": driver.state_port,
+            "form": WireFormat(byte_order=driver.byte_order),
+            "one_address": driver.one_handshake,
+        }
+        return cls(host=host, **(usual | changes))
 
     def __post_init__(self) -> None:
         """Checks the settings.

@@ -8,7 +8,11 @@ import time
 
 from oed.controllers.errors import LinkError, ProtocolError
 from oed.controllers.links.base import Endpoint, Link
+from oed.exports.simple_message import MessageError, WireFormat
 from robots.common.errors import InputError
+
+LOCAL, PORTS = 20_000, 10_000
+"""A link that keeps its address comes from one of so many ports from the first on, below those of the system."""
 
 BUFFER = 2**22
 """Bytes of feedback that the system may hold while we are busy."""
@@ -27,10 +31,13 @@ class UdpLink(Link):
     def __init__(self, endpoint: Endpoint, port: int) -> None:
         self.place = endpoint.place(port)
         self._byte = bytes([endpoint.handshake])
+        self._first: bytes | None = None
         self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
         try:
             self._socket.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, BUFFER)
             self._socket.setblocking(False)
+            if endpoint.one_address:
+                self._bind(LOCAL + port % PORTS)
             try:
                 # `connect` alone has no clear error for a name that cannot be encoded.
                 found = socket.getaddrinfo(endpoint.host, port, socket.AF_INET, socket.SOCK_DGRAM)
@@ -44,6 +51,15 @@ class UdpLink(Link):
             self._socket.close()
             raise
 
+    def _bind(self, local: int) -> None:
+        try:
+            self._socket.bind(("", local))
+        except OSError as error:
+            raise LinkError(
+                f"port {local} of this computer is taken ({(error.strerror or str(error)).lower()})",
+                remedy="end the other program; the controller sends to this port only",
+            ) from error
+
     def _shake_hands(self, endpoint: Endpoint) -> None:
         end = time.monotonic() + endpoint.connect_time
         refused = other = False
@@ -53,6 +69,10 @@ class UdpLink(Link):
             while (left := stop - time.monotonic()) > 0:
                 data = self._wait(left)
                 if data == self._byte:
+                    return
+                if data and self._is_message(endpoint.form, data):
+                    # A server that answers one handshake only goes on with what it does.
+                    self._first = data
                     return
                 if data == b"":
                     refused = True
@@ -72,6 +92,14 @@ class UdpLink(Link):
                 + ("; what answered is no simple_message controller" if other else "")
             ),
         )
+
+    @staticmethod
+    def _is_message(form: WireFormat, data: bytes) -> bool:
+        try:
+            form.decode(data)
+        except MessageError:
+            return False
+        return True
 
     def _try_send(self, data: bytes) -> bool:
         try:
@@ -105,6 +133,9 @@ class UdpLink(Link):
     def receive(self, timeout: float) -> bytes | None:
         """Waits for a datagram; see `Link.receive`. Refusals are left to the time-outs of who waits."""
         end = time.monotonic() + timeout
+        if self._first is not None:
+            first, self._first = self._first, None
+            return first
         while True:
             data = self._wait(end - time.monotonic())
             if data is None:

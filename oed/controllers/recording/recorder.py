@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import threading
 import time
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from os import PathLike
 from typing import Any
 
@@ -15,10 +15,19 @@ from oed.controllers.errors import LinkError, ProtocolError, RecordingError
 from oed.controllers.links import Link
 from oed.controllers.recording.clock import ClockAnchor
 from oed.controllers.recording.feed import Feed
-from oed.controllers.recording.feedback import coarse_clock
+from oed.controllers.recording.feedback import Layout, coarse_clock
 from oed.controllers.recording.log_file import FeedbackLog
 from oed.controllers.recording.statistics import Statistics
-from oed.exports.simple_message import Comm, Frame, Message, MessageError, Ping, Reply, Status, WireFormat
+from oed.exports.simple_message import (
+    Comm,
+    Frame,
+    Message,
+    MessageError,
+    Ping,
+    Reply,
+    Status,
+    WireFormat,
+)
 from robots.common.errors import OedError
 from robots.robot import Robot
 
@@ -43,10 +52,13 @@ class Recorder:
         form: of the messages.
         patience: longest silence [s].
         connect_time: how long the first feedback is waited for [s].
+        answers: whether requests of the controller are answered; otherwise nothing is sent to it.
     """
 
-    def __init__(self, link: Link, robot: Robot, form: WireFormat, patience: float, connect_time: float) -> None:
-        self._link, self._robot, self._form = link, robot, form
+    def __init__(
+        self, link: Link, robot: Robot, form: WireFormat, patience: float, connect_time: float, answers: bool = True
+    ) -> None:
+        self._link, self._robot, self._form, self._answers = link, robot, form, answers
         self._patience, self._connect_time = patience, connect_time
         self._lock = threading.Lock()
         self._end = threading.Event()
@@ -54,7 +66,7 @@ class Recorder:
         self._log: FeedbackLog | None = None
         self._feed = Feed(robot.n, form)
         self._offset, self._clock = 0.0, "controller"
-        self.statistics = Statistics()
+        self.statistics = Statistics(link.reliable)
         self.status: Status | None = None
         self._status_count = 0
         self.positions: Array | None = None
@@ -66,6 +78,9 @@ class Recorder:
         """The controller's time of the last feedback, or ours where it sends none [s]."""
         self.rest_since = self.last_heard = self._last_row = time.monotonic()
         self.error: OedError | None = None
+        self.watch: Callable[[float, Array], None] | None = None
+        """Sees time and positions of each row; what it raises, `check` raises, and the recording goes on."""
+        self._seen: OedError | None = None
         self.received = 0
         self.rows = 0
         """Rows of the log, once it has ended."""
@@ -104,8 +119,8 @@ class Recorder:
         Raises:
             OedError: a closed link, a full disk, a restarted controller, or a silent one.
         """
-        if self.error is not None:
-            raise self.error
+        if self.error is not None or self._seen is not None:
+            raise self.error or self._seen  # type: ignore[misc]
         silence = time.monotonic() - self._last_row
         if silence > self._patience and self._heard.is_set():
             # A state may come just after the last row; one that still comes later shows a live controller.
@@ -128,9 +143,10 @@ class Recorder:
         return float(np.abs(self.highest - self.lowest).max()) > tolerance
 
     @property
-    def has_torque(self) -> bool:
-        """Whether the feedback carries torque or current."""
-        return self._feed.layout is not None and bool(self._feed.layout.effort)
+    def layout(self) -> Layout:
+        """What the feedback carries, once there is any."""
+        assert self._feed.layout is not None
+        return self._feed.layout
 
     def renewed_status(self) -> Status | None:
         """Waits for a state that is reported from now on; gives the last one where none comes in time."""
@@ -175,7 +191,7 @@ class Recorder:
             known["clock_offset"] = offset + late
         log = FeedbackLog(path, layout.columns, layout.units(units), known, digits=layout.digits, force=force)
         with self._lock:
-            self.statistics = Statistics()
+            self.statistics = Statistics(self._link.reliable)
             self.statistics.stamped = layout.stamped
             self._feed.forget()
             self._offset = offset
@@ -240,7 +256,7 @@ class Recorder:
 
     def _take(self, frame: Frame, now: float) -> None:
         message = frame.message
-        if frame.comm == Comm.REQUEST:
+        if frame.comm == Comm.REQUEST and self._answers:
             self._link.send(self._form.encode(Frame(_echo(message), Comm.REPLY, Reply.SUCCESS)))
         self.last_heard = now
         if isinstance(message, Status):
@@ -258,6 +274,11 @@ class Recorder:
         if self.positions is None or np.abs(positions - self.positions).max() > REST:
             self.rest_since = now
         self.positions, self.stamp = positions, stamp
+        if self.watch is not None and self._seen is None:
+            try:
+                self.watch(stamp, positions[: self._robot.n])
+            except OedError as error:
+                self._seen = error
         self.lowest = positions if self.lowest is None else np.minimum(self.lowest, positions)
         self.highest = positions if self.highest is None else np.maximum(self.highest, positions)
         if self._log is None:

@@ -63,6 +63,7 @@ def record(
     *,
     duration: float | None = None,
     patience: float = 2.0,
+    external_axes: bool = False,
     force: bool = False,
     progress: Progress = SILENT,
 ) -> Recording:
@@ -74,6 +75,7 @@ def record(
         log: CSV file.
         duration: of the recording [s]; until Ctrl-C by default.
         patience: longest silence [s].
+        external_axes: whether the controller may report axes behind those of the robot; they are left out.
         force: whether an existing log may be replaced.
         progress: listener.
 
@@ -95,7 +97,9 @@ def record(
     begin, ended, interrupted = time.monotonic(), "interrupted", False
     failure: OedError | None = None
     try:
-        require_no_further_joints(recorder.wait_for_feedback()[robot.n :], robot)
+        pose = recorder.wait_for_feedback()
+        if not external_axes:
+            require_no_further_joints(pose[robot.n :], robot)
         recorder.begin(log, {"robot": robot.name, "source": f"feedback of {place}", "tool": VERSION}, force=force)
         begin = time.monotonic()
         progress.start("recording", duration)

@@ -31,17 +31,17 @@ def require_no_further_joints(unused: Array, robot: Robot) -> None:
         raise InputError(
             f"the controller reports a joint {joint}, {robot.name} has {robot.n}",
             joint=joint,
-            remedy="the controller is of another robot: correct --robot",
+            remedy="the controller is of another robot: correct --robot; or these are external axes: --external-axes",
         )
 
 
-def warn_of_other_robot(robot: Robot, lowest: Array, highest: Array) -> None:
+def warn_of_other_robot(robot: Robot, lowest: Array, highest: Array, planned: Array | None = None) -> None:
     """Warns of what `doubts_about_robot` finds."""
-    for doubt in doubts_about_robot(robot, lowest, highest):
+    for doubt in doubts_about_robot(robot, lowest, highest, planned):
         warnings.warn(OtherRobotWarning(doubt), stacklevel=3)
 
 
-def doubts_about_robot(robot: Robot, lowest: Array, highest: Array) -> list[str]:
+def doubts_about_robot(robot: Robot, lowest: Array, highest: Array, planned: Array | None = None) -> list[str]:
     """Names what speaks against a robot in the positions that its controller reports.
 
     Feedback does not say how many joints there are: those that a controller lacks read zero.
@@ -50,9 +50,12 @@ def doubts_about_robot(robot: Robot, lowest: Array, highest: Array) -> list[str]
         robot: the robot.
         lowest: smallest reported positions (10,) [rad or m].
         highest: largest ones (10,).
+        planned: the positions that were played (N, n); a joint that is held at zero reads zero.
     """
     found, n = [], robot.n
     silent = (lowest[:n] == 0) & (highest[:n] == 0)
+    if planned is not None:
+        silent &= (planned != 0).any(axis=0)
     real = int(np.flatnonzero(~silent)[-1]) + 1 if (~silent).any() else n
     if real < n:
         joints = ", ".join(str(joint) for joint in range(real + 1, n + 1))

@@ -11,9 +11,14 @@ LEARNING = 50
 
 
 class Statistics:
-    """Counts without keeping: its memory does not grow."""
+    """Counts without keeping: its memory does not grow.
 
-    def __init__(self) -> None:
+    Args:
+        reliable: whether the link loses nothing, as TCP. Stamps that jitter are no gaps then.
+    """
+
+    def __init__(self, reliable: bool = False) -> None:
+        self._reliable = reliable
         self.rows = self.late = self.lost = self.malformed = 0
         self.stamped = False
         self._steps: list[float] = []
@@ -55,7 +60,7 @@ class Statistics:
 
     def _lose(self, step: float) -> None:
         # Times of arrival jitter: only the controller's own stamps show what is missing.
-        if self.stamped and self._period:
+        if self.stamped and self._period and not self._reliable:
             self.lost += max(0, round(step / self._period) - 1)
 
     @property

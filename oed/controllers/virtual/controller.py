@@ -2,35 +2,46 @@
 
 from __future__ import annotations
 
-import heapq
 import select
 import threading
 import time
-from collections.abc import Callable
 from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
 
 from oed.controllers.virtual.faults import Network
+from oed.controllers.virtual.fixed_packets import FixedPackets
 from oed.controllers.virtual.messages import feedback_frame, reply_frame, status_frame
+from oed.controllers.virtual.motoman import MotomanProgram
+from oed.controllers.virtual.opening import open_ports
 from oed.controllers.virtual.options import ControllerOptions
 from oed.controllers.virtual.player import REPORTED, Outcome, Player
-from oed.controllers.virtual.ports import Client, Port, TcpPort, UdpPort
+from oed.controllers.virtual.ports import Client, Port
 from oed.controllers.virtual.robot import VirtualRobot
-from oed.exports.simple_message import Comm, Frame, FullPoint, MessageError, Ping, Point, Reply, Special
+from oed.exports.simple_message import (
+    Comm,
+    Frame,
+    FullPoint,
+    MessageError,
+    Ping,
+    Point,
+    Reply,
+    Special,
+    Valid,
+)
 from robots.common.errors import InputError
 from robots.plants import Plant, nominal_plant
 from robots.robot import Robot
 
 Array = NDArray[np.float64]
 
+NEEDED = Valid.TIME | Valid.POSITION
+"""What a point must state."""
+
 STATUS_PERIOD = 0.1
 WAITING = 256
 """Requests that wait for room in the buffer, at most."""
-
-DELAYED = 100_000
-"""Datagrams on their way, at most."""
 
 LONGEST_WAIT, SHORTEST_WAIT = 0.02, 0.0005
 STALL = 0.15
@@ -68,32 +79,20 @@ class VirtualController:
         if self.options.feedback == "torque":
             virtual = VirtualRobot(plant or nominal_plant(robot), self.options.feedback_period, seed)
         self._virtual = virtual
-        self._motion, self._state = self._open_ports()
+        driver = self.options.driver
+        self._fixed = FixedPackets if driver is not None and driver.fixed_packets else None
+        self._motion, self._state = open_ports(self.options)
         self._network = Network(self.options.faults)
         self._start_over(pose)
-        self._delayed: list[tuple[float, int, Callable[[], None]]] = []
-        self._delayed_count = 0
         self._stopping = threading.Event()
         self._thread: threading.Thread | None = None
         self.received = self.malformed = self.refused = self.restarts = self.points = 0
         self.stalled = 0.0
 
-    def _open_ports(self) -> tuple[Port, Port]:
-        o = self.options
-        if o.transport == "tcp":
-            motion: Port = TcpPort(o.host, o.motion_port, o.form, 1)
-        else:
-            motion = UdpPort(o.host, o.motion_port, o.handshake, 1, False)
-        try:
-            if o.transport == "tcp":
-                return motion, TcpPort(o.host, o.state_port, o.form, 4)
-            return motion, UdpPort(o.host, o.state_port, o.handshake, 4, True)
-        except BaseException:
-            motion.close()
-            raise
-
     def _start_over(self, pose: Array) -> None:
         self._player = Player(pose, self._virtual, self.options)
+        self._commands = MotomanProgram()
+        self._external = self.options.external
         self._waiting: dict[tuple[Client, int], Frame] = {}
         self._clock_ticks = self._sent = 0
         self._due_from = time.monotonic()
@@ -160,31 +159,19 @@ class VirtualController:
     def _turn(self) -> None:
         now = time.monotonic()
         wait = min(LONGEST_WAIT, self._due_from + self.options.feedback_period / self.options.speed - now)
-        if self._delayed:
-            wait = min(wait, self._delayed[0][0] - now)
+        wait = min(wait, self._network.next - now)
         ports = {sock: port for port in (self._motion, self._state) for sock in port.sockets()}
         for sock in select.select(list(ports), [], [], max(wait, SHORTEST_WAIT))[0]:
             port = ports[sock]
             for client, data in port.receive(sock, time.monotonic()):
-                self._travel(partial(self._deliver, port, client, data))
+                self._network.send(time.monotonic(), partial(self._deliver, port, client, data))
         now = time.monotonic()
-        while self._delayed and self._delayed[0][0] <= now:
-            heapq.heappop(self._delayed)[2]()
+        self._network.deliver(now)
         self._advance(now)
-
-    def _travel(self, arrive: Callable[[], None]) -> None:
-        """Lets a datagram through the network."""
-        now = time.monotonic()
-        for due in self._network.arrivals(now):
-            if due <= now:
-                arrive()
-            elif len(self._delayed) < DELAYED:
-                self._delayed_count += 1
-                heapq.heappush(self._delayed, (due, self._delayed_count, arrive))
 
     def _send(self, port: Port, client: Client, data: bytes) -> None:
         if not self._silent:
-            self._travel(lambda: port.send(client, data))
+            self._network.send(time.monotonic(), lambda: port.send(client, data))
 
     def _deliver(self, port: Port, client: Client, data: bytes) -> None:
         self.received += 1
@@ -198,7 +185,10 @@ class VirtualController:
         if client not in port.clients or len(data) == 1:
             return
         try:
-            frame = self.options.form.decode(data)
+            if port is self._motion and self._fixed is not None:
+                frame = self._fixed(self.options.form).point(data)
+            else:
+                frame = self.options.form.decode(data)
         except MessageError:
             self.malformed += 1
             return
@@ -208,7 +198,17 @@ class VirtualController:
             self._send(port, client, self.options.form.encode(reply_frame(frame, Reply.SUCCESS, self.options)))
 
     def _handle(self, client: Client, frame: Frame) -> None:
-        message = frame.message
+        message, driver = frame.message, self.options.driver
+        if driver is not None and driver.pings == "end" and not isinstance(message, Point):
+            self.refused += 1
+            self._motion.drop(client)
+            return
+        if driver is not None and driver.commands and not isinstance(message, Ping):
+            before = self._player.accepted
+            reply = self._commands.answer(message, self._player, self._state_now == "ready")
+            self._send(self._motion, client, self.options.form.encode(reply))
+            self._count(self._player.accepted - before)
+            return
         if isinstance(message, Ping):
             self._answer(client, frame, Reply.SUCCESS)
             return
@@ -228,19 +228,28 @@ class VirtualController:
         if self._state_now != "ready":
             self._answer(client, frame, Reply.FAILURE)
             return
+        if isinstance(message, FullPoint) and message.valid & NEEDED != NEEDED:
+            self._answer(client, frame, Reply.FAILURE)
+            return
+        if self._external:
+            n = len(self._player.pose)
+            self._external = message.positions[n : n + len(self._external)]
         outcome = self._player.put(message, time.monotonic(), streaming=frame.comm == Comm.REQUEST)
         if outcome == Outcome.FULL:
             if len(self._waiting) < WAITING:
                 self._waiting[client, message.sequence] = frame
             return
-        if outcome == Outcome.ACCEPTED:
-            self.points += 1
-            self._break_as_ordered()
+        self._count(int(outcome == Outcome.ACCEPTED))
         self._answer(client, frame, Reply.FAILURE if outcome is None else Reply.SUCCESS)
 
     def _answer(self, client: Client, frame: Frame, code: Reply) -> None:
         if frame.comm == Comm.REQUEST:
             self._send(self._motion, client, self.options.form.encode(reply_frame(frame, code, self.options)))
+
+    def _count(self, points: int) -> None:
+        if points:
+            self.points += points
+            self._break_as_ordered()
 
     def _break_as_ordered(self) -> None:
         """Has the faults that come after a number of points."""
@@ -256,7 +265,7 @@ class VirtualController:
             self.restarts += 1
             self._motion.forget()
             self._state.forget()
-            self._delayed.clear()
+            self._network.clear()
             self._start_over(self._player.pose)
 
     def _advance(self, now: float) -> None:
@@ -274,9 +283,10 @@ class VirtualController:
                 break
             self._due_from += step
             self._clock_ticks += 1
-            if self._state.clients:
+            if self._state.clients and self._clock_ticks % self.options.feedback_every == 0:
                 self._sent += 1
-                data = self.options.form.encode(feedback_frame(sample, clock, self._sent, self.options.feedback))
+                feedback = feedback_frame(sample, clock, self._sent, self.options.feedback, self._external)
+                data = self.options.form.encode(feedback)
                 for client in list(self._state.clients):
                     self._send(self._state, client, data)
                 if self.options.status and clock >= self._status_due:

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import heapq
+import math
 import random
+from collections.abc import Callable
 
 from oed.controllers.virtual.options import Faults
 
@@ -10,8 +13,12 @@ OVERTAKEN = 0.005
 """A reordered datagram is held back for so long [s], so that the next one overtakes it."""
 
 
+DELAYED = 100_000
+"""Datagrams on their way, at most."""
+
+
 class Network:
-    """Decides for each datagram when it arrives.
+    """Decides for each datagram when it arrives, and delivers it then.
 
     Args:
         faults: what goes wrong.
@@ -20,6 +27,31 @@ class Network:
     def __init__(self, faults: Faults) -> None:
         self._faults = faults
         self._random = random.Random(faults.seed)
+        self._delayed: list[tuple[float, int, Callable[[], None]]] = []
+        self._count = 0
+
+    @property
+    def next(self) -> float:
+        """When the next datagram arrives [s]; infinity for none."""
+        return self._delayed[0][0] if self._delayed else math.inf
+
+    def send(self, now: float, arrive: Callable[[], None]) -> None:
+        """Lets a datagram travel; `arrive` is called at once, later, twice or never."""
+        for due in self.arrivals(now):
+            if due <= now:
+                arrive()
+            elif len(self._delayed) < DELAYED:
+                self._count += 1
+                heapq.heappush(self._delayed, (due, self._count, arrive))
+
+    def deliver(self, now: float) -> None:
+        """Delivers what arrives up to a time [s]."""
+        while self._delayed and self._delayed[0][0] <= now:
+            heapq.heappop(self._delayed)[2]()
+
+    def clear(self) -> None:
+        """Loses everything that is on its way."""
+        self._delayed.clear()
 
     def arrivals(self, now: float) -> list[float]:
         """Gives the times at which a datagram that is sent now arrives: none, one or two [s]."""

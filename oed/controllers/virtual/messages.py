@@ -10,8 +10,12 @@ from oed.exports.simple_message import (
     Frame,
     JointFeedback,
     JointPosition,
+    Message,
+    MotionControl,
+    MotionReply,
     Ping,
     Reply,
+    Result,
     Status,
     TorqueFeedback,
     Valid,
@@ -22,13 +26,34 @@ SAMPLED = Valid.TIME | Valid.POSITION | Valid.VELOCITY | Valid.ACCELERATION
 
 
 def reply_frame(request: Frame, code: Reply, options: ControllerOptions) -> Frame:
-    """Answers a request: without a body as the thesis' program does, or with the message itself."""
-    bare = options.replies == "bare" or isinstance(request.message, Ping)
-    message = Bare(kind=request.message.kind) if bare else request.message
-    return Frame(Ping() if isinstance(request.message, Ping) else message, Comm.REPLY, code)
+    """Answers a request: without a body as the thesis' program does, as JOINT_POSITION, or with the message itself."""
+    asked = request.message
+    if isinstance(asked, Ping):
+        return Frame(Ping(), Comm.REPLY, code)
+    if options.replies == "bare":
+        return Frame(Bare(kind=asked.kind), Comm.REPLY, code)
+    if options.replies == "position":
+        return Frame(JointPosition(sequence=getattr(asked, "sequence", 0), positions=()), Comm.REPLY, code)
+    return Frame(asked, Comm.REPLY, code)
 
 
-def feedback_frame(sample: Sample, clock: float, number: int, kind: str) -> Frame:
+def motion_reply(asked: Message, result: Result, subcode: int = 0) -> Frame:
+    """Answers as Motoman's driver does: the code of the reply is SUCCESS, whatever the result."""
+    command = asked.command if isinstance(asked, MotionControl) else asked.kind
+    return Frame(
+        MotionReply(
+            robot_id=getattr(asked, "robot_id", -1),
+            sequence=getattr(asked, "sequence", -1),
+            command=command,
+            result=result,
+            subcode=subcode,
+        ),
+        Comm.REPLY,
+        Reply.SUCCESS,
+    )
+
+
+def feedback_frame(sample: Sample, clock: float, number: int, kind: str, external: tuple[float, ...] = ()) -> Frame:
     """Reports what the robot does.
 
     Args:
@@ -36,10 +61,16 @@ def feedback_frame(sample: Sample, clock: float, number: int, kind: str) -> Fram
         clock: the controller's time [s].
         number: of the message.
         kind: see `ControllerOptions.feedback`.
+        external: positions of further axes.
     """
     q, dq, ddq = (tuple(values.tolist()) for values in (sample.q, sample.dq, sample.ddq))
+    q = (*q, *external)
     if kind == "position":
         return Frame(JointPosition(sequence=number, positions=q))
+    if kind == "feedback":
+        return Frame(
+            JointFeedback(valid=Valid.POSITION, time=0.0, positions=q, velocities=(), accelerations=()),
+        )
     if kind == "full" or sample.tau is None:
         return Frame(JointFeedback(valid=SAMPLED, time=clock, positions=q, velocities=dq, accelerations=ddq))
     return Frame(

@@ -3,9 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, fields
-from typing import Literal
+from typing import Any, Literal, get_args
 
+from oed.controllers.drivers import Driver
+from oed.controllers.drivers.base import Replies
 from oed.controllers.links.base import HANDSHAKE
+from oed.controllers.virtual.path_faults import KINDS
+from oed.controllers.virtual.path_faults import Kind as PathKind
 from oed.exports.simple_message import DEFAULT, WireFormat
 from oed.exports.simple_message.kinds import MOTION_PORT, STATE_PORT
 from robots.common.errors import InputError
@@ -29,6 +33,8 @@ class Faults:
         e_stop_after: points after which an emergency stop is pressed.
         restart_after: points after which the controller restarts and forgets everything.
         stuck: no point is ever played, so the buffer never empties.
+        path: what the robot does with its path, see `PathFault`. The torque stays that of the path.
+        path_after: so long after the start of a trajectory [s].
         seed: of the faults.
     """
 
@@ -42,14 +48,20 @@ class Faults:
     e_stop_after: int | None = None
     restart_after: int | None = None
     stuck: bool = False
+    path: PathKind = "none"
+    path_after: float = 0.0
     seed: int = 0
 
     def __post_init__(self) -> None:
         """Checks the ranges.
 
         Raises:
-            InputError: a share outside 0 to 1, a negative time or number.
+            InputError: a share outside 0 to 1, a negative time or number, or an unknown fault of the path.
         """
+        if self.path not in KINDS:
+            raise InputError(f"a path fault {self.path!r}", allowed=", ".join(KINDS))
+        if not self.path_after >= 0:
+            raise InputError(f"path_after is {self.path_after}", allowed="0 s or more")
         for name in ("lose", "double", "late", "reorder"):
             if not 0 <= getattr(self, name) <= 1:
                 raise InputError(f"{name} is {getattr(self, name)}", allowed="a share, 0 to 1")
@@ -57,7 +69,7 @@ class Faults:
             raise InputError(f"late_by is {self.late_by}", allowed="0 to 60 s")
         for item in fields(self):
             value = getattr(self, item.name)
-            if item.name.endswith("_after") and value is not None and value < 0:
+            if item.name.endswith("_after") and item.name != "path_after" and value is not None and value < 0:
                 raise InputError(f"{item.name} is {value}", allowed="zero or more points")
 
     @property
@@ -71,6 +83,7 @@ class ControllerOptions:
     """How the controller behaves.
 
     Attributes:
+        driver: profile of the program that it stands for; None for what the other settings say.
         host: address to listen at.
         transport: udp or tcp.
         motion_port: takes points; 0 for any free one.
@@ -79,17 +92,20 @@ class ControllerOptions:
         handshake: the byte that opens a link by UDP.
         capacity: points that the buffer holds.
         feedback: ``position`` is the thesis' message, ``full`` has time, velocity and acceleration, ``torque`` also
-            torque (a type of our own).
+            torque (a type of our own); ``feedback`` has positions only, as Motoman's.
         feedback_period: between two feedback messages [s].
+        feedback_every: of so many periods one message is sent.
         status: whether status messages are sent, ten a second.
-        replies: ``bare`` is the thesis' reply without a body; ``echo`` repeats the point.
+        replies: see `Driver.replies`.
         speed: how many times faster than real time.
         wait_for_points: whether an empty buffer makes time stand still instead of being an error.
         state: ``ready``, or what keeps the controller from moving: ``error``, ``e-stop``, ``manual``, ``drives-off``.
+        external: where axes stand that the controller has behind those of the robot [rad or m].
         start_tolerance: farthest first point from the pose [rad or m].
         faults: what goes wrong.
     """
 
+    driver: Driver | None = None
     host: str = "127.0.0.1"
     transport: Literal["udp", "tcp"] = "udp"
     motion_port: int = MOTION_PORT
@@ -97,15 +113,40 @@ class ControllerOptions:
     form: WireFormat = DEFAULT
     handshake: int = HANDSHAKE
     capacity: int = CAPACITY
-    feedback: Literal["position", "full", "torque"] = "torque"
+    feedback: Literal["position", "feedback", "full", "torque"] = "torque"
     feedback_period: float = 0.004
+    feedback_every: int = 1
     status: bool = True
-    replies: Literal["bare", "echo"] = "bare"
+    replies: Replies = "bare"
     speed: float = 1.0
     wait_for_points: bool = False
     state: Literal["ready", "error", "e-stop", "manual", "drives-off"] = "ready"
+    external: tuple[float, ...] = ()
     start_tolerance: float = 0.05
     faults: Faults = Faults()
+
+    @classmethod
+    def of(cls, driver: Driver, **changes: Any) -> ControllerOptions:
+        """Makes a controller that behaves as a driver does.
+
+        Args:
+            driver: its profile.
+            changes: other settings.
+
+        Raises:
+            InputError: see `ControllerOptions`.
+        """
+        usual = {
+            "transport": driver.transport,
+            "motion_port": driver.motion_port,
+            "state_port": driver.state_port,
+            "form": WireFormat(byte_order=driver.byte_order),
+            "capacity": driver.capacity,
+            "feedback": driver.feedback,
+            "feedback_every": max(round(driver.feedback_period / 0.004), 1),
+            "replies": driver.replies,
+        }
+        return cls(driver=driver, **(usual | changes))
 
     def __post_init__(self) -> None:
         """Checks the settings.
@@ -115,8 +156,8 @@ class ControllerOptions:
         """
         choices = {
             "transport": ("udp", "tcp"),
-            "feedback": ("position", "full", "torque"),
-            "replies": ("bare", "echo"),
+            "feedback": ("position", "feedback", "full", "torque"),
+            "replies": get_args(Replies),
             "state": ("ready", "error", "e-stop", "manual", "drives-off"),
         }
         for name, allowed in choices.items():

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import Enum
 
 import numpy as np
@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from oed.controllers.virtual.buffer import Outcome, PointBuffer
 from oed.controllers.virtual.options import ControllerOptions
+from oed.controllers.virtual.path_faults import PathFault
 from oed.controllers.virtual.robot import VirtualRobot
 from oed.exports.simple_message import FullPoint, Point, Special
 
@@ -69,7 +70,9 @@ class Player:
         self._phase = Phase.IDLE
         self._error = 0
         self._last_accepted = 0.0
-        self._ticks = 0
+        self._ticks = self._elapsed = 0
+        self._path = PathFault(options.faults.path, options.faults.path_after)
+        self._last: Sample | None = None
         self._refilling = False
         self._numbers: list[int] = []
         self._ahead: list[Sample] = []
@@ -150,7 +153,8 @@ class Player:
         if self._phase == Phase.LOADING and not self._options.faults.stuck:
             waited = now - self._last_accepted > LOAD
             if self._buffer.end and (self._buffer.full or waited or self._buffer is self._download):
-                self._phase, self._ticks = Phase.PLAYING, 0
+                self._phase, self._ticks, self._elapsed, self._last = Phase.PLAYING, 0, 0, None
+                self._path.begin()
                 if self._robot is not None:
                     self._robot.begin(clock)
         if self._phase != Phase.PLAYING:
@@ -163,22 +167,26 @@ class Player:
             self.pose = sample.q
             return sample
         buffer = self._buffer
-        if buffer.at_rest:
+        if self._options.wait_for_points and not buffer.at_rest and now - self._last_accepted < GONE:
+            # Piece by piece: one point at a time would cost a simulation each.
+            self._refilling = True
+            return None
+        if buffer.at_rest or self._stands:
             if now - self._last_accepted > LOAD:
                 self._phase = Phase.IDLE
                 self.played_trajectories += 1
             return self._stand(heard)
-        if self._options.wait_for_points and now - self._last_accepted < GONE:
-            # Piece by piece: one point at a time would cost a simulation each.
-            self._refilling = True
-            return None
         self.fail(UNDERRUN)
         return self._stand(heard)
 
     @property
     def _exhausted(self) -> bool:
         buffer = self._buffer
-        return buffer.end > 0 and buffer.played == buffer.end and buffer.at_rest
+        return buffer.end > 0 and buffer.played == buffer.end and (buffer.at_rest or self._stands)
+
+    @property
+    def _stands(self) -> bool:
+        return self._options.driver is not None and self._options.driver.stands
 
     def _count(self, now: float) -> None:
         self.accepted += 1
@@ -214,6 +222,9 @@ class Player:
         if self._buffer is not buffer or number < 0:
             self.fail(GAP)
             return None
+        most = None if self._options.driver is None else self._options.driver.most
+        if most is not None and len(self._numbers) >= most - 1:
+            return Outcome.KNOWN
         outcome = buffer.accept(number, point)
         if outcome == Outcome.ACCEPTED:
             self.accepted += 1
@@ -222,13 +233,20 @@ class Player:
 
     def _next(self) -> Sample | None:
         """Gives the next sample of the trajectory, or None at the end of the points."""
+        elapsed = self._elapsed * self._options.feedback_period
+        if self._last is not None and self._path.holds(elapsed):
+            self._elapsed += 1
+            return self._last
         if not self._ahead:
             self._look_ahead()
         if not self._ahead:
             return None
         self._buffer.pass_time(self._ticks * self._options.feedback_period)
         self._ticks += 1
-        return self._ahead.pop(0)
+        self._elapsed += 1
+        sample = self._ahead.pop(0)
+        self._last = replace(sample, q=self._path.moved(sample.q, elapsed))
+        return self._last
 
     def _look_ahead(self) -> None:
         period, buffer = self._options.feedback_period, self._buffer
@@ -236,7 +254,7 @@ class Player:
             return
         count = int(np.floor(buffer.points[-1].time / period + 1e-3)) + 1 - self._ticks
         # Points without velocities are not differentiated at the edge of what is known.
-        if buffer.points[-1].dq is None and not buffer.at_rest:
+        if buffer.points[-1].dq is None and not buffer.at_rest and not self._stands:
             count -= 2
         if count <= 0:
             return

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import math
 import socket
 from abc import ABC, abstractmethod
-from collections.abc import Hashable
+from collections.abc import Callable, Hashable
 from contextlib import suppress
 
-from oed.exports.simple_message import MessageError, Splitter, WireFormat
+from oed.controllers.virtual.fixed_packets import FixedPackets
+from oed.exports.simple_message import MessageError, Splitter
 from robots.common.errors import InputError
 
 Client = Hashable
@@ -58,7 +60,11 @@ class Port(ABC):
     def release(self, client: Client) -> None:
         """Lets another client take the place of one that has finished."""
         if client in self.clients:
-            self.clients[client] = -SILENCE
+            self.clients[client] = -math.inf
+
+    def drop(self, client: Client) -> None:
+        """Ends the link of a client."""
+        self.clients.pop(client, None)
 
     @abstractmethod
     def forget(self) -> None:
@@ -77,15 +83,16 @@ class UdpPort(Port):
         number: of the port; 0 for a free one.
         handshake: the byte that opens a link.
         most: clients at once; a further one waits until one is silent, or takes its place where `take_over`.
-        take_over: whether a further client replaces the one that was heard longest ago.
+        once: whether only the first handshake is answered as one.
+        stale: what its client gets for a later one; None for nothing.
     """
 
-    def __init__(self, host: str, number: int, handshake: int, most: int, take_over: bool) -> None:
+    def __init__(self, host: str, number: int, handshake: int, most: int, once: bool, stale: bytes | None) -> None:
         super().__init__(most)
         self._socket = listening(host, number, socket.SOCK_DGRAM)
         self._socket.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, BUFFER)
         self._byte = bytes([handshake])
-        self._take_over = take_over
+        self._once, self._stale = once, stale
         self.number = self._socket.getsockname()[1]
 
     def sockets(self) -> list[socket.socket]:
@@ -107,17 +114,17 @@ class UdpPort(Port):
 
     def admit(self, client: Client, data: bytes, now: float) -> bytes | None:
         """Answers a handshake if there is room for the client."""
-        if data == self._byte:
+        if data == self._byte and not (self._once and self.clients):
             if client not in self.clients and len(self.clients) >= self._most:
                 oldest = min(self.clients, key=lambda known: self.clients[known])
-                if not self._take_over and now - self.clients[oldest] < SILENCE:
+                if now - self.clients[oldest] < SILENCE:
                     return None
                 del self.clients[oldest]
             self.clients[client] = now
             return data
         if client in self.clients:
             self.clients[client] = now
-        return None
+        return self._stale if data == self._byte and client in self.clients else None
 
     def send(self, client: Client, data: bytes) -> None:
         """Sends one datagram; a full buffer of the system loses it."""
@@ -139,16 +146,16 @@ class TcpPort(Port):
     Args:
         host: address to listen at.
         number: of the port; 0 for a free one.
-        form: of the frames.
+        splitter: makes what cuts the bytes of a client into frames.
         most: clients at once.
     """
 
-    def __init__(self, host: str, number: int, form: WireFormat, most: int) -> None:
+    def __init__(self, host: str, number: int, splitter: Callable[[], Splitter | FixedPackets], most: int) -> None:
         super().__init__(most)
         self._listener = listening(host, number, socket.SOCK_STREAM)
         self._listener.listen(8)
-        self._form = form
-        self._open: dict[Client, tuple[socket.socket, Splitter]] = {}
+        self._splitter = splitter
+        self._open: dict[Client, tuple[socket.socket, Splitter | FixedPackets]] = {}
         self._unsent: dict[Client, bytearray] = {}
         self.number = self._listener.getsockname()[1]
 
@@ -166,7 +173,7 @@ class TcpPort(Port):
                     return []
                 connection.setblocking(False)
                 connection.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
-                self._open[client] = (connection, Splitter(self._form))
+                self._open[client] = (connection, self._splitter())
                 self._unsent[client] = bytearray()
                 self.clients[client] = now
             return []
@@ -182,7 +189,7 @@ class TcpPort(Port):
             return []
         except (OSError, MessageError):
             pass
-        self._drop(client)
+        self.drop(client)
         return []
 
     def admit(self, client: Client, data: bytes, now: float) -> bytes | None:
@@ -200,16 +207,17 @@ class TcpPort(Port):
             del waiting[:sent]
         except BlockingIOError:
             if len(waiting) > BUFFER:
-                self._drop(client)
+                self.drop(client)
         except OSError:
-            self._drop(client)
+            self.drop(client)
 
     def forget(self) -> None:
         """Disconnects all clients."""
         for client in list(self._open):
-            self._drop(client)
+            self.drop(client)
 
-    def _drop(self, client: Client) -> None:
+    def drop(self, client: Client) -> None:
+        """Disconnects a client."""
         self._open.pop(client)[0].close()
         self._unsent.pop(client)
         self.clients.pop(client, None)

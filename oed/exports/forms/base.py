@@ -68,6 +68,10 @@ class Form(ABC):
         first, _, rest = whole.partition(b"\n")
         return b"\n".join([first, f"{begin} {options.remark}".encode("ascii", "replace"), rest])
 
+    def period_of(self, robot: Robot) -> float | None:
+        """Gives the sample period that the controller of a robot needs [s]; None for that of the trajectory."""
+        return self.period
+
     @abstractmethod
     def write(self, motion: Motion, robot: Robot, options: ExportOptions, suffix: str) -> bytes:
         """Gives the content of the file.

@@ -3,32 +3,54 @@
 from __future__ import annotations
 
 import re
+import warnings
 from collections.abc import Mapping
 from typing import ClassVar
 
 import numpy as np
 
 from oed.exports.forms.base import Array, ExportOptions, Form, number, require_joints
-from robots.common.errors import InputError
+from robots.common.errors import AssumedValueWarning, InputError
 from robots.robot import Robot
 from robots.signals import Motion
+
+CYCLES = {0.008: "CB", 0.002: "e-series"}
+"""Cycle of the controllers [s]: a servoj takes at least one, so shorter ones play the motion too slowly."""
 
 LOOKAHEAD, GAIN = 0.1, 300
 _POINT = re.compile(r"^ +servoj\(\[([^]]*)\], 0, 0, ([\d.]+)", re.MULTILINE)
 
 
 class UrScript(Form):
-    """A program for Universal Robots: 500 Hz by default, as e-series controllers run; older ones need 0.008 s."""
+    """A program for Universal Robots at the period of the robot: 8 ms of CB controllers, 2 ms of the e-series."""
 
     name: ClassVar[str] = "urscript"
     suffixes: ClassVar[tuple[str, ...]] = (".script",)
     comment: ClassVar[Mapping[str, str]] = {".script": "#"}
     period: ClassVar[float | None] = 0.002
 
+    def period_of(self, robot: Robot) -> float | None:
+        """See `Form.period_of`; a robot with another period than a UR controller's gets that of the e-series."""
+        found = next((cycle for cycle in CYCLES if abs(cycle - robot.period) < 1e-6), None)
+        if found is None:
+            text = (
+                f"{robot.name} has a period of {1e3 * robot.period:g} ms, which is none of a UR controller: 2 ms of "
+                "the e-series are taken. CB controllers need --period 0.008"
+            )
+            warnings.warn(AssumedValueWarning(text), stacklevel=4)
+        return found or self.period
+
     def write(self, motion: Motion, robot: Robot, options: ExportOptions, suffix: str) -> bytes:
         """See `Form.write`."""
         require_joints(robot, 6, 6, "a UR controller")
         period = motion.period or 0.0
+        if robot.period in CYCLES and period < robot.period - 1e-6:
+            text = (
+                f"commands of {1e3 * period:g} ms are shorter than the cycle of {robot.name}'s controller "
+                f"({CYCLES[robot.period]}, {1e3 * robot.period:g} ms): it plays the motion too slowly. Leave out "
+                "--period, or state the period of another controller in the robot's description"
+            )
+            warnings.warn(AssumedValueWarning(text), stacklevel=4)
         # The two zeros are an acceleration and a speed that the command does not use.
         tail = f"0, 0, {number(period)}, {number(LOOKAHEAD)}, {GAIN})"
         lines = [

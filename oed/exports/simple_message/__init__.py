@@ -2,7 +2,7 @@
 
 from oed.exports.simple_message.codec import DEFAULT, WireFormat, shortest
 from oed.exports.simple_message.errors import MessageError
-from oed.exports.simple_message.kinds import Comm, Kind, Reply, Special, Valid
+from oed.exports.simple_message.kinds import Comm, Command, Kind, Reply, Result, Special, Valid
 from oed.exports.simple_message.messages import (
     Bare,
     Frame,
@@ -10,6 +10,8 @@ from oed.exports.simple_message.messages import (
     JointFeedback,
     JointPosition,
     Message,
+    MotionControl,
+    MotionReply,
     Ping,
     Point,
     Status,
@@ -22,6 +24,7 @@ __all__ = [
     "DEFAULT",
     "Bare",
     "Comm",
+    "Command",
     "Frame",
     "FullPoint",
     "JointFeedback",
@@ -29,9 +32,12 @@ __all__ = [
     "Kind",
     "Message",
     "MessageError",
+    "MotionControl",
+    "MotionReply",
     "Ping",
     "Point",
     "Reply",
+    "Result",
     "Special",
     "Splitter",
     "Status",

@@ -20,6 +20,8 @@ from oed.exports.simple_message.messages import (
     JointFeedback,
     JointPosition,
     Message,
+    MotionControl,
+    MotionReply,
     Ping,
     Point,
     Reals,
@@ -37,6 +39,8 @@ _BODIES: dict[int, str] = {
     Kind.JOINT_TRAJ_PT_FULL: "iiirjjj",
     Kind.JOINT_FEEDBACK: "iirjjj",
     Kind.TORQUE_FEEDBACK: "iirjjjj",
+    Kind.MOTION_CONTROL: "iiij",
+    Kind.MOTION_REPLY: "iiiiij",
 }
 _BUILD: dict[int, Callable[..., Message]] = {
     Kind.PING: Ping,
@@ -73,6 +77,12 @@ _BUILD: dict[int, Callable[..., Message]] = {
         velocities=dq,
         accelerations=ddq,
         efforts=efforts,
+    ),
+    Kind.MOTION_CONTROL: lambda robot, sequence, command, data: MotionControl(
+        robot_id=robot, sequence=sequence, command=command, data=data
+    ),
+    Kind.MOTION_REPLY: lambda robot, sequence, command, result, subcode, data: MotionReply(
+        robot_id=robot, sequence=sequence, command=command, result=result, subcode=subcode, data=data
     ),
 }
 

@@ -18,7 +18,7 @@ MOTION_PORT, STATE_PORT = 11000, 11002
 
 
 class Kind(IntEnum):
-    """Message types. `TORQUE_FEEDBACK` is ours, far above the types that are in use."""
+    """Message types. 2001 and 2002 are Motoman's; `TORQUE_FEEDBACK` is ours, far above the types that are in use."""
 
     PING = 1
     JOINT_POSITION = 10
@@ -26,6 +26,8 @@ class Kind(IntEnum):
     STATUS = 13
     JOINT_TRAJ_PT_FULL = 14
     JOINT_FEEDBACK = 15
+    MOTION_CONTROL = 2001
+    MOTION_REPLY = 2002
     TORQUE_FEEDBACK = 9015
 
 
@@ -52,6 +54,26 @@ class Special(IntEnum):
     START_STREAMING = -2
     END = -3
     STOP = -4
+
+
+class Command(IntEnum):
+    """Commands of `MotionControl`."""
+
+    CHECK_READY = 200101
+    STOP = 200111
+    START = 200121
+
+
+class Result(IntEnum):
+    """What became of a message, in `MotionReply`. A controller that is ready says SUCCESS, too."""
+
+    SUCCESS = 0
+    BUSY = 1
+    FAILURE = 2
+    INVALID = 3
+    ALARM = 4
+    NOT_READY = 5
+    MOTION_FAILURE = 6
 
 
 class Valid(IntFlag):

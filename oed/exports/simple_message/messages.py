@@ -154,7 +154,58 @@ class Status:
     kind: ClassVar[int] = Kind.STATUS
 
 
-Message = Ping | Bare | JointPosition | Point | FullPoint | JointFeedback | TorqueFeedback | Status
+@dataclass(frozen=True, slots=True, kw_only=True)
+class MotionControl:
+    """A command to Motoman's driver.
+
+    Attributes:
+        robot_id: which robot of the controller.
+        sequence: number of the message.
+        command: see `Command`.
+        data: of no use yet.
+    """
+
+    robot_id: int = 0
+    sequence: int = 0
+    command: int
+    data: Reals = ()
+    kind: ClassVar[int] = Kind.MOTION_CONTROL
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class MotionReply:
+    """What Motoman's driver says to a point or a command.
+
+    Attributes:
+        robot_id: which robot of the controller.
+        sequence: number of the point, or -1.
+        command: command or message type that it answers.
+        result: see `Result`.
+        subcode: why, in numbers of the driver.
+        data: of no use yet.
+    """
+
+    robot_id: int = 0
+    sequence: int
+    command: int
+    result: int
+    subcode: int = 0
+    data: Reals = ()
+    kind: ClassVar[int] = Kind.MOTION_REPLY
+
+
+Message = (
+    Ping
+    | Bare
+    | JointPosition
+    | Point
+    | FullPoint
+    | JointFeedback
+    | TorqueFeedback
+    | Status
+    | MotionControl
+    | MotionReply
+)
 
 
 @dataclass(frozen=True, slots=True)

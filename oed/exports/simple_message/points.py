@@ -17,7 +17,13 @@ PointType = Literal["full", "short"]
 
 
 def trajectory_points(
-    motion: Motion, limits: Limits | None = None, *, kind: PointType = "full", robot_id: int = 0
+    motion: Motion,
+    limits: Limits | None = None,
+    *,
+    kind: PointType = "full",
+    robot_id: int = 0,
+    resting: float = 0.0,
+    further: tuple[float, ...] = (),
 ) -> Iterator[FullPoint | Point]:
     """Makes the points of a motion, numbered from 0.
 
@@ -26,6 +32,8 @@ def trajectory_points(
         limits: velocity limits, for the share of points of the short type.
         kind: ``full`` for JOINT_TRAJ_PT_FULL, ``short`` for JOINT_TRAJ_PT.
         robot_id: which robot of the controller.
+        further: positions of axes behind those of the motion, in each point [rad or m].
+        resting: share of the speed in short points at rest.
 
     Raises:
         InputError: too many joints, another type, or the short type without limits.
@@ -42,7 +50,7 @@ def trajectory_points(
                 robot_id=robot_id,
                 sequence=k,
                 time=time,
-                positions=tuple(q[k]),
+                positions=(*q[k], *further),
                 velocities=tuple(dq[k]),
                 accelerations=tuple(ddq[k]),
             )
@@ -50,7 +58,8 @@ def trajectory_points(
     if limits is None:
         raise InputError("points of type short need velocity limits", remedy="give the robot, or send full points")
     with np.errstate(divide="ignore", invalid="ignore"):
-        share = np.nan_to_num(np.abs(motion.dq) / limits.velocity).max(axis=1).clip(0.0, 1.0).tolist()
+        share = np.nan_to_num(np.abs(motion.dq) / limits.velocity).max(axis=1).clip(0.0, 1.0)
+    share = np.where(share > 0, share, resting).tolist()
     durations = np.diff(t, prepend=0.0).tolist()
     for k in range(len(motion)):
-        yield Point(sequence=k, positions=tuple(q[k]), velocity=share[k], duration=durations[k])
+        yield Point(sequence=k, positions=(*q[k], *further), velocity=share[k], duration=durations[k])

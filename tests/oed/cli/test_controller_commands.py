@@ -19,6 +19,7 @@ import pytest
 
 from estimation import read_log
 from oed.controllers import ControllerOptions, Faults, VirtualController
+from oed.controllers.drivers import driver_of
 from oed.exports import write_trajectory
 from robots.loading import load_robot
 from tests.oed.controllers.conftest import swing
@@ -148,6 +149,14 @@ def test_controller_ends_on_demand(robot: Path, run) -> None:
         (["stream", "T", "--host", "no.such.host.invalid", "--robot", "ROBOT"], "has no address"),
         (["stream", "T", "--host", "", "--robot", "ROBOT"], "the host is empty"),
         (["record", "--robot", "ROBOT", "--host", "127.0.0.1", "--duration", "-1"], "duration"),
+        (
+            ["stream", "T", "--host", "127.0.0.1", "--robot", "ROBOT", "--driver", "kuka"],
+            "'kuka' is not known",
+        ),
+        (["stream", "T", "--host", "127.0.0.1", "--robot", "ROBOT", "--driver", "fanuc", "--ping"], "leave out --ping"),
+        (["stream", "T", "--host", "127.0.0.1", "--robot", "ROBOT", "--driver", "abb", "--points", "full"], "misreads"),
+        (["stream", "T", "--host", "127.0.0.1", "--robot", "ROBOT", "--tolerance", "1,2,3"], "3 tolerances"),
+        (["controller", "--robot", "ROBOT", "--path-fault", "drop"], "path fault"),
         (["controller", "--robot", "ROBOT", "--speed", "0"], "speed"),
         (["controller", "--robot", "ROBOT", "--pose", "1"], "pose of 1"),
         (["controller", "--robot", "ROBOT", "--lose", "2"], "lose"),
@@ -189,3 +198,37 @@ def test_controllers_that_do_not_play(settings: Any, code: int, problem: str, ru
     assert log.exists() == (code == 1)
     if code == 1:
         assert f"{len(read_log(log, 2))} rows are in" in done.err
+
+
+def test_another_period(run, robot: Path, tmp_path: Path) -> None:
+    """A trajectory of 300 points fits into ABB's driver with a longer time between its points."""
+    described = load_robot(robot)
+    write_trajectory(tmp_path / "t.csv", swing(described))
+    options = ControllerOptions.of(driver_of("abb"), motion_port=0, state_port=0)
+    with VirtualController(described, options=options) as controller:
+        ports = ["--motion-port", controller.motion_port, "--state-port", controller.state_port]
+        line = ["stream", tmp_path / "t.csv", "--robot", robot, "--host", "127.0.0.1", "--driver", "abb", *ports]
+        log = ["--log", tmp_path / "log.csv", "--json"]
+        done = run(*line, *log)
+        assert done.code == 2
+        assert "300 points; allowed: up to 100, as ABB's driver holds" in done.err
+        done = run(*line, *log, "--period", 0.02)
+        assert done.code == 0, done.err
+        assert done.data["sent"] == controller.points == 61
+
+
+@pytest.mark.parametrize("driver", ["fanuc", "motoman"])
+def test_commands_with_a_driver(driver: str, run, robot: Path, tmp_path: Path) -> None:
+    """With --driver the ports and forms need no options, but those that are stated count."""
+    described = load_robot(robot)
+    write_trajectory(tmp_path / "t.csv", swing(described))
+    options = ControllerOptions.of(driver_of(driver), motion_port=0, state_port=0)
+    with VirtualController(described, options=options) as controller:
+        ports = ["--motion-port", controller.motion_port, "--state-port", controller.state_port]
+        line = ["--robot", robot, "--host", "127.0.0.1", "--driver", driver]
+        done = run("stream", tmp_path / "t.csv", *line, *ports, "--log", tmp_path / "log.csv", "--json")
+        assert done.code == 0, done.err
+        assert (done.data["sent"], done.data["stopped"]) == (300, True)
+        done = run("record", *line, *ports[2:], "--log", tmp_path / "second.csv", "--duration", 0.3, "--json")
+        assert done.code == 0, done.err
+        assert done.data["rows"] > 3

@@ -114,6 +114,17 @@ def test_one_program_a_file(tmp_path: Path) -> None:
     FeedbackLog(path, COLUMNS, UNITS, {}, force=True).close()
 
 
+def test_nothing_is_lost_by_tcp() -> None:
+    """Stamps that jitter by more than a period are no gaps on a link that loses nothing."""
+    stamps = 0.004 * np.arange(200) + np.where(np.arange(200) % 7 == 0, 0.009, 0.0)
+    for reliable in (True, False):
+        statistics = Statistics(reliable)
+        statistics.stamped = True
+        for stamp in np.sort(stamps):
+            statistics.add(float(stamp), float(stamp))
+        assert (statistics.summary()["lost"] == 0) == reliable
+
+
 def test_loss_and_jitter() -> None:
     """Missing time stamps count as lost, and the spread of the arrivals as jitter."""
     rng = np.random.default_rng(1)

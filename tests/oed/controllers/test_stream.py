@@ -23,6 +23,9 @@ from tests.oed.controllers.conftest import PATIENT, PERIOD, swing
 pytestmark = pytest.mark.slow
 
 EXACT = Sensors(encoder_counts=0, torque_noise=0)
+BUSY = 0.1
+"""A busy computer is so late [s]."""
+
 REAL = 2e-7
 """Rounding of a real of 4 bytes, relative."""
 
@@ -117,7 +120,7 @@ def test_thesis_feedback(robot, controllers, log: Path) -> None:
     """A controller that sends positions only, and no status, gives a log with times of arrival."""
     motion = swing(robot)
     _, endpoint = controllers(feedback="position", status=False, handshake=0xFF, speed=2.0)
-    stream(motion, robot, endpoint, log=log, options=PATIENT)
+    stream(motion, robot, endpoint, log=log, options=replace(PATIENT, ping=True, speed=2.0))
     read = read_log(log, robot.n, torque=False)
     # Times are those of the measurement: of the arrival less half the round trip of a ping.
     assert 0 < read.metadata["delay_removed"] < 1.0
@@ -199,6 +202,35 @@ def test_controller_that_dies(robot, controllers, log: Path) -> None:
         stream(swing(robot, 600), robot, endpoint, log=log, options=StreamOptions(patience=0.6))
     assert time.monotonic() - begin < 0.7 + 0.6 + 2.0
     assert len(read_log(log, robot.n)) > 50
+
+
+@pytest.mark.parametrize("feedback", ["full", "position"])
+@pytest.mark.parametrize("fault", ["swap", "sign", "half-speed", "stall", "offset", "other-robot"])
+def test_faults_of_the_path(fault, feedback, robot, controllers, log: Path) -> None:
+    """A robot that leaves its plan is stopped within 0.2 s of leaving the tolerance, with joint, time and positions."""
+    motion = swing(robot, 600, 0.6)
+    after = 0.4
+    controller, endpoint = controllers(
+        path=fault,
+        path_after=after,
+        feedback=feedback,
+        replies="echo",
+        speed=1.0,
+        late=0.05,
+        late_by=0.05,
+        wait_for_points=False,
+    )
+    message = r"joint \d: the robot has left the plan: at \d\.\d+ s of the trajectory it is at .* the plan is .* rad"
+    with pytest.raises(ControllerError, match=message):
+        stream(motion, robot, endpoint, log=log, options=replace(PATIENT, window=32))
+    assert not controller.player.moving
+    read = read_log(log, robot.n, torque=False)
+    assert read.metadata["complete"] is False
+    assert "left the plan" in read.metadata["ended"]
+    if feedback == "full":
+        part, samples = samples_of(read, motion)
+        left = part.t[(np.abs(part.q - motion.q[samples]).max(axis=1) > 0.05).argmax()]
+        assert 0.05 <= read.t[-1] - left < 0.2 + BUSY
 
 
 def test_two_trajectories_on_one_controller(robot, controllers, log: Path) -> None:

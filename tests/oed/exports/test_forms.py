@@ -14,12 +14,12 @@ import yaml
 from oed.exports import CONTROLLER_FORMS, ExportOptions, export_trajectory
 from oed.exports.forms.moveit_limits import read_joint_limits
 from oed.exports.forms.sampling import at_period
-from robots.common.errors import InputError
+from robots.common.errors import AssumedValueWarning, InputError
 from robots.loading import load_robot
 from robots.robot import Robot
 from robots.signals import Motion
 
-ROBOTS = {"franka": "panda"}
+ROBOTS = {"franka": "panda", "urscript": "ur10"}
 PRECISION = {"simple-message": 2e-7, "kuka": 1e-8, "abb": 1e-8, "urscript": 1e-8}
 CASES = [(name, suffix) for name, form in CONTROLLER_FORMS.items() for suffix in form.suffixes]
 EACH = pytest.mark.parametrize(("name", "suffix"), CASES)
@@ -28,7 +28,7 @@ EACH = pytest.mark.parametrize(("name", "suffix"), CASES)
 @pytest.fixture(scope="module")
 def robots() -> dict[str, Robot]:
     """Load a robot for each form."""
-    loaded = {robot: load_robot(robot) for robot in ("er3a", "panda")}
+    loaded = {robot: load_robot(robot) for robot in ("er3a", "panda", "ur10")}
     return {name: loaded[ROBOTS.get(name, "er3a")] for name in CONTROLLER_FORMS}
 
 
@@ -58,7 +58,7 @@ def test_reads_back(name: str, suffix: str, robots, tmp_path: Path) -> None:
             form.read(path.read_bytes(), robot, suffix)
         return
     t, q = form.read(path.read_bytes(), robot, suffix)
-    period = form.period or 0.004
+    period = form.period_of(robot) or 0.004
     expected = motion_of(robot, period, round(1.0 / period) + 1)
     np.testing.assert_allclose(t, expected.t - 5.0, atol=1e-7)
     np.testing.assert_allclose(q, expected.q, atol=PRECISION.get(name, 1e-12))
@@ -68,11 +68,11 @@ def test_reads_back(name: str, suffix: str, robots, tmp_path: Path) -> None:
 def test_other_period(name: str, suffix: str, robots, tmp_path: Path) -> None:
     """The period is the user's; a duration that is no multiple of it ends at rest at the last pose."""
     robot, path = robots[name], tmp_path / f"a{suffix}"
-    written = export_trajectory(path, motion_of(robot), robot, name, period=0.007)
-    assert len(written) == 144
+    written = export_trajectory(path, motion_of(robot), robot, name, period=0.009)
+    assert len(written) == 113
     np.testing.assert_array_equal(written.q[-1], motion_of(robot).q[-1])
     np.testing.assert_array_equal(written.dq[-1], 0.0)
-    np.testing.assert_allclose(written.q[:-1], motion_of(robot, 0.007, 143).q, atol=1e-9)
+    np.testing.assert_allclose(written.q[:-1], motion_of(robot, 0.009, 112).q, atol=1e-9)
 
 
 @EACH
@@ -153,6 +153,22 @@ def test_moveit_limits(robots, tmp_path: Path) -> None:
         read_joint_limits(b"a: 1", changed)
     with pytest.raises(InputError, match="no limits of"):
         read_joint_limits(b"joint_limits: {}", changed)
+
+
+def test_urscript_has_the_period_of_its_controller(robots, tmp_path: Path) -> None:
+    """A CB controller gets commands of 8 ms, one of the e-series 2 ms; another period, or a shorter one, is noted."""
+    cb = robots["urscript"]
+    for robot, period in ((cb, 0.008), (replace(cb, period=0.002), 0.002)):
+        path = tmp_path / f"{period}.script"
+        export_trajectory(path, motion_of(robot), robot, "urscript")
+        assert re.findall(r"0, 0, ([\d.]+), 0.1, 300\)", path.read_text()) == [str(period)] * (round(1.0 / period) + 1)
+    with pytest.warns(AssumedValueWarning, match="4 ms, which is none of a UR controller: 2 ms of the e-series"):
+        assert (
+            export_trajectory(tmp_path / "a.script", motion_of(cb), replace(cb, period=0.004), "urscript").period
+            == 0.002
+        )
+    with pytest.warns(AssumedValueWarning, match="commands of 2 ms are shorter than the cycle"):
+        export_trajectory(tmp_path / "b.script", motion_of(cb), cb, "urscript", period=0.002)
 
 
 def test_urscript_guards_its_start(robots, tmp_path: Path) -> None:

@@ -226,3 +226,13 @@ def test_two_hidden_effects_are_named(two, designed, controllers, tmp_path: Path
         moving = np.abs(np.gradient(log.q, log.t, axis=0)) > 0.05
         size = [np.sqrt(np.mean(error[moving[:, j], j] ** 2) / np.mean(log.tau[moving[:, j], j] ** 2)) for j in (0, 1)]
         assert max(size) < 0.012
+
+
+@pytest.mark.slow
+def test_torque_is_asked_for_before_the_design(
+    two: Robot, controllers: Callable[..., Endpoint], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A controller that sends no torque ends a loop before minutes of design, with what to do."""
+    monkeypatch.setattr(running, "design_experiment", lambda *_, **__: pytest.fail("it designs"))
+    with pytest.raises(ControllerError, match=r"neither torque nor current; .*record torque at the controller"):
+        run_loop(two, controllers(feedback="full"), tmp_path / "loop", options=FREE, stream_options=FAST, speed=SPEED)

@@ -15,6 +15,7 @@ from oed.campaigns import Campaign
 from oed.campaigns.runs import run_campaign, running
 from oed.campaigns.runs.state import run_lock
 from oed.controllers import ControllerError, ControllerOptions, Endpoint, LinkError, StreamOptions, VirtualController
+from oed.controllers.drivers import DRIVERS
 from oed.exports import read_trajectory
 from robots.common.errors import InputError
 from robots.robot import Robot
@@ -131,3 +132,20 @@ def test_buffer_that_never_empties(campaign: Path, two: Robot) -> None:
         place = Endpoint(host="127.0.0.1", motion_port=controller.motion_port, state_port=controller.state_port)
         with pytest.raises(ControllerError, match=r"takes no points.*0 of 4 stages are recorded"):
             run_campaign(campaign, place, options=StreamOptions(patience=0.5))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["efort", "motoman"])
+def test_campaigns_with_a_driver(name: str, campaign: Path, two: Robot) -> None:
+    """A campaign opens one link after the other, also to a server that answers one handshake, and stops by command."""
+    driver = DRIVERS[name]
+    home = read_trajectory(campaign / "friction.csv")[0].q[0]
+    options = ControllerOptions.of(
+        driver, motion_port=0, state_port=0, feedback="torque", feedback_every=1, speed=5.0, wait_for_points=True
+    )
+    with VirtualController(two, options=options, pose=home) as controller:
+        ports = {"motion_port": controller.motion_port, "state_port": controller.state_port}
+        place = Endpoint.of(driver, "127.0.0.1", handshake_interval=0.1, **ports)
+        result = run_campaign(campaign, place, options=StreamOptions.of(driver, patience=10.0, speed=5.0), speed=5.0)
+    assert [stage.number for stage in result.stages] == [1, 2, 3, 4]
+    assert len(list((campaign / "logs").iterdir())) == 4
