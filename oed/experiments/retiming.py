@@ -13,13 +13,13 @@ from oed.criteria import criterion as choose_criterion
 from oed.experiments.checks import usable_limits
 from oed.experiments.quality import design_model, measure
 from oed.experiments.results.retimed import RetimedExperiment, torque_use
-from oed.experiments.safety_checks.freedom import collision_data
+from oed.experiments.safety_checks.freedom import freedom_of
 from oed.experiments.safety_checks.margins import measured_margins
 from oed.exports import shorter_way
 from oed.retiming import Retimed, retime_with_stops
 from oed.retiming import retime as retime_by_toppra
 from robots.base_parameters import find_base_parameters
-from robots.collision import Surroundings, check_motion
+from robots.collision import Surroundings
 from robots.common.errors import InputError
 from robots.limits import Limits
 from robots.regressor import TorqueModel
@@ -102,7 +102,7 @@ def retime(
         torque_after=torque_use(base, retimed.motion),
         margins=measured_margins(robot, retimed.motion, base),
         settings=settings,
-        freedom=None if bodies is None else collision_data(bodies, check_motion(bodies, retimed.motion, confirm=False)),
+        freedom=None if bodies is None else freedom_of(bodies, retimed.motion),
     )
 
 

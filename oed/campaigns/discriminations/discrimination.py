@@ -15,10 +15,10 @@ from numpy.typing import NDArray
 from estimation.diagnosis.hypothesis_tests.power import resolving_energy
 from oed.campaigns.discriminations.motions import Run
 from oed.experiments.results.design_file import DESIGN, TRAJECTORY
-from oed.experiments.safety_checks.freedom import collision_data, freedom_text
+from oed.experiments.safety_checks.freedom import freedom_of, freedom_text
 from oed.experiments.safety_checks.margins import margin_data, missing_limits
 from oed.exports import write_trajectory
-from robots.collision import Surroundings, check_motion
+from robots.collision import Surroundings
 from robots.common.files import write_atomic
 from robots.common.plain import percent
 from robots.robot import Robot
@@ -115,7 +115,7 @@ class Discrimination:
             return None
         bodies = self.surroundings.model(self.robot)
         motions = {id(run.motion): run.motion for run in self.runs}.values()
-        found = [collision_data(bodies, check_motion(bodies, motion, confirm=False)) for motion in motions]
+        found = [freedom_of(bodies, motion) for motion in motions]
         return min(
             (one for one in found if one), key=lambda one: (not one["meetings"], one["clearance"] or 0.0), default=None
         )

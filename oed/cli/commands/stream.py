@@ -31,10 +31,14 @@ from oed.cli.links import (
 )
 from oed.cli.options import (
     ROBOT,
+    CollisionOption,
+    FloorOption,
     ForceOption,
     JointsOption,
     JsonOption,
+    KeepOutOption,
     LockOption,
+    NoFloorOption,
     QuietOption,
     TipOption,
     robot_of_file,
@@ -83,6 +87,10 @@ def stream(
     dry_run: Annotated[
         bool, typer.Option("--dry-run", help="Check trajectory, controller and pose; only listen.")
     ] = False,
+    collision: CollisionOption = True,
+    floor: FloorOption = None,
+    no_floor: NoFloorOption = False,
+    keep_out: KeepOutOption = None,
     tip: TipOption = None,
     joints: JointsOption = None,
     lock: LockOption = None,
@@ -96,10 +104,13 @@ def stream(
     """
     console = Console(json=json, quiet=quiet)
     with console.working() as progress:
+        from oed.cli.spaces import surroundings_from
         from oed.controllers import stream as play
         from oed.controllers.interrupts import terminate_as_interrupt
+        from oed.experiments.safety_checks.freedom import FREE, require_free
         from oed.exports import read_trajectory
         from oed.exports.forms.sampling import at_period
+        from robots.collision import Surroundings
 
         place = endpoint(context, host)
         options = stream_options(
@@ -109,6 +120,11 @@ def stream(
         if period is not None:
             motion = at_period(motion, period)
         described = robot_of_file(robot, metadata, trajectory, tip, joints, lock)
+        around = surroundings_from(floor, no_floor, keep_out)
+        # What a design has proved need not be proved again, unless other surroundings are stated.
+        proved = str(metadata.get("collisions", "")).startswith(FREE) and around == Surroundings()
+        if collision and not proved:
+            require_free(around.model(described), motion, trajectory)
         try:
             with terminate_as_interrupt():
                 result = play(

@@ -2,11 +2,18 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Mapping
+from os import PathLike
 from typing import Any
 
-from robots.collision import CollisionModel, CollisionReport, Plane
+from robots.collision import CollisionModel, CollisionReport, Plane, check_motion
 from robots.collision.boxes import FLOOR
+from robots.common.errors import AssumedValueWarning, InfeasibleError
+from robots.signals import Motion
+
+FREE = "No collision"
+"""How the text about a motion begins that was checked and meets nothing."""
 
 UNCHECKED = "NOT CHECKED for collisions"
 """How every text about a motion that was not checked begins."""
@@ -40,6 +47,19 @@ def collision_data(model: CollisionModel, report: CollisionReport) -> dict[str, 
     }
 
 
+def freedom_of(model: CollisionModel, motion: Motion) -> dict[str, Any] | None:
+    """Checks a motion for collisions at all times, as `collision_data` writes it.
+
+    Args:
+        model: the bodies and obstacles.
+        motion: of the same robot.
+
+    Raises:
+        InputError: a motion of another number of joints.
+    """
+    return collision_data(model, check_motion(model, motion, confirm=False))
+
+
 def _height(obstacle: object) -> float | None:
     upright = isinstance(obstacle, Plane) and abs(obstacle.normal[2]) > 1.0 - 1e-9
     return float(obstacle.offset * obstacle.normal[2]) if upright else None  # type: ignore[attr-defined]
@@ -48,6 +68,34 @@ def _height(obstacle: object) -> float | None:
 def is_free(freedom: Mapping[str, Any] | None) -> bool:
     """Whether a motion was checked, and is proved free of collisions."""
     return freedom is not None and bool(freedom["certified"])
+
+
+def require_free(model: CollisionModel, motion: Motion, file: str | PathLike[str] | None = None) -> None:
+    """Refuses a motion that collides, before it is played.
+
+    Args:
+        model: the bodies and obstacles.
+        motion: what is to be played.
+        file: that it is in, for the message.
+
+    Raises:
+        InfeasibleError: naming the bodies and the time.
+
+    Warns:
+        AssumedValueWarning: a motion that could not be proved free.
+    """
+    freedom = freedom_of(model, motion)
+    if collides(freedom):
+        raise InfeasibleError(
+            freedom_text(freedom).removesuffix("."),
+            file=file,
+            remedy=(
+                "design it anew; state other surroundings (--floor, --no-floor), or play it without this check "
+                "(--no-collision)"
+            ),
+        )
+    if not is_free(freedom):
+        warnings.warn(freedom_text(freedom), AssumedValueWarning, stacklevel=2)
 
 
 def collides(freedom: Mapping[str, Any] | None) -> bool:
@@ -73,7 +121,7 @@ def freedom_text(freedom: Mapping[str, Any] | None) -> str:
         return f"COLLIDES: {near}."
     proof = "proved at all times" if freedom["certified"] else "NOT proved between the samples"
     shapes = " The shapes of the links are assumed." if freedom.get("assumed") else ""
-    return f"No collision with itself{_around(freedom.get('obstacles', {}))}; closest: {near}, {proof}.{shapes}"
+    return f"{FREE} with itself{_around(freedom.get('obstacles', {}))}; closest: {near}, {proof}.{shapes}"
 
 
 def _around(obstacles: Mapping[str, float | None]) -> str:

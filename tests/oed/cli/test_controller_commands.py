@@ -21,6 +21,8 @@ from estimation import read_log
 from oed.controllers import ControllerOptions, Faults, VirtualController
 from oed.controllers.drivers import driver_of
 from oed.exports import write_trajectory
+from oed.retiming import plan_move
+from oed.trajectories import PiecewisePolynomial
 from robots.loading import load_robot
 from tests.oed.controllers.conftest import swing
 
@@ -232,3 +234,23 @@ def test_commands_with_a_driver(driver: str, run, robot: Path, tmp_path: Path) -
         done = run("record", *line, *ports[2:], "--log", tmp_path / "second.csv", "--duration", 0.3, "--json")
         assert done.code == 0, done.err
         assert done.data["rows"] > 3
+
+
+def test_a_trajectory_into_the_floor_is_not_played(run, tmp_path: Path) -> None:
+    """A motion whose flange goes 160 mm below the base is refused before anything is sent, unless the user says so."""
+    er3a = load_robot("er3a")
+    planned = plan_move(er3a.limits, np.zeros(6), np.array([0.0, -2.0, 0.0, 0.0, 0.0, 0.0]), period=er3a.period)
+    there = PiecewisePolynomial(breakpoints=planned.breakpoints, coefficients=planned.coefficients)
+    write_trajectory(tmp_path / "down.csv", there.motion(er3a.period), {"robot": "er3a"})
+    nowhere = ["--host", "127.0.0.1", "--transport", "tcp", "--motion-port", 9, "--state-port", 9]
+    refused = run("stream", tmp_path / "down.csv", *nowhere, "--log", tmp_path / "log.csv")
+    assert refused.code == 1
+    assert "COLLIDES: floor / " in refused.err
+    assert "--no-collision" in refused.err
+    assert not (tmp_path / "log.csv").exists()
+    # With other surroundings, or by the user's word, the next obstacle is that nothing listens.
+    for option in (["--floor", -1.0], ["--no-floor"], ["--no-collision"]):
+        tried = run("stream", tmp_path / "down.csv", *nowhere, *option, "--log", tmp_path / "log.csv")
+        assert tried.code == 1
+        assert "COLLIDES" not in tried.err
+        assert "9" in tried.err
