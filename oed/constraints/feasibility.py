@@ -11,6 +11,7 @@ from scipy.optimize import least_squares, minimize
 
 from oed.constraints.geometric import CollisionLimit, GeometricLimits
 from oed.constraints.tool import ToolBox
+from oed.constraints.torque import TorqueLimit
 from robots.collision import CollisionModel, Plane
 from robots.collision.pairs import random_poses
 from robots.common.errors import InfeasibleError, InputError
@@ -20,6 +21,7 @@ Array = NDArray[np.float64]
 
 SAMPLES = 4000  # poses from which the tool's nearest approach to its box is sought
 STARTS = 6
+HELD = 0.95  # of the usable torque that a start pose may take
 ROOM = 0.1  # around a start pose, in the scale of the limits, mostly [m]
 REACHED = 1e-5  # of the box's distance, below which the tool is within it [m]
 
@@ -159,12 +161,15 @@ def nearest_feasible(limits: GeometricLimits, home: ArrayLike, *, seed: int = 0,
     return roomy_pose(limits, q, seed=seed)
 
 
-def roomy_pose(limits: GeometricLimits, home: Array, *, seed: int = 0) -> Array | None:
+def roomy_pose(
+    limits: GeometricLimits, home: Array, *, torque: TorqueLimit | None = None, seed: int = 0
+) -> Array | None:
     """Looks for a pose that keeps all limits with room around it, so that motions can start there.
 
     Args:
-        limits: the limits.
+        limits: the limits in space.
         home: (n,) [rad or m].
+        torque: which has to hold the pose.
         seed: of the poses that are tried.
 
     Returns:
@@ -172,8 +177,11 @@ def roomy_pose(limits: GeometricLimits, home: Array, *, seed: int = 0) -> Array 
         where no pose was found that keeps all limits.
     """
     q = random_poses(limits.robot.limits, SAMPLES, seed)
+    still = np.zeros_like(q)
+    if torque is not None:
+        q = q[(np.abs(torque.values(q, still, still)) <= HELD).all(axis=1)]
     room = limits.values(q, q, q).min(axis=1, initial=np.inf)
-    if room.max() < 0.0:
+    if room.max(initial=-np.inf) < 0.0:
         return None
     enough = np.flatnonzero(room >= min(ROOM, 0.8 * room.max()))
     return np.round(q[enough[np.linalg.norm(q[enough] - home, axis=1).argmin()]], 3)

@@ -41,11 +41,11 @@ class TorqueRms:
         margin: float = 0.1,
         effects: Sequence[PlantEffect] = (),
     ) -> None:
-        self._torque = TorqueLimit(model, parameters, limit, margin=margin, effects=effects)
-        self.effects = self._torque.effects
-        self.model, self.parameters = self._torque.model, self._torque.parameters
+        self.torque = TorqueLimit(model, parameters, limit, margin=margin, effects=effects)
+        self.effects = self.torque.effects
+        self.model, self.parameters = self.torque.model, self.torque.parameters
         self.limit = np.asarray(limit, dtype=float)
-        self.margin, self.joints = margin, self._torque.joints
+        self.margin, self.joints = margin, self.torque.joints
         self.labels = tuple(f"torque RMS of joint {joint}" for joint in self.joints)
 
     def __reduce__(self) -> tuple[Any, ...]:
@@ -53,14 +53,14 @@ class TorqueRms:
 
     def values(self, q: Array, dq: Array, ddq: Array) -> Array:
         """Gives the root mean square over samples (M, n) as shares of the usable limits (R,)."""
-        return np.sqrt(np.square(self._torque.values(q, dq, ddq)).mean(axis=0))
+        return np.sqrt(np.square(self.torque.values(q, dq, ddq)).mean(axis=0))
 
     def jacobian(self, q: Array, dq: Array, ddq: Array) -> Array:
         """Gives its derivatives by q, dq and ddq of every sample (R, M, 3 n)."""
-        torque = self._torque.values(q, dq, ddq)
+        torque = self.torque.values(q, dq, ddq)
         rms = np.maximum(np.sqrt(np.square(torque).mean(axis=0)), np.finfo(float).tiny)
         weights = torque / rms / len(torque)  # (M, R)
-        return np.asarray((weights[:, :, None] * self._torque.jacobian(q, dq, ddq)).transpose(1, 0, 2))
+        return np.asarray((weights[:, :, None] * self.torque.jacobian(q, dq, ddq)).transpose(1, 0, 2))
 
     def check_holding(self, pose: ArrayLike) -> None:
         """Checks that resting in a pose (n,) is not too much already.

@@ -102,28 +102,36 @@ class Safety:
     ) -> tuple[Experiment, CollisionReport | None, tuple[int, ...]]:
         joints = tuple(range(1, limits.n + 1)) if strokes else ()
         left_out: tuple[int, ...] = ()
-        for factor in SLOWER:
-            gentle = limits.scaled(velocity=factor, acceleration=factor, jerk=factor)
-            while True:
-                kept = tuple(joint for joint in joints if joint not in left_out)
-                sequence = assemble(excitation, gentle, period=period, home=self.home, kind=kind, strokes=kept)
-                motion = sequence.motion()
-                report = self.report(motion)
-                wrong = self._broken(motion, report)
-                if wrong is None or _segment_at(sequence, wrong[0])["kind"] == kind:
-                    break  # Another stroke or move does not help the optimised part: the report says what it does.
-                left_out += (_culprit(sequence, *wrong),)
-            if self._strong_enough(motion):
-                return sequence, report, left_out
-        raise InfeasibleError(
-            "the moves between the segments exceed a limit of torque or motion, even at low speed",
-            remedy="choose another home pose (--home), or leave out the strokes (--no-strokes)",
-        )
+        while True:
+            for factor in SLOWER:
+                gentle = limits.scaled(velocity=factor, acceleration=factor, jerk=factor)
+                while True:
+                    kept = tuple(joint for joint in joints if joint not in left_out)
+                    sequence = assemble(excitation, gentle, period=period, home=self.home, kind=kind, strokes=kept)
+                    motion = sequence.motion()
+                    report = self.report(motion)
+                    wrong = self._broken(motion, report)
+                    if wrong is None or _segment_at(sequence, wrong[0])["kind"] == kind:
+                        break  # Another stroke or move does not help the optimised part: the report says what it does.
+                    left_out += (_culprit(sequence, *wrong),)
+                hardest = self._hardest(motion)
+                if hardest is None:
+                    return sequence, report, left_out
+            assert hardest is not None
+            left_out += (_culprit(sequence, hardest, "exceeds a limit of torque or motion, even at low speed"),)
 
-    def _strong_enough(self, motion: Motion) -> bool:
+    def _hardest(self, motion: Motion) -> float | None:
+        """The time at which a limit of torque or motion is passed most; None where all are kept [s]."""
         states = (motion.q, motion.dq, motion.ddq)
-        peaks = [limit.excess(*states).max() for limit in (self.torque, self.motion) if limit is not None]
-        return max(peaks, default=0.0) <= 0 and (self.torque_rms is None or self.torque_rms.values(*states).max() <= 1)
+        found = [limit.excess(*states).max(axis=1) for limit in (self.torque, self.motion) if limit is not None]
+        excess = np.max([np.full(len(motion), -np.inf), *found], axis=0)
+        if excess.max() > 0.0:
+            return float(motion.t[int(excess.argmax())])
+        rms = self.torque_rms
+        if rms is None or rms.values(*states).max() <= 1.0:
+            return None
+        joint = int(rms.values(*states).argmax())
+        return float(motion.t[int(np.abs(rms.torque.values(*states)[:, joint]).argmax())])
 
     def _broken(self, motion: Motion, report: CollisionReport | None) -> tuple[float, str] | None:
         """The time and the kind of the largest workspace violation; None without any."""
@@ -163,7 +171,7 @@ def choose_safety(robot: Robot, base: BaseParameters, home: Array, limits: Limit
         base: whose model gives the torques.
         home: pose (n,) at both ends.
         limits: the limits to keep.
-        movable: whether another home pose may be used if this one is in collision.
+        movable: whether another home pose may be used if this one cannot.
 
     Raises:
         InfeasibleError: a home pose that cannot be held, is in collision or breaks another limit; a tool box that the
@@ -172,26 +180,33 @@ def choose_safety(robot: Robot, base: BaseParameters, home: Array, limits: Limit
     model = limits.collision_model(robot)
     bodies = () if model is None or not model.pairs else (CollisionLimit(model=model, margin=limits.clearance),)
     space = tuple(limits.space)
-    spatial, moved = None, False
-    if bodies or space:
-        spatial = GeometricLimits(robot=robot, limits=(*bodies, *space))
-        try:
-            check_feasible(robot, spatial, home)
-        except InfeasibleError:
-            pose = roomy_pose(spatial, home) if movable else None
-            if pose is None:
-                raise
-            home, moved = pose, True
-    torque, torque_rms = _torque_limits(robot, base, home, limits)
+    spatial = GeometricLimits(robot=robot, limits=(*bodies, *space))
+    torque, torque_rms = _torque_limits(robot, base, limits)
     motion = StateLimits(robot=robot, limits=tuple(limits.motion)) if limits.motion else None
-    if motion is not None:
-        _check_rest(motion, home)
+
+    def check(pose: Array) -> None:
+        check_feasible(robot, spatial, pose)
+        for holding in (torque, torque_rms):
+            if holding is not None:
+                holding.check_holding(pose)
+        if motion is not None:
+            _check_rest(motion, pose)
+
+    moved = False
+    try:
+        check(home)
+    except InfeasibleError:
+        pose = roomy_pose(spatial, home, torque=torque) if movable else None
+        if pose is None:
+            raise
+        check(pose)
+        home, moved = pose, True
     return Safety(
         home=home,
         torque=torque,
         torque_rms=torque_rms,
         collision=model,
-        spatial=spatial,
+        spatial=spatial if spatial.size else None,
         check=SpatialCheck(GeometricLimits(robot=robot, limits=space)) if space else None,
         motion=motion,
         moved=moved,
@@ -200,7 +215,7 @@ def choose_safety(robot: Robot, base: BaseParameters, home: Array, limits: Limit
 
 
 def _torque_limits(
-    robot: Robot, base: BaseParameters, home: Array, limits: LimitOptions
+    robot: Robot, base: BaseParameters, limits: LimitOptions
 ) -> tuple[TorqueLimit | None, TorqueRms | None]:
     """The limits of torque and of its root mean square, where they and the nominal dynamics are described."""
     peak = rms = None
@@ -208,10 +223,8 @@ def _torque_limits(
     known = limits.torque and model.described
     if known and np.isfinite(robot.limits.torque).any():
         peak = TorqueLimit(model, model.nominal, robot.limits.torque, margin=limits.torque_margin, effects=effects)
-        peak.check_holding(home)
     if known and np.isfinite(robot.limits.torque_rms).any():
         rms = TorqueRms(model, model.nominal, robot.limits.torque_rms, margin=limits.torque_margin, effects=effects)
-        rms.check_holding(home)
     return peak, rms
 
 
