@@ -32,6 +32,7 @@ _UNITS = {
 _TIME = re.compile(r"(?i)t([_ \[(]+[mun]?s(ec)?[\])]?)?|.*(time|stamp|zeit|clock).*")
 _TIME_UNITS = {"ms": "ms", "msec": "ms", "us": "us", "usec": "us", "ns": "ns", "nsec": "ns", "s": "s", "sec": "s"}
 PLAIN_REMEDY = "rename the columns, or describe them in a mapping (--mapping)"
+RATE_REMEDY = "if there is no column of time, state the rows per second, such as --rate 250"
 _KEYS = ("position", "velocity", "torque", "current", "temperature")
 
 
@@ -43,11 +44,27 @@ class _Group:
         pattern: with ``{joint}`` or ``{index}``.
         names: in order.
         words: of the pattern, in small letters.
+        by_name: whether ``{joint}`` stands for the robot's names of its joints, and not for their numbers.
     """
 
     pattern: str
     names: tuple[str, ...]
     words: tuple[str, ...]
+    by_name: bool = False
+
+    def columns(self, count: int, by_name: bool) -> str:
+        """Writes the columns of the first joints: as a pattern, if {joint} means the same in the whole mapping."""
+        same = self.by_name == by_name or "{joint}" not in self.pattern
+        return _text(self.pattern) if same and len(self.names) == count else _list(self.names[:count])
+
+
+def save_mapping(text: str) -> str:
+    """Says what to do with a mapping.
+
+    Args:
+        text: the YAML to be saved.
+    """
+    return f"check this mapping, save it as mapping.yaml and add --mapping mapping.yaml:\n{text}".rstrip()
 
 
 def remedy_for_columns(names: Sequence[str], n: int | None = None, joints: Sequence[str] | None = None) -> str:
@@ -58,10 +75,13 @@ def remedy_for_columns(names: Sequence[str], n: int | None = None, joints: Seque
         n: the number of joints, where it is known.
         joints: names of the robot's joints in its order, where they are known.
     """
+    if not _time_of(names) and "t" not in names and has_usual_names(names):
+        return RATE_REMEDY
     suggested = suggest_mapping(names, n, joints)
     if suggested is None or not ("torque:" in suggested or "current:" in suggested):
         return PLAIN_REMEDY
-    return f"check this mapping, save it as mapping.yaml and add --mapping mapping.yaml:\n{suggested}".rstrip()
+    rate = "" if suggested.startswith("time:") else f"{RATE_REMEDY}; "
+    return rate + save_mapping(suggested)
 
 
 def suggest_mapping(names: Sequence[str], n: int | None = None, joints: Sequence[str] | None = None) -> str | None:
@@ -73,7 +93,7 @@ def suggest_mapping(names: Sequence[str], n: int | None = None, joints: Sequence
         joints: names of the robot's joints in its order, where they are known.
 
     Returns:
-        YAML to be saved and checked; None if no columns look like time or positions.
+        YAML to be saved and checked, without `time` if no column looks like it; None if none looks like positions.
     """
     chosen: dict[str, _Group] = {}
     for group in _groups(names, joints):
@@ -84,19 +104,20 @@ def suggest_mapping(names: Sequence[str], n: int | None = None, joints: Sequence
         if known is None or _rank(group) < _rank(known):
             chosen[quantity] = group
     position = chosen.get("position")
-    time = min((name for name in names if _TIME.fullmatch(name)), key=len, default=None)
-    if position is None or time is None:
+    time = _time_of(names)
+    if position is None:
         return None
     count = n or len(position.names)
-    lines = [f"time: {{column: {_text(time)}, unit: {_time_unit(time)}}}"]
+    by_name = any(group.by_name for group in chosen.values())
+    lines = [f"time: {{column: {_text(time)}, unit: {_time_unit(time)}}}"] if time else []
     for key in _KEYS:
         found = chosen.get(key)
         if found is None or (key == "current" and "torque" in chosen) or len(found.names) < count:
             continue
         unit = next((unit for word in found.words if (unit := _unit(key, word))), None)
-        written = _text(found.pattern) if len(found.names) == count else _list(found.names[:count])
+        written = found.columns(count, by_name)
         lines.append(f"{key}: {{columns: {written}{f', unit: {_text(unit)}' if unit else ''}}}")
-    if any("{joint}" in line for line in lines) and joints is not None and not _counts_joints(chosen):
+    if by_name and joints is not None and any("{joint}" in line for line in lines):
         lines.append(f"joints: {_list(joints)}")
     return "\n".join(lines) + "\n"
 
@@ -109,7 +130,8 @@ def _groups(names: Sequence[str], joints: Sequence[str] | None) -> list[_Group]:
         for pattern in patterns:
             members = tuple(pattern.replace("{joint}", joint) for joint in joints)
             if set(members) <= set(names):
-                groups.append(_Group(pattern=pattern, names=members, words=_words(pattern.replace("{joint}", " "))))
+                words = _words(pattern.replace("{joint}", " "))
+                groups.append(_Group(pattern=pattern, names=members, words=words, by_name=True))
     numbered: dict[str, dict[int, str]] = {}
     for name in names:
         for match in re.finditer(r"\d+", name):
@@ -157,9 +179,22 @@ def _time_unit(name: str) -> str:
     return next((_TIME_UNITS[word] for word in reversed(words) if word in _TIME_UNITS), "s")
 
 
-def _counts_joints(chosen: dict[str, _Group]) -> bool:
-    """Whether {joint} stands for numbers."""
-    return all(re.search(r"\d", group.names[0]) for group in chosen.values() if "{joint}" in group.pattern)
+def _time_of(names: Sequence[str]) -> str | None:
+    """Finds the column of time by its name: the shortest that fits."""
+    return min((name for name in names if _TIME.fullmatch(name)), key=len, default=None)
+
+
+def has_usual_names(names: Sequence[str]) -> bool:
+    """Whether a table has positions, and torques or currents, under the names of a log; joints count from 0 or 1.
+
+    Args:
+        names: of all columns.
+    """
+    present = set(names)
+    return all(
+        any(f"{prefix}{number}" in present for prefix in prefixes for number in (0, 1))
+        for prefixes in (("q",), ("tau", "i"))
+    )
 
 
 def _text(text: str) -> str:

@@ -61,7 +61,7 @@ def test_source_of_the_torque_is_stated(tmp_path, name):
         assert source is None
         return
     assert source["columns"].startswith(form.source)
-    (note,) = log.metadata["repairs"]
+    note = next(note for note in log.metadata["repairs"] if note["name"] == "torque_source")
     assert (note["name"], note["value"]) == ("torque_source", len(T))
     assert source["columns"] in note["text"]
     assert source["meaning"] in note["text"]
