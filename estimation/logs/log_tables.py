@@ -5,16 +5,18 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from os import PathLike
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from estimation.logs.columns import parse_name
-from estimation.logs.formats import column_names, read_foreign
+from estimation.logs.formats import column_names, is_log_name, read_foreign
 from estimation.logs.joint_numbers import NAMES, counted_from_one, named_as_in_file
 from estimation.logs.mappings.mapped_tables import count_joints, map_table, mapped_sources
 from estimation.logs.mappings.mapping import USUAL, LogMapping
 from estimation.logs.needed_columns import is_needed
+from estimation.logs.readers.compressed import unpacked
 from estimation.logs.recorders import Recorder, recorder_of
 from estimation.logs.torque_source import NO_TORQUE, TorqueSource
 from robots.common.errors import InputError
@@ -52,6 +54,18 @@ def read_log_table(
     Raises:
         InputError: a file that cannot be read, or a column that a mapping or a recorder lacks.
     """
+    with unpacked(path, is_log_name) as place:
+        table, notes = _log_table(place, n, mapping, joints, kinds)
+    return replace(table, path=Path(path)), notes
+
+
+def _log_table(
+    path: Path,
+    n: int | None,
+    mapping: LogMapping | None,
+    joints: Sequence[str] | None,
+    kinds: Sequence[str] | None,
+) -> tuple[Table, Notes]:
     names = column_names(path)
     if mapping is None or mapping.position is None:
         recorder = None if names is None else recorder_of(names)
@@ -77,7 +91,7 @@ def read_log_table(
 
 
 def _read(
-    path: str | PathLike[str],
+    path: Path,
     wanted: Callable[[str], bool],
     needs: Callable[[str], bool],
     *,
@@ -145,7 +159,7 @@ def _with_time(table: Table, mapping: LogMapping) -> tuple[Table, Notes]:
 
 
 def _recognised(
-    path: str | PathLike[str],
+    path: Path,
     recorder: Recorder,
     mapping: LogMapping | None,
     joints: Sequence[str] | None,
