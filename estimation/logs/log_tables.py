@@ -13,8 +13,8 @@ import numpy as np
 from estimation.logs.columns import parse_name
 from estimation.logs.formats import column_names, is_log_name, read_foreign
 from estimation.logs.joint_numbers import NAMES, counted_from_one, named_as_in_file
-from estimation.logs.mappings.mapped_tables import count_joints, map_table, mapped_sources
-from estimation.logs.mappings.mapping import USUAL, LogMapping
+from estimation.logs.mappings.mapped_tables import count_joints, map_table, stated_columns
+from estimation.logs.mappings.mapping import LogMapping
 from estimation.logs.needed_columns import is_needed
 from estimation.logs.readers.compressed import unpacked
 from estimation.logs.recorders import Recorder, recorder_of
@@ -72,7 +72,7 @@ def _log_table(
         if recorder is not None:
             return _recognised(path, recorder, mapping, joints, kinds)
     known = LogMapping() if mapping is None else mapping
-    stated = _stated(known, names, n)
+    stated = stated_columns(known, names, n)
     table, notes = _read(
         path,
         # Of arrays the columns are known only when they are read.
@@ -81,7 +81,7 @@ def _log_table(
         topic=known.topic,
         joints=known.joints if known.joints is not None else joints,
     )
-    table, in_file, more = counted_from_one(table, _stated(known, table.names, n))
+    table, in_file, more = counted_from_one(table, stated_columns(known, table.names, n))
     with named_as_in_file(in_file):
         if mapping is not None:
             table = _mapped(table, known, count_joints(known, table.names, n), kinds)
@@ -127,14 +127,6 @@ def _read(
             )
 
 
-def _stated(mapping: LogMapping, names: Sequence[str] | None, n: int | None) -> list[str]:
-    """The columns that a mapping names, not those that it only describes under their usual names."""
-    usual = {key: None for key in USUAL if (entry := getattr(mapping, key)) and entry.columns == [USUAL[key]]}
-    named = mapping.model_copy(update=usual)
-    known = names or ()
-    return mapped_sources(named, known, count_joints(mapping, known, n))
-
-
 def _with_time(table: Table, mapping: LogMapping) -> tuple[Table, Notes]:
     """Adds the times of rows at a stated rate; a column of time that says otherwise is noted."""
     if mapping.rate is None:
@@ -150,7 +142,7 @@ def _with_time(table: Table, mapping: LogMapping) -> tuple[Table, Notes]:
     note = {
         "name": "stated_rate",
         "text": text,
-        "action": "state no rate if the column of time is right" if differs else "none",
+        "action": "state no rate if the column of time is right" if differs else "the rows are taken as evenly spaced",
         "value": mapping.rate,
         "unit": "Hz",
         "severity": "warning" if differs else "info",

@@ -7,6 +7,8 @@ import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+import yaml
+
 # Words of a column's name, in English and as German controllers write them, in the order in which quantities are
 # recognised. A velocity's name often has a position's.
 _WORDS = {
@@ -15,7 +17,7 @@ _WORDS = {
     "velocity": r"dq|qd|vel|velocity|velocities|speed|speeds|omega|geschwindigkeit|drehzahl",
     "current": r"i|iq|cur|curr|current|currents|amps|strom",
     "torque": r"tau|trq|tq|torque|torques|effort|efforts|moment|moments|mt|tauj|load|loads|drehmoment",
-    "position": r"q|pos|position|positions|angle|angles|axis|ax|theta|joint|j|mp|encoder|winkel|lage|achse",
+    "position": r"q|pos|position|positions|angle|angles|axis|ax|theta|joint|j|mp|encoder|state|winkel|lage|achse",
 }
 _COMMANDED = re.compile(r"target|desired|des|cmd|command|commanded|ref|reference|setpoint|set|goal|soll|ext|external")
 _UNITS = {
@@ -54,8 +56,9 @@ class _Group:
 
     def columns(self, count: int, by_name: bool) -> str:
         """Writes the columns of the first joints: as a pattern, if {joint} means the same in the whole mapping."""
-        same = self.by_name == by_name or "{joint}" not in self.pattern
-        return _text(self.pattern) if same and len(self.names) == count else _list(self.names[:count])
+        filled = (self.pattern.replace("{joint}", str(k + 1)).replace("{index}", str(k)) for k in range(count))
+        same = self.by_name if "{joint}" in self.pattern and by_name else list(filled) == list(self.names)
+        return _text(self.pattern) if same else _list(self.names[:count])
 
 
 def save_mapping(text: str) -> str:
@@ -135,9 +138,8 @@ def _groups(names: Sequence[str], joints: Sequence[str] | None) -> list[_Group]:
     numbered: dict[str, dict[int, str]] = {}
     for name in names:
         for match in re.finditer(r"\d+", name):
-            if match[0] == str(int(match[0])):
-                pattern = f"{name[: match.start()]}{{}}{name[match.end() :]}"
-                numbered.setdefault(pattern, {})[int(match[0])] = name
+            pattern = f"{name[: match.start()]}{{}}{name[match.end() :]}"
+            numbered.setdefault(pattern, {})[int(match[0])] = name
     for pattern, counted in numbered.items():
         first = 0 if 0 in counted else 1
         run: list[str] = []
@@ -198,7 +200,11 @@ def has_usual_names(names: Sequence[str]) -> bool:
 
 
 def _text(text: str) -> str:
-    return text if re.fullmatch(r"[A-Za-z_][A-Za-z0-9_/ .]*[A-Za-z0-9_]|[A-Za-z]", text) else json.dumps(text)
+    """Writes a text for YAML, in quotes where it would read as something else."""
+    try:
+        return text if yaml.safe_load(f"[{text}]") == [text] else json.dumps(text)
+    except yaml.YAMLError:
+        return json.dumps(text)
 
 
 def _list(names: Sequence[str]) -> str:

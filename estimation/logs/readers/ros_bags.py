@@ -154,7 +154,7 @@ def _choose(path: Path, reader: Any, topic: str | None, joints: Sequence[str] | 
             f"{len(names)} topics with joint states: {', '.join(names)}",
             file=path,
             allowed=f"one {best[0].message.kind}",
-            remedy="choose one with `topic` in a mapping (--mapping)",
+            remedy=save_mapping(f"topic: {names[0]}"),
         )
     return best[0]
 

@@ -5,7 +5,10 @@ import pytest
 
 from estimation.logs import read_log
 from estimation.logs.joint_numbers import renamed_joints
+from estimation.logs.mappings.mapping import LogMapping, PerJoint
+from estimation.logs.parquet_streams import open_stream
 from robots.common.errors import InputError
+from robots.common.tables.table_files import write_table
 from tests.estimation.logs.made_logs import columns, csv, refused, text
 
 
@@ -64,3 +67,17 @@ def test_a_number_too_many_is_refused(tmp_path):
         read_log(csv(tmp_path, text(columns(q0=[0.0] * 4, tau0=[0.0] * 4))), n=2)
     assert refused(csv(tmp_path, text(columns(q01=[0.0] * 4)))).column == "q01"
     assert refused(csv(tmp_path, text(columns(q1000000000000=[0.0] * 4)))).column == "q3"
+
+
+def test_a_log_in_pieces_is_counted_alike(tmp_path):
+    """A Parquet file that is read in pieces is asked the same question, also if a mapping names its torques."""
+    made = columns(rows=40, joints=2)
+    data = {name if name == "t" else f"{name[:-1]}{int(name[-1]) - 1}": values for name, values in made.items()}
+    write_table(tmp_path / "log.parquet", data)
+    for mapping in (None, LogMapping(torque=PerJoint(columns=["tau{index}"]))):
+        log = open_stream(tmp_path / "log.parquet", 2, mapping=mapping).rows(0, 40)
+        np.testing.assert_array_equal(log.q[:, 1], made["q2"])
+        np.testing.assert_array_equal(log.tau[:, 0], made["tau1"])
+    with pytest.raises(InputError, match="read in pieces") as caught:
+        open_stream(tmp_path / "log.parquet", 2, mapping=LogMapping(rate=100.0))
+    assert "--no-stream" in caught.value.remedy

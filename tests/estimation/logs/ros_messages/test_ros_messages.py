@@ -333,3 +333,29 @@ def test_one_message_without_a_stamp_is_left_out(tmp_path):
         log = read_log(bag.close(), 7, joints=NAMES)
         assert len(log) == rows
         np.testing.assert_allclose(log.t - 1.0, np.delete(T, [7] if rows == 39 else []), atol=1e-9)
+
+
+def pasted(error, folder):
+    """Saves the mapping that a message prints."""
+    (folder / "mapping.yaml").write_text(str(error).split("mapping.yaml:\n", 1)[1])
+    return folder / "mapping.yaml"
+
+
+def test_the_mapping_of_a_message_reads_the_bag(tmp_path):
+    """The joints or the topic that a message prints read the bag, pasted as they are."""
+    names = [f"axis_{letter}" for letter in "abcdefg"]
+    bag = Bag(tmp_path / "other", "db3", names=names)
+    for row in range(len(T)):
+        bag.add("/joint_states", JOINT_STATE, row, bag.state(row, order=range(7)))
+    path = bag.close()
+    with pytest.raises(InputError, match="no message has the joints") as caught:
+        read_log(path, 7, joints=NAMES)
+    is_the_motion(read_log(path, 7, joints=NAMES, mapping=pasted(caught.value, tmp_path)))
+    bag = Bag(tmp_path / "two", "db3")
+    for row in range(len(T)):
+        for topic in ("/left/joint_states", "/right/joint_states"):
+            bag.add(topic, JOINT_STATE, row, bag.state(row))
+    path = bag.close()
+    with pytest.raises(InputError, match="2 topics") as caught:
+        read_log(path, 7, joints=NAMES)
+    is_the_motion(read_log(path, 7, joints=NAMES, mapping=pasted(caught.value, tmp_path)))
