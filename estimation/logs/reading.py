@@ -78,7 +78,9 @@ def _log(
     kinds: Sequence[str] | None,
 ) -> Log:
     """Makes a log of a table with its columns."""
-    remedy = PLAIN_REMEDY if mapping else remedy_for_columns((*table.names, *table.skipped), n, joints)
+    in_file = table.metadata.get(NAMES, {})
+    names = (*(in_file.get(name, name) for name in table.names), *table.skipped)
+    remedy = PLAIN_REMEDY if mapping else remedy_for_columns(names, n, joints)
     _checked_names(table, remedy)
     table, left_out = without_faulty_extras(table)
     quantities = _checked_names(table, remedy)

@@ -31,7 +31,7 @@ _UNITS = {
     "ma": ("current", "mA"),
     "a": ("current", "A"),
 }
-_TIME = re.compile(r"(?i)t([_ \[(]+[mun]?s(ec)?[\])]?)?|.*(time|stamp|zeit|clock).*")
+_TIME = re.compile(r"(?i)t([_ \[(]+[mun]?s(ec)?[\])]?)?|.*(time|stamp|zeit|clock).*|(.*[ _])?(date|datum)([ _].*)?")
 _TIME_UNITS = {"ms": "ms", "msec": "ms", "us": "us", "usec": "us", "ns": "ns", "nsec": "ns", "s": "s", "sec": "s"}
 PLAIN_REMEDY = "rename the columns, or describe them in a mapping (--mapping)"
 RATE_REMEDY = "if there is no column of time, state the rows per second, such as --rate 250"

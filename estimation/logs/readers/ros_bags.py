@@ -149,6 +149,9 @@ def _choose(path: Path, reader: Any, topic: str | None, joints: Sequence[str] | 
     best = [c for c in fitting if c.has_effort] or fitting
     best = [c for c in best if c.message is best[0].message] if topic else _preferred(best)
     names = sorted({candidate.name for candidate in best})
+    if best[0].called is None:
+        # The topic whose joints could be the robot's under other names; its message says what it has.
+        return next((c for c in best if len(c.found) == len(joints or ())), best[0])
     if len(names) > 1:
         raise InputError(
             f"{len(names)} topics with joint states: {', '.join(names)}",

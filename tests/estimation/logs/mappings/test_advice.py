@@ -4,12 +4,15 @@ import gzip
 import re
 import subprocess
 import sys
+import tomllib
+from pathlib import Path
 
 import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 
+import estimation.logs
 from estimation.logs import read_log
 from estimation.logs.mappings.mapping import stated_rate
 from robots.common.errors import InputError
@@ -57,11 +60,13 @@ CASES = {
     "names without digits": table("__time", by("/js/{}/position"), by("/js/{}/effort"), names=ABB),
     "brackets and blanks": table("Time [s]", by("Axis {} pos [rad]"), by("Axis {} torque [Nm]")),
     "German": table("Zeit [ms]", by("Achse{}_Winkel"), by("Achse{}_Drehmoment"), scale=1e3),
+    "time behind the text": table("Datum", by("pos{}"), by("tau_{}")),
     "milliseconds": table("t_ms", by("pos{}"), by("tau_{}"), scale=1e3),
     "reserved words": table("time: s", by("pos #{}"), by("effort, {}")),
     "without time": table(None, by("pos_{}"), by("trq_{}")),
     "usual, without time": table(None, by("q{}"), by("tau{}")),
     "usual from 0, without time": table(None, by("q{}", 0), by("tau{}", 0)),
+    "usual from 0, time elsewhere": table("time", by("q{}", 0), by("tau{}", 0)),
     "commanded beside measured": table("time", by("pos_{}"), by("trq_{}"), more=[f"target_pos_{k}" for k in (1, 2, 3)]),
     "two kinds of names": table("time", by("{}_position"), by("torque{}"), names=None)
     | {"arm_joint1_position": Q[:, 0], "arm_joint2_position": Q[:, 1], "arm_joint3_position": Q[:, 2]},
@@ -120,3 +125,19 @@ def test_the_command_for_an_archive_writes_one(tmp_path):
     code = f"import numpy; path = {str(path)!r}; {call}"
     subprocess.run([sys.executable, "-c", code], check=True)
     np.testing.assert_array_equal(read_log(path, JOINTS).tau, TAU)
+
+
+def test_options_and_packages_of_messages_exist():
+    """Each option that a reader names is one of the command line, and each extra of the package can be installed."""
+    from typer.main import get_command
+
+    from oed.cli.app import app
+
+    root = Path(estimation.logs.__file__).parent
+    source = "\n".join(path.read_text() for path in root.rglob("*.py"))
+    parameters = [parameter for command in get_command(app).commands.values() for parameter in command.params]
+    options = {name for parameter in parameters for name in (*parameter.opts, *parameter.secondary_opts)}
+    named = set(re.findall(r"(?<![-\w])--[a-z][a-z-]+", source))
+    assert {"--mapping", "--rate", "--no-stream"} <= named <= options
+    extras = tomllib.loads((root.parents[1] / "pyproject.toml").read_text())["project"]["optional-dependencies"]
+    assert set(re.findall(r"robot-oed\[(\w+)\]", source)) <= set(extras)

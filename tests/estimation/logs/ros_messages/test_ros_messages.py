@@ -359,3 +359,14 @@ def test_the_mapping_of_a_message_reads_the_bag(tmp_path):
     with pytest.raises(InputError, match="2 topics") as caught:
         read_log(path, 7, joints=NAMES)
     is_the_motion(read_log(path, 7, joints=NAMES, mapping=pasted(caught.value, tmp_path)))
+
+
+def test_topics_without_the_robots_joints_say_what_is_missing(tmp_path):
+    """Of several topics with some joints each, none is offered as a choice that would not help."""
+    bag = Bag(tmp_path / "log", "db3")
+    for row in range(3):
+        bag.add("/left/joint_states", JOINT_STATE, row, bag.state(row, order=[0, 1, 2]))
+        bag.add("/right/joint_states", JOINT_STATE, row, bag.state(row, order=[3, 4, 5, 6]))
+    with pytest.raises(InputError, match="no message has the joints") as caught:
+        read_log(bag.close(), 7, joints=NAMES)
+    assert "record panda_joint4, panda_joint5, panda_joint6, panda_joint7, too" in caught.value.remedy
