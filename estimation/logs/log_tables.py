@@ -187,7 +187,9 @@ def _mapped(table: Table, mapping: LogMapping, joints: int, kinds: Sequence[str]
                 allowed="numbers with a unit, or times such as 2024-05-03T12:34:56.789 without one",
             )
         table = with_seconds(table, name)
-    mapped = map_table(with_seconds(table, "t"), mapping, joints, kinds)
+    # A log of another number of joints than the robot's is refused later, with both numbers.
+    own = kinds if kinds is not None and len(kinds) == joints else None
+    mapped = map_table(with_seconds(table, "t"), mapping, joints, own)
     kept = {name: values for name, values in mapped.columns.items() if parse_name(name) is not None}
     left = tuple(name for name in mapped.columns if name not in kept)
     return replace(mapped, columns=kept, skipped=(*mapped.skipped, *left))
