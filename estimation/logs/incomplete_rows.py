@@ -21,6 +21,8 @@ Notes = list[dict[str, Any]]
 MOST = 0.9
 # A value is interpolated between two of its column that are at most so many of its usual steps apart.
 STEPS = 3.0
+# Times above this one are those of a clock that counts from 1970 [s]; this is in 1973.
+SINCE_1970 = 1e8
 # Share of left-out rows from which on a note is a warning.
 MANY = 0.1
 
@@ -88,14 +90,14 @@ def complete_rows(table: Table) -> tuple[Table, NDArray[np.intp], Notes]:
 
 
 def _timed_rows(table: Table) -> tuple[NDArray[np.bool_], Notes]:
-    """Which rows have a time: a stamp of 0 between others, or long before all others, was never set."""
+    """Which rows have a time: a stamp of 0 between others, or before a date, was never set."""
     t = np.asarray(table.columns["t"], dtype=float)
     timed = ~np.isnan(t)
     zero = t == 0.0
     others = t[timed & ~zero]
     if zero.any() and len(others) > 1 and zero.sum() < len(others) and (np.diff(others) > 0).all():
-        # A log may start at 0: its other times then follow, and do not lie further away than they are long.
-        far = others[0] > max(others[-1] - others[0], 1.0)
+        # A log may start at 0, but then its other times are not seconds since 1970.
+        far = others[0] > SINCE_1970
         first_timed = int(np.flatnonzero(timed & ~zero)[0])
         timed &= ~zero | (np.arange(len(t)) < first_timed) & (not far)
     lost = ~timed

@@ -25,6 +25,9 @@ from robots.common.tables.times import is_time, seconds_of
 
 Notes = list[dict[str, Any]]
 
+# Serial numbers of days in a spreadsheet, that of 1970, and the fastest step of a time in seconds.
+SERIAL_DAYS, SERIAL_1970, FASTEST = (20_000.0, 80_000.0), 25_569.0, 1e-5
+
 RATE_ERROR = 0.01
 """Relative difference between a stated rate and that of a column of time, from which on a note is a warning."""
 
@@ -85,9 +88,10 @@ def _log_table(
     with named_as_in_file(in_file):
         if mapping is not None:
             table = _mapped(table, known, count_joints(known, table.names, n), kinds)
-        table, timed = _with_time(with_seconds(table, "t"), known)
+        table, dated = _without_serial_days(with_seconds(table, "t"))
+        table, timed = _with_time(table, known)
     table = replace(table, metadata={**table.metadata, NAMES: in_file} if in_file else table.metadata)
-    return _noted(table, [*notes, *more, *timed])
+    return _noted(table, [*notes, *more, *dated, *timed])
 
 
 def _read(
@@ -125,6 +129,26 @@ def _read(
                     "unit": "columns",
                 }
             )
+
+
+def _without_serial_days(table: Table) -> tuple[Table, Notes]:
+    """Converts a spreadsheet's serial numbers of days to seconds since 1970.
+
+    As seconds, rows at such numbers (1954 to 2119) would follow each other at more than 100 kHz.
+    """
+    times = table.columns.get("t")
+    if times is None or table.is_text("t") or len(times) < 2 or not np.isfinite(times).all():
+        return table, []
+    first, last = SERIAL_DAYS
+    if not (first < times.min() and times.max() < last and 0.0 < times[-1] - times[0] < FASTEST * (len(times) - 1)):
+        return table, []
+    note = {
+        "name": "serial_days",
+        "text": f"times from {times[0]:.6f} on are the days of a spreadsheet",
+        "action": "they are converted to seconds",
+        "value": len(times),
+    }
+    return replace(table, columns={**table.columns, "t": (times - SERIAL_1970) * 86400.0}), [note]
 
 
 def _with_time(table: Table, mapping: LogMapping) -> tuple[Table, Notes]:

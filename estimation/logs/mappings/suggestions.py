@@ -19,6 +19,7 @@ _WORDS = {
     "torque": r"tau|trq|tq|torque|torques|effort|efforts|moment|moments|mt|tauj|load|loads|drehmoment",
     "position": r"q|pos|position|positions|angle|angles|axis|ax|theta|joint|j|mp|encoder|state|winkel|lage|achse",
 }
+_LOADS = ("current", "torque")
 _COMMANDED = re.compile(r"target|desired|des|cmd|command|commanded|ref|reference|setpoint|set|goal|soll|ext|external")
 _UNITS = {
     "rad": ("position", "rad"),
@@ -31,8 +32,21 @@ _UNITS = {
     "ma": ("current", "mA"),
     "a": ("current", "A"),
 }
-_TIME = re.compile(r"(?i)t([_ \[(]+[mun]?s(ec)?[\])]?)?|.*(time|stamp|zeit|clock).*|(.*[ _])?(date|datum)([ _].*)?")
-_TIME_UNITS = {"ms": "ms", "msec": "ms", "us": "us", "usec": "us", "ns": "ns", "nsec": "ns", "s": "s", "sec": "s"}
+_TIME = re.compile(
+    r"(?i)ts|epoch|secs?|seconds|millis|t([_ \[(]+[mun]?s(ec)?[\])]?)?|.*(time|stamp|zeit|clock).*"
+    r"|(.*[ _])?(date|datum)([ _].*)?"
+)
+_TIME_UNITS = {
+    "ms": "ms",
+    "msec": "ms",
+    "us": "us",
+    "usec": "us",
+    "ns": "ns",
+    "nsec": "ns",
+    "s": "s",
+    "sec": "s",
+    "millis": "ms",
+}
 PLAIN_REMEDY = "rename the columns, or describe them in a mapping (--mapping)"
 RATE_REMEDY = "if there is no column of time, state the rows per second, such as --rate 250"
 _KEYS = ("position", "velocity", "torque", "current", "temperature")
@@ -157,9 +171,13 @@ def _words(pattern: str) -> tuple[str, ...]:
 
 
 def _quantity(words: Sequence[str]) -> str | None:
-    for quantity, spellings in _WORDS.items():
-        if any(re.fullmatch(spellings, word) for word in words):
-            return quantity
+    found = [quantity for quantity, spellings in _WORDS.items() if any(re.fullmatch(spellings, word) for word in words)]
+    if found and found[0] in _LOADS:
+        # The last word is the noun: a current torque is one, and so is a torque current.
+        kinds = (kind for word in reversed(words) for kind in _LOADS if re.fullmatch(_WORDS[kind], word))
+        return next(kinds)
+    if found:
+        return found[0]
     return next((_UNITS[word][0] for word in words if word in _UNITS), None)
 
 

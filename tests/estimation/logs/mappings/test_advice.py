@@ -60,6 +60,9 @@ CASES = {
     "names without digits": table("__time", by("/js/{}/position"), by("/js/{}/effort"), names=ABB),
     "brackets and blanks": table("Time [s]", by("Axis {} pos [rad]"), by("Axis {} torque [Nm]")),
     "German": table("Zeit [ms]", by("Achse{}_Winkel"), by("Achse{}_Drehmoment"), scale=1e3),
+    "current torque": table(
+        "ts", by("pos{}"), by("current_torque_{}"), more=[f"torque_current_{k}" for k in (1, 2, 3)]
+    ),
     "time behind the text": table("Datum", by("pos{}"), by("tau_{}")),
     "milliseconds": table("t_ms", by("pos{}"), by("tau_{}"), scale=1e3),
     "reserved words": table("time: s", by("pos #{}"), by("effort, {}")),

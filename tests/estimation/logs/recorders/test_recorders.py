@@ -261,7 +261,7 @@ def test_rostopic_table_with_fewer_values_than_names_is_refused(tmp_path):
 @EACH
 def test_a_recording_of_another_robot_names_both_numbers(tmp_path, name):
     """A robot of two joints cannot have a recording of six or seven."""
-    form, path, _ = written(tmp_path, name)
+    _, path, _ = written(tmp_path, name)
     with pytest.raises(InputError, match="joints") as caught:
         read_log(path, 2, kinds=("revolute", "revolute"))
     assert caught.value.exit_code == 2
