@@ -96,10 +96,10 @@ def _timed_rows(table: Table) -> tuple[NDArray[np.bool_], Notes]:
     zero = t == 0.0
     others = t[timed & ~zero]
     if zero.any() and len(others) > 1 and zero.sum() < len(others) and (np.diff(others) > 0).all():
-        # A log may start at 0, but then its other times are not seconds since 1970.
-        far = others[0] > SINCE_1970
-        first_timed = int(np.flatnonzero(timed & ~zero)[0])
-        timed &= ~zero | (np.arange(len(t)) < first_timed) & (not far)
+        # A log may start at 0, but then its other times are not seconds since 1970; or count down to 0 and on.
+        at_start = np.cumsum(timed & ~zero) == 0
+        before = others[np.maximum(np.cumsum(timed & ~zero) - 1, 0)]
+        timed &= ~(zero & np.where(at_start, others[0] > SINCE_1970, before > 0.0))
     lost = ~timed
     if not lost.any():
         return timed, []

@@ -94,9 +94,11 @@ def test_a_stamp_that_was_never_set_is_left_out(tmp_path, row):
     assert "rows_without_time" in noted(log)
 
 
-def test_a_log_may_start_at_zero(tmp_path):
-    """The first row at t = 0 stays, also before a pause."""
-    t = np.array([0.0, 3.0, 3.5, 4.0, 8.0])
+@pytest.mark.parametrize(
+    "t", [[0.0, 3.0, 3.5, 4.0, 8.0], [-2.0, -1.0, 0.0, 1.0, 2.0], [0.0, 1e6, 1e6 + 1, 1e6 + 2, 2e6]]
+)
+def test_a_time_of_zero_may_be_right(tmp_path, t):
+    """The first row at t = 0 stays, also before a pause, and so does a row at 0 behind negative times."""
     log = read_log(csv(tmp_path, text(columns(rows=5, t=t))), n=2)
     np.testing.assert_array_equal(log.t, t)
     assert not noted(log)
