@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from estimation.gate.finding import SEVERITIES, Finding, Severity
 from estimation.gate.measurements.timing import FEWEST
+from estimation.logs.torque_source import NO_TORQUE
 from robots.common.errors import InputError, NotIdentifiableError
 from robots.common.plain import all_finite, finite
 from robots.signals import Log
@@ -20,7 +21,9 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 
 # Findings that do not concern a prediction, and findings on torques, which only make its error wrong.
-NOT_OF_MOTION = frozenset({"badly_excited", "hardly_moves", "no_motion", "poorly_explained", "short", "undetermined"})
+NOT_OF_MOTION = frozenset(
+    {"badly_excited", "hardly_moves", "no_motion", NO_TORQUE, "poorly_explained", "short", "undetermined"}
+)
 OF_TORQUE = frozenset(
     {
         "constant_torque",
@@ -181,7 +184,8 @@ class GateReport:
 
     def summary(self) -> str:
         """Gives the verdict and lists the findings, the worst first."""
-        verdict = "refused" if self.refused else "usable"
+        lacks_torque = any(finding.name == NO_TORQUE for finding in self.findings)
+        verdict = "refused" if self.refused else "no torque, its motion is usable" if lacks_torque else "usable"
         rate = 1.0 / self.period if self.period > 0 else float("nan")
         head = f"{self.log or 'log'}: {verdict}; {self.samples} samples, {self.duration:.4g} s at {rate:.4g} Hz"
         return "\n".join([head, *(f"  {finding.severity}: {finding}" for finding in self.findings)])

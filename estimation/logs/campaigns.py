@@ -8,7 +8,7 @@ from os import PathLike
 from pathlib import Path
 
 from estimation.logs.clocks import do_not_overlap
-from estimation.logs.formats import SUFFIXES, is_bag_folder
+from estimation.logs.formats import SUFFIXES, is_log_name
 from robots.common.errors import InputError
 from robots.signals import Log
 
@@ -43,12 +43,7 @@ def log_files(folder: str | PathLike[str]) -> list[Path]:
         entries = in_natural_order(place.iterdir())
     except OSError as error:
         raise InputError(f"cannot be read ({error.strerror or error})", file=place) from error
-    found = [
-        entry
-        for entry in entries
-        if not entry.name.startswith(".")
-        and (is_bag_folder(entry) or (entry.is_file() and entry.suffix.lower() in SUFFIXES))
-    ]
+    found = [entry for entry in entries if not entry.name.startswith(".") and is_log_name(entry)]
     if not found:
         raise InputError("no logs in the folder", file=place, allowed=", ".join(SUFFIXES))
     return found

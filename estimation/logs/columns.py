@@ -18,6 +18,7 @@ _TURN = float(2.0 * np.pi)
 _POSITION = {"rad": 1.0, "deg": _DEGREE, "mrad": 1e-3, "turn": _TURN, "m": 1.0, "mm": 1e-3}
 _VELOCITY = {"rad/s": 1.0, "deg/s": _DEGREE, "rpm": _TURN / 60.0, "m/s": 1.0, "mm/s": 1e-3}
 _TORQUE = {"Nm": 1.0, "N": 1.0, "Nmm": 1e-3, "mNm": 1e-3, "kNm": 1e3, "kN": 1e3}
+_TIME = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9, "min": 60.0, "h": 3600.0, "d": 86400.0}
 _LINEAR = {"m", "mm", "m/s", "mm/s", "m/s2", "mm/s2", "N", "kN"}
 # In SI units: files of earlier versions state them for linear axes, too, and N is often written for N m.
 _HARMLESS = {"rad", "rad/s", "rad/s2", "Nm", "N"}
@@ -49,7 +50,7 @@ class Quantity:
 
 
 QUANTITIES = (
-    Quantity(prefix="t", field="t", unit="s", units={"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}, per_joint=False),
+    Quantity(prefix="t", field="t", unit="s", units=_TIME, per_joint=False),
     Quantity(prefix="q", field="q", unit="rad", units=_POSITION, linear_unit="m"),
     Quantity(prefix="dq", field="dq", unit="rad/s", units=_VELOCITY, linear_unit="m/s"),
     Quantity(prefix="ddq", field="ddq", unit="rad/s^2", units=_ACCELERATION, linear_unit="m/s^2"),

@@ -6,7 +6,9 @@ from collections.abc import Callable, Sequence
 from os import PathLike
 from pathlib import Path
 
+from estimation.logs.readers import compressed
 from estimation.logs.readers.franka_states import HEAD, franka_names, is_franka_states, read_franka_states
+from estimation.logs.readers.json_tables import read_json
 from estimation.logs.readers.matlab_files import read_matlab
 from estimation.logs.readers.numpy_files import read_npz
 from estimation.logs.readers.ros_bags import read_bag
@@ -18,7 +20,8 @@ from robots.common.tables.table_files import parquet_names, read_parquet
 
 CSV = (".csv", ".txt", ".tsv", ".dat")
 BAGS = (".bag", ".mcap", ".db3")
-SUFFIXES = (*CSV, ".parquet", ".mat", ".npz", *BAGS)
+JSON_LINES = (".jsonl", ".ndjson")
+SUFFIXES = (*CSV, ".parquet", ".mat", ".npz", *JSON_LINES, *BAGS)
 _MAGIC = {
     b"#ROSBAG V2.0": ".bag",
     b"\x89MCAP0\r\n": ".mcap",
@@ -35,6 +38,18 @@ def is_bag_folder(path: Path) -> bool:
     return path.is_dir() and (path / "metadata.yaml").is_file()
 
 
+def is_log_name(path: Path) -> bool:
+    """Whether something in a folder is a log, by its name: a file of a known format, compressed or not, or a bag.
+
+    Files ``.json`` are not: results of this software are.
+
+    Args:
+        path: an existing file or folder.
+    """
+    inner = path.with_suffix("") if path.suffix.lower() in compressed.SUFFIXES else path
+    return is_bag_folder(path) or (path.is_file() and inner.suffix.lower() in SUFFIXES)
+
+
 def form_of(path: Path) -> str:
     """Finds the format of a file: by its first bytes where the name does not say it.
 
@@ -42,13 +57,13 @@ def form_of(path: Path) -> str:
         path: an existing file.
 
     Returns:
-        The suffix of the format; ``franka`` for robot states that libfranka printed.
+        The suffix of the format; ``franka`` for robot states that libfranka printed, ``json`` for any JSON.
 
     Raises:
         InputError: a file of no known format.
     """
     suffix = path.suffix.lower()
-    if suffix in SUFFIXES and suffix not in CSV:
+    if suffix in SUFFIXES and suffix not in (*CSV, *JSON_LINES):
         return suffix
     with path.open("rb") as stream:
         head = stream.read(HEAD)
@@ -57,6 +72,8 @@ def form_of(path: Path) -> str:
         return magic
     if is_franka_states(head):
         return "franka"
+    if suffix in (*JSON_LINES, ".json") or head.lstrip(b"\xef\xbb\xbf \r\n\t").startswith((b'{"', b'[{"')):
+        return "json"
     if suffix in CSV:
         return suffix
     if suffix in (".log", ".asc", "") and head and b"\0" not in head:
@@ -119,5 +136,6 @@ def read_foreign(
         ".npz": read_npz,
         ".parquet": read_parquet,
         "franka": read_franka_states,
+        "json": read_json,
     }
     return readers.get(form, read_csv)(place, wanted)

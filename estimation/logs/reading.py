@@ -15,12 +15,15 @@ from estimation.logs.campaigns import MAPPING, in_order, log_files
 from estimation.logs.clocks import advice_on_times
 from estimation.logs.columns import BY_FIELD, QUANTITIES, Quantity, column_name, parse_name, refuse_text, unit_factors
 from estimation.logs.formats import is_bag_folder
-from estimation.logs.log_tables import read_log_table, without_broken_derivatives
+from estimation.logs.incomplete_rows import complete_rows
+from estimation.logs.joint_numbers import NAMES, named_as_in_file
+from estimation.logs.log_tables import read_log_table
 from estimation.logs.mappings.mapped_tables import UNIT_NOTES
-from estimation.logs.mappings.mapping import LogMapping, read_mapping
+from estimation.logs.mappings.mapping import LogMapping, read_mapping, stated_rate
 from estimation.logs.mappings.suggestions import PLAIN_REMEDY, remedy_for_columns
+from estimation.logs.needed_columns import without_faulty_extras
 from estimation.logs.repairs import repair_rows
-from estimation.logs.torque_source import KEY, parse_meaning
+from estimation.logs.torque_source import KEY, NO_TORQUE, parse_meaning
 from robots.common.errors import InputError
 from robots.common.tables.table import Table
 from robots.signals import FloatArray, Log
@@ -61,16 +64,34 @@ def read_log(
     """
     known = mapping if isinstance(mapping, LogMapping) or mapping is None else read_mapping(mapping)
     table, notes = read_log_table(path, n, known, joints, kinds)
-    remedy = PLAIN_REMEDY if known else remedy_for_columns((*table.names, *table.skipped), n, joints)
+    with named_as_in_file(table.metadata.get(NAMES, {})):
+        return _log(table, notes, n, torque, known, joints, kinds)
+
+
+def _log(
+    table: Table,
+    notes: list[dict[str, Any]],
+    n: int | None,
+    torque: bool,
+    mapping: LogMapping | None,
+    joints: Sequence[str] | None,
+    kinds: Sequence[str] | None,
+) -> Log:
+    """Makes a log of a table with its columns."""
+    in_file = table.metadata.get(NAMES, {})
+    names = (*(in_file.get(name, name) for name in table.names), *table.skipped)
+    remedy = PLAIN_REMEDY if mapping else remedy_for_columns(names, n, joints)
+    _checked_names(table, remedy)
+    table, left_out = without_faulty_extras(table)
     quantities = _checked_names(table, remedy)
     count = _count_joints(table, quantities, n, remedy)
     for name in table.names:
         refuse_text(table, name)
-    table, dropped = without_broken_derivatives(table)
-    quantities = {name: quantities[name] for name in table.names}
     whole = table
+    table, complete, gaps = complete_rows(table)
     table, kept, repairs = repair_rows(table)
-    repairs = [*notes, *dropped, *repairs]
+    kept = complete[kept]
+    repairs = [*notes, *left_out, *gaps, *repairs, *_not_read(table)]
     if len(table) < 2:
         raise InputError("only one row", file=table.path, row=table.first_row, allowed="2 or more rows")
     factors, unit_notes = unit_factors(table, quantities, kinds)
@@ -80,19 +101,32 @@ def read_log(
         for quantity in QUANTITIES
         if any(found is quantity for found in quantities.values())
     }
-    if torque and "tau" not in signals and "current" not in signals:
-        raise InputError(
-            f"neither tau1..tau{count} nor i1..i{count}" if count > 1 else "neither tau1 nor i1",
-            file=table.path,
-            column="tau1",
-            row=_header_row(table),
-            allowed="columns of joint torque [N m] or motor current [A]",
-            remedy=table.metadata.get("no_torque", remedy),
+    if "tau" not in signals and "current" not in signals:
+        lacking = f"neither tau1..tau{count} nor i1..i{count}" if count > 1 else "neither tau1 nor i1"
+        remedy = table.metadata.get(NO_TORQUE, remedy)
+        if torque:
+            raise InputError(
+                lacking,
+                file=table.path,
+                column="tau1",
+                row=_header_row(table),
+                allowed="columns of joint torque [N m] or motor current [A]",
+                remedy=remedy,
+            )
+        repairs.append(
+            {
+                "name": NO_TORQUE,
+                "text": f"{lacking}: without torque nothing can be identified",
+                "action": remedy,
+                "value": 0,
+                "unit": "columns",
+                "severity": "warning",
+            }
         )
     metadata = _metadata(table) | ({"repairs": repairs} if repairs else {})
-    if known is not None and known.torque_is is not None:
-        parse_meaning(known.torque_is, count)
-        metadata[KEY] = known.torque_is
+    if mapping is not None and mapping.torque_is is not None:
+        parse_meaning(mapping.torque_is, count)
+        metadata[KEY] = mapping.torque_is
     try:
         return Log(**signals, name=table.path.stem, metadata=metadata)
     except InputError as error:
@@ -149,11 +183,19 @@ def read_logs(
         place = Path(path)
         if place.is_dir() and not is_bag_folder(place):
             own = place / MAPPING
-            chosen = mapping if mapping is not None or not own.is_file() else own
+            chosen = _of_folder(own, mapping) if own.is_file() else mapping
             logs += in_order([read(file, chosen) for file in log_files(place)])
         else:
             logs.append(read(path, mapping))
     return tuple(logs)
+
+
+def _of_folder(own: Path, mapping: LogMapping | str | PathLike[str] | None) -> LogMapping | str | PathLike[str] | None:
+    """A given mapping counts before a folder's own; a rate alone is added to it."""
+    if mapping is None:
+        return own
+    alone = isinstance(mapping, LogMapping) and mapping.rate is not None and mapping == LogMapping(rate=mapping.rate)
+    return stated_rate(mapping.rate, own) if alone else mapping  # type: ignore[union-attr,arg-type]
 
 
 def _checked_names(table: Table, remedy: str) -> dict[str, Quantity]:
@@ -182,6 +224,22 @@ def _checked_names(table: Table, remedy: str) -> dict[str, Quantity]:
             remedy=remedy,
         )
     return quantities
+
+
+def _not_read(table: Table) -> list[dict[str, Any]]:
+    """Names the columns that are no part of a log."""
+    if not table.skipped:
+        return []
+    names = ", ".join(table.skipped[:LISTED]) + (", ..." if len(table.skipped) > LISTED else "")
+    return [
+        {
+            "name": "columns_not_read",
+            "text": f"not read: {names}",
+            "action": "if a column belongs to the log, name it in a mapping (--mapping)",
+            "value": len(table.skipped),
+            "unit": "columns",
+        }
+    ]
 
 
 def _listed(table: Table, prefix: str = "") -> str:
@@ -255,7 +313,9 @@ def _signal(table: Table, quantity: Quantity, joints: int, factors: Mapping[str,
 
 
 def _metadata(table: Table) -> dict[str, Any]:
-    metadata = {key: value for key, value in table.metadata.items() if key not in ("units", "no_torque", UNIT_NOTES)}
+    metadata = {
+        key: value for key, value in table.metadata.items() if key not in ("units", NO_TORQUE, UNIT_NOTES, NAMES)
+    }
     period = metadata.get("period")
     if period is not None:
         try:

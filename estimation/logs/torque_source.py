@@ -10,6 +10,8 @@ from robots.common.errors import InputError
 MEANINGS = ("current", "motor", "without-gravity")
 KEY = "torque_is"
 """Of a log's metadata: what its torque column means, until it is converted."""
+NO_TORQUE = "no_torque"
+"""Name of the note on a log that has neither torques nor currents, and key of a table's remedy for it."""
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -13,7 +13,7 @@ from robots.common.tables.table import Column
 from robots.common.tables.table_files import write_table
 from robots.signals import Log
 
-_OF_THE_FILE = ("file", "ignored_columns", "units")
+_OF_THE_FILE = ("file", "ignored_columns", "repairs", "units")
 
 
 def write_log(path: str | PathLike[str], log: Log, force: bool = False, *, kinds: Sequence[str] | None = None) -> None:

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 if TYPE_CHECKING:
+    from estimation.logs.mappings.mapping import LogMapping
     from estimation.models.model import Model
     from robots.signals import Log
 
@@ -40,7 +41,7 @@ def heat_of(
     log: Log,
     before: list[Path],
     ambient: float | None,
-    mapping: Path | None,
+    mapping: LogMapping | Path | None,
     later: float,
 ) -> Heat:
     """Gives what a prediction of a log needs to know of heat.

@@ -14,6 +14,7 @@ from robots.common.errors import InputError
 if TYPE_CHECKING:
     from concurrent.futures import Executor
 
+    from estimation.logs.mappings.mapping import LogMapping
     from robots.robot import Robot
 
 ROBOT = "a catalogue name (er3a, ur10, panda), a URDF or xacro, an MJCF (MuJoCo), or a robot YAML"
@@ -59,6 +60,15 @@ MappingOption = Annotated[
     Path | None,
     typer.Option(
         "--mapping", help="A YAML file with names, units, signs and order of the log's columns.", show_default=False
+    ),
+]
+RateOption = Annotated[
+    float | None,
+    typer.Option(
+        "--rate",
+        metavar="HZ",
+        help="Rows per second of a log without a column of time. It replaces a column that does not hold the time.",
+        show_default=False,
     ),
 ]
 ForceOption = Annotated[bool, typer.Option("--force", help="Overwrite existing results.")]
@@ -175,6 +185,19 @@ def robot_from(
     return load_robot(
         spec, tip=tip, joints=names, locked=locked or None, unlimited=unlimited, assume_masses=assume_masses
     )
+
+
+def with_rate(mapping: Path | None, rate: float | None) -> LogMapping | Path | None:
+    """Gives the mapping that `--mapping` and `--rate` state together.
+
+    Raises:
+        InputError: a rate that is not positive, or beside a column of time that the mapping names.
+    """
+    if rate is None:
+        return mapping
+    from estimation.logs.mappings.mapping import stated_rate
+
+    return stated_rate(rate, mapping)
 
 
 def robot_of_file(

@@ -31,5 +31,5 @@ def grouped(**options: Any) -> dict[str, Any]:
 
 
 def design(robot: Any, **options: Any) -> Design:
-    """Designs with options by their own names."""
-    return oed.design(robot, **grouped(**options))
+    """Designs with options by their own names, at full speed also for the robots that the tests make."""
+    return oed.design(robot, **grouped(**{"velocity_fraction": 1.0, **options}))

@@ -21,7 +21,7 @@ class ReaderNotes(Check):
         return [
             Finding(
                 name=str(note["name"]),
-                severity="info",
+                severity=note.get("severity", "info"),
                 text=str(note["text"]),
                 action=str(note["action"]),
                 value=float(note["value"]),

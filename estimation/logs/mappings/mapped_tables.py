@@ -8,7 +8,7 @@ import numpy as np
 
 from estimation.logs.columns import BY_FIELD, Quantity, column_name, refuse_text, suits, unit_factor, units_note
 from estimation.logs.mappings.coupled_axes import uncouple
-from estimation.logs.mappings.mapping import FIELDS, LogMapping, PerJoint, Single
+from estimation.logs.mappings.mapping import FIELDS, USUAL, LogMapping, PerJoint, Single
 from robots.common.errors import InputError
 from robots.common.tables.table import Column, Table
 
@@ -63,6 +63,19 @@ def mapped_sources(mapping: LogMapping, names: Sequence[str], joints: int) -> li
             single = isinstance(entry, Single)
             used.update([entry.column] if single else _columns(entry, mapping, joints, set(names)))
     return [name for name in names if name in used]
+
+
+def stated_columns(mapping: LogMapping, names: Sequence[str] | None, n: int | None) -> list[str]:
+    """Names the columns that a mapping states, and not those that it only describes under their usual names.
+
+    Args:
+        mapping: of the file.
+        names: the file's columns, where they are known.
+        n: the number of joints, where it is known.
+    """
+    usual = {key: None for key in USUAL if (entry := getattr(mapping, key)) and entry.columns == [USUAL[key]]}
+    known = names or ()
+    return mapped_sources(mapping.model_copy(update=usual), known, count_joints(mapping, known, n))
 
 
 def map_table(table: Table, mapping: LogMapping, joints: int, kinds: Sequence[str] | None = None) -> Table:

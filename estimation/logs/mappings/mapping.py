@@ -10,6 +10,7 @@ from pydantic import BeforeValidator, Field, field_validator, model_validator
 
 from estimation.logs.columns import BY_FIELD
 from robots.common.config import Config, read_config
+from robots.common.errors import InputError
 
 
 def _listed(value: Any) -> Any:
@@ -102,6 +103,7 @@ class LogMapping(Config):
 
     Attributes:
         time: the column of time.
+        rate: rows per second [Hz], for a log without a column of time.
         position: joint positions; the other quantities are optional.
         velocity: joint velocities.
         acceleration: joint accelerations.
@@ -125,6 +127,7 @@ class LogMapping(Config):
     """
 
     time: Single | None = None
+    rate: float | None = Field(default=None, gt=0.0, allow_inf_nan=False)
     position: PerJoint | None = None
     velocity: PerJoint | None = None
     acceleration: PerJoint | None = None
@@ -143,6 +146,12 @@ class LogMapping(Config):
     coupling: dict[int, dict[int, float]] | None = None
     coupled_torques: bool = False
 
+    @model_validator(mode="after")
+    def _check_times(self) -> LogMapping:
+        if self.time is not None and self.rate is not None:
+            raise ValueError("`time` and `rate` exclude each other: give the one that is right")
+        return self
+
     @model_validator(mode="before")
     @classmethod
     def _usual_columns(cls, data: Any) -> Any:
@@ -154,6 +163,34 @@ class LogMapping(Config):
             if key in USUAL and isinstance(value, dict)
         }
         return data | usual
+
+
+def stated_rate(rate: float, mapping: LogMapping | str | PathLike[str] | None = None) -> LogMapping:
+    """Gives a mapping with the rows per second that someone states.
+
+    Args:
+        rate: rows per second [Hz].
+        mapping: what else is known of the columns: a mapping, or its file.
+
+    Raises:
+        InputError: a rate that is not positive, or a mapping that names a column of time.
+    """
+    if not 0.0 < rate < np.inf:
+        raise InputError(f"a rate of {rate:g} rows per second", allowed="more than 0")
+    if not isinstance(mapping, LogMapping):
+        named = mapping
+        mapping = LogMapping() if named is None else read_mapping(named)
+    else:
+        named = None
+    if mapping.time is not None:
+        raise InputError(
+            f"a rate of {rate:g} rows per second, and the mapping names the column of time {mapping.time.column!r}",
+            file=named,
+            column="time",
+            allowed="one of the two",
+            remedy="remove `time` from the mapping, or leave out the rate",
+        )
+    return mapping.model_copy(update={"rate": rate})
 
 
 def read_mapping(path: str | PathLike[str]) -> LogMapping:

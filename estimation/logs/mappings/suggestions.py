@@ -7,6 +7,8 @@ import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+import yaml
+
 # Words of a column's name, in English and as German controllers write them, in the order in which quantities are
 # recognised. A velocity's name often has a position's.
 _WORDS = {
@@ -15,8 +17,9 @@ _WORDS = {
     "velocity": r"dq|qd|vel|velocity|velocities|speed|speeds|omega|geschwindigkeit|drehzahl",
     "current": r"i|iq|cur|curr|current|currents|amps|strom",
     "torque": r"tau|trq|tq|torque|torques|effort|efforts|moment|moments|mt|tauj|load|loads|drehmoment",
-    "position": r"q|pos|position|positions|angle|angles|axis|ax|theta|joint|j|mp|encoder|winkel|lage|achse",
+    "position": r"q|pos|position|positions|angle|angles|axis|ax|theta|joint|j|mp|encoder|state|winkel|lage|achse",
 }
+_LOADS = ("current", "torque")
 _COMMANDED = re.compile(r"target|desired|des|cmd|command|commanded|ref|reference|setpoint|set|goal|soll|ext|external")
 _UNITS = {
     "rad": ("position", "rad"),
@@ -29,9 +32,23 @@ _UNITS = {
     "ma": ("current", "mA"),
     "a": ("current", "A"),
 }
-_TIME = re.compile(r"(?i)t([_ \[(]+[mun]?s(ec)?[\])]?)?|.*(time|stamp|zeit|clock).*")
-_TIME_UNITS = {"ms": "ms", "msec": "ms", "us": "us", "usec": "us", "ns": "ns", "nsec": "ns", "s": "s", "sec": "s"}
+_TIME = re.compile(
+    r"(?i)ts|epoch|secs?|seconds|millis|t([_ \[(]+[mun]?s(ec)?[\])]?)?|.*(time|stamp|zeit|clock).*"
+    r"|(.*[ _])?(date|datum)([ _].*)?"
+)
+_TIME_UNITS = {
+    "ms": "ms",
+    "msec": "ms",
+    "us": "us",
+    "usec": "us",
+    "ns": "ns",
+    "nsec": "ns",
+    "s": "s",
+    "sec": "s",
+    "millis": "ms",
+}
 PLAIN_REMEDY = "rename the columns, or describe them in a mapping (--mapping)"
+RATE_REMEDY = "if there is no column of time, state the rows per second, such as --rate 250"
 _KEYS = ("position", "velocity", "torque", "current", "temperature")
 
 
@@ -43,11 +60,28 @@ class _Group:
         pattern: with ``{joint}`` or ``{index}``.
         names: in order.
         words: of the pattern, in small letters.
+        by_name: whether ``{joint}`` stands for the robot's names of its joints, and not for their numbers.
     """
 
     pattern: str
     names: tuple[str, ...]
     words: tuple[str, ...]
+    by_name: bool = False
+
+    def columns(self, count: int, by_name: bool) -> str:
+        """Writes the columns of the first joints: as a pattern, if {joint} means the same in the whole mapping."""
+        filled = (self.pattern.replace("{joint}", str(k + 1)).replace("{index}", str(k)) for k in range(count))
+        same = self.by_name if "{joint}" in self.pattern and by_name else list(filled) == list(self.names)
+        return _text(self.pattern) if same else _list(self.names[:count])
+
+
+def save_mapping(text: str) -> str:
+    """Says what to do with a mapping.
+
+    Args:
+        text: the YAML to be saved.
+    """
+    return f"check this mapping, save it as mapping.yaml and add --mapping mapping.yaml:\n{text}".rstrip()
 
 
 def remedy_for_columns(names: Sequence[str], n: int | None = None, joints: Sequence[str] | None = None) -> str:
@@ -58,10 +92,13 @@ def remedy_for_columns(names: Sequence[str], n: int | None = None, joints: Seque
         n: the number of joints, where it is known.
         joints: names of the robot's joints in its order, where they are known.
     """
+    if not _time_of(names) and "t" not in names and has_usual_names(names):
+        return RATE_REMEDY
     suggested = suggest_mapping(names, n, joints)
     if suggested is None or not ("torque:" in suggested or "current:" in suggested):
         return PLAIN_REMEDY
-    return f"check this mapping, save it as mapping.yaml and add --mapping mapping.yaml:\n{suggested}".rstrip()
+    rate = "" if suggested.startswith("time:") else f"{RATE_REMEDY}; "
+    return rate + save_mapping(suggested)
 
 
 def suggest_mapping(names: Sequence[str], n: int | None = None, joints: Sequence[str] | None = None) -> str | None:
@@ -73,7 +110,7 @@ def suggest_mapping(names: Sequence[str], n: int | None = None, joints: Sequence
         joints: names of the robot's joints in its order, where they are known.
 
     Returns:
-        YAML to be saved and checked; None if no columns look like time or positions.
+        YAML to be saved and checked, without `time` if no column looks like it; None if none looks like positions.
     """
     chosen: dict[str, _Group] = {}
     for group in _groups(names, joints):
@@ -84,19 +121,20 @@ def suggest_mapping(names: Sequence[str], n: int | None = None, joints: Sequence
         if known is None or _rank(group) < _rank(known):
             chosen[quantity] = group
     position = chosen.get("position")
-    time = min((name for name in names if _TIME.fullmatch(name)), key=len, default=None)
-    if position is None or time is None:
+    time = _time_of(names)
+    if position is None:
         return None
     count = n or len(position.names)
-    lines = [f"time: {{column: {_text(time)}, unit: {_time_unit(time)}}}"]
+    by_name = any(group.by_name for group in chosen.values())
+    lines = [f"time: {{column: {_text(time)}, unit: {_time_unit(time)}}}"] if time else []
     for key in _KEYS:
         found = chosen.get(key)
         if found is None or (key == "current" and "torque" in chosen) or len(found.names) < count:
             continue
         unit = next((unit for word in found.words if (unit := _unit(key, word))), None)
-        written = _text(found.pattern) if len(found.names) == count else _list(found.names[:count])
+        written = found.columns(count, by_name)
         lines.append(f"{key}: {{columns: {written}{f', unit: {_text(unit)}' if unit else ''}}}")
-    if any("{joint}" in line for line in lines) and joints is not None and not _counts_joints(chosen):
+    if by_name and joints is not None and any("{joint}" in line for line in lines):
         lines.append(f"joints: {_list(joints)}")
     return "\n".join(lines) + "\n"
 
@@ -109,13 +147,13 @@ def _groups(names: Sequence[str], joints: Sequence[str] | None) -> list[_Group]:
         for pattern in patterns:
             members = tuple(pattern.replace("{joint}", joint) for joint in joints)
             if set(members) <= set(names):
-                groups.append(_Group(pattern=pattern, names=members, words=_words(pattern.replace("{joint}", " "))))
+                words = _words(pattern.replace("{joint}", " "))
+                groups.append(_Group(pattern=pattern, names=members, words=words, by_name=True))
     numbered: dict[str, dict[int, str]] = {}
     for name in names:
         for match in re.finditer(r"\d+", name):
-            if match[0] == str(int(match[0])):
-                pattern = f"{name[: match.start()]}{{}}{name[match.end() :]}"
-                numbered.setdefault(pattern, {})[int(match[0])] = name
+            pattern = f"{name[: match.start()]}{{}}{name[match.end() :]}"
+            numbered.setdefault(pattern, {})[int(match[0])] = name
     for pattern, counted in numbered.items():
         first = 0 if 0 in counted else 1
         run: list[str] = []
@@ -133,9 +171,13 @@ def _words(pattern: str) -> tuple[str, ...]:
 
 
 def _quantity(words: Sequence[str]) -> str | None:
-    for quantity, spellings in _WORDS.items():
-        if any(re.fullmatch(spellings, word) for word in words):
-            return quantity
+    found = [quantity for quantity, spellings in _WORDS.items() if any(re.fullmatch(spellings, word) for word in words)]
+    if found and found[0] in _LOADS:
+        # The last word is the noun: a current torque is one, and so is a torque current.
+        kinds = (kind for word in reversed(words) for kind in _LOADS if re.fullmatch(_WORDS[kind], word))
+        return next(kinds)
+    if found:
+        return found[0]
     return next((_UNITS[word][0] for word in words if word in _UNITS), None)
 
 
@@ -157,13 +199,30 @@ def _time_unit(name: str) -> str:
     return next((_TIME_UNITS[word] for word in reversed(words) if word in _TIME_UNITS), "s")
 
 
-def _counts_joints(chosen: dict[str, _Group]) -> bool:
-    """Whether {joint} stands for numbers."""
-    return all(re.search(r"\d", group.names[0]) for group in chosen.values() if "{joint}" in group.pattern)
+def _time_of(names: Sequence[str]) -> str | None:
+    """Finds the column of time by its name: the shortest that fits."""
+    return min((name for name in names if _TIME.fullmatch(name)), key=len, default=None)
+
+
+def has_usual_names(names: Sequence[str]) -> bool:
+    """Whether a table has positions, and torques or currents, under the names of a log; joints count from 0 or 1.
+
+    Args:
+        names: of all columns.
+    """
+    present = set(names)
+    return all(
+        any(f"{prefix}{number}" in present for prefix in prefixes for number in (0, 1))
+        for prefixes in (("q",), ("tau", "i"))
+    )
 
 
 def _text(text: str) -> str:
-    return text if re.fullmatch(r"[A-Za-z_][A-Za-z0-9_/ .]*[A-Za-z0-9_]|[A-Za-z]", text) else json.dumps(text)
+    """Writes a text for YAML, in quotes where it would read as something else."""
+    try:
+        return text if yaml.safe_load(f"[{text}]") == [text] else json.dumps(text)
+    except yaml.YAMLError:
+        return json.dumps(text)
 
 
 def _list(names: Sequence[str]) -> str:

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
@@ -12,7 +12,8 @@ import pyarrow.parquet as pq
 from numpy.typing import NDArray
 
 from estimation.logs.columns import parse_name, refuse_text, unit_factors
-from estimation.logs.mappings.mapped_tables import count_joints, map_table, mapped_sources
+from estimation.logs.joint_numbers import renamed_joints
+from estimation.logs.mappings.mapped_tables import count_joints, map_table, mapped_sources, stated_columns
 from estimation.logs.mappings.mapping import LogMapping
 from estimation.logs.mappings.suggestions import PLAIN_REMEDY, remedy_for_columns
 from robots.common.errors import InputError
@@ -39,6 +40,7 @@ class Part:
         columns: names of the columns that are read.
         mapping: what they mean, where their names do not say it.
         kinds: "revolute" or "prismatic" of each joint, where they are known.
+        renamed: the log's names of columns whose joints are counted from 0.
         start: first time [s].
         end: last time [s].
         period: median step of time in the first row group [s].
@@ -50,6 +52,7 @@ class Part:
     columns: tuple[str, ...]
     mapping: LogMapping | None
     kinds: Sequence[str] | None
+    renamed: Mapping[str, str] = field(default_factory=dict)
     start: float = 0.0
     end: float = 0.0
     period: float = 0.0
@@ -69,8 +72,8 @@ class Part:
         columns = self._converted(table, self.columns, self.mapping)
         found = {"t": columns["t"]}
         torque = "tau" if "tau1" in columns else "i"
-        for prefix, field in (("q", "q"), (torque, "tau" if torque == "tau" else "current")):
-            found[field] = np.stack([columns[f"{prefix}{joint + 1}"] for joint in range(self.joints)], axis=1)
+        for prefix, signal in (("q", "q"), (torque, "tau" if torque == "tau" else "current")):
+            found[signal] = np.stack([columns[f"{prefix}{joint + 1}"] for joint in range(self.joints)], axis=1)
         return found
 
     def times(self, table: pa.Table) -> Array:
@@ -88,6 +91,12 @@ class Part:
         read = replace(self.head, columns={name: parquet_column(table.column(name), name, self.path) for name in names})
         for name in names:
             refuse_text(read, name)
+        if self.renamed:
+            read = replace(
+                read,
+                columns={self.renamed.get(name, name): values for name, values in read.columns.items()},
+                units={self.renamed.get(name, name): unit for name, unit in read.units.items()},
+            )
         if mapping is not None:
             read = map_table(read, mapping, self.joints, self.kinds)
         parsed = ((name, parse_name(name)) for name in read.names)
@@ -109,6 +118,12 @@ def open_part(path: Path, n: int | None, kinds: Sequence[str] | None, mapping: L
         InputError: a file that is empty or cut off, lacks a column, or has row groups that are too large.
     """
     if mapping is not None:
+        if mapping.rate is not None:
+            raise InputError(
+                "a stated rate, but the log is read in pieces",
+                file=path,
+                remedy="add a column t [s] to the files, or read the log at once with --no-stream",
+            )
         mapping = mapping.model_copy(update=dict.fromkeys(UNUSED))
     try:
         with pq.ParquetFile(path) as file:
@@ -117,7 +132,11 @@ def open_part(path: Path, n: int | None, kinds: Sequence[str] | None, mapping: L
                 raise InputError("the part has no rows", file=path, remedy="remove the file from the folder")
             names = file.schema_arrow.names
             stored, units = stored_in(file.schema_arrow.metadata or {})
-            joints, chosen = _chosen(path, names, n, mapping)
+            renamed = renamed_joints(names, stated_columns(mapping or LogMapping(), names, n))
+            lists = [column.name for column in file.schema_arrow if pa.types.is_nested(column.type)]
+            joints, chosen = _chosen(path, [renamed.get(name, name) for name in names], n, mapping, lists)
+            in_file = {log: name for name, log in renamed.items()}
+            chosen = [in_file.get(name, name) for name in chosen]
             if max(groups) * len(chosen) > MOST_VALUES:
                 raise InputError(
                     f"a row group of {max(groups)} rows",
@@ -126,7 +145,7 @@ def open_part(path: Path, n: int | None, kinds: Sequence[str] | None, mapping: L
                     remedy="write the file with smaller row groups (pyarrow: row_group_size=1000000)",
                 )
             head = Table(columns={}, metadata=stored, path=path, first_row=1, units=units)
-            part = Part(head, groups, joints, tuple(chosen), mapping, kinds)
+            part = Part(head, groups, joints, tuple(chosen), mapping, kinds, renamed)
             full = [k for k, rows in enumerate(groups) if rows]
             first, last = (part.times(file.read_row_group(k, [part.time_column])) for k in (full[0], full[-1]))
             # A mapping that does not suit the columns is refused now, not after an hour.
@@ -143,7 +162,9 @@ def open_part(path: Path, n: int | None, kinds: Sequence[str] | None, mapping: L
     return replace(part, start=float(first[0]), end=float(last[-1]), period=period)
 
 
-def _chosen(path: Path, names: Sequence[str], n: int | None, mapping: LogMapping | None) -> tuple[int, list[str]]:
+def _chosen(
+    path: Path, names: Sequence[str], n: int | None, mapping: LogMapping | None, lists: Sequence[str]
+) -> tuple[int, list[str]]:
     """Counts the joints and names the columns that are read: t, q1.. and tau1.., or i1.. without torque."""
     if mapping is None:
         joints = n or sum(name.startswith("q") and name[1:].isdigit() for name in names)
@@ -160,6 +181,13 @@ def _chosen(path: Path, names: Sequence[str], n: int | None, mapping: LogMapping
     }
     wanted = [*(["t"] if left["t"] else []), *(f"{k}{j + 1}" for k in ("q", torque) if left[k] for j in range(joints))]
     for name in wanted:
+        if name not in names and lists:
+            raise InputError(
+                f"the column is missing, and lists ({', '.join(lists[:3])}) are not read in pieces",
+                file=path,
+                column=name,
+                remedy="read the log at once with --no-stream, or store one number per column",
+            )
         if name not in names or (name == "t" and joints == 0):
             raise InputError(
                 "the column is missing",

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from itertools import islice
@@ -11,9 +11,10 @@ from typing import Any
 
 import numpy as np
 
+from estimation.logs.mappings.suggestions import save_mapping
 from estimation.logs.readers.joint_names import places
 from estimation.logs.ros_messages import MESSAGES, JointMessage, JointValues
-from estimation.logs.torque_source import TorqueSource
+from estimation.logs.torque_source import NO_TORQUE, TorqueSource
 from robots.common.errors import InputError
 from robots.common.tables.table import Column, Table
 
@@ -30,12 +31,17 @@ class _Topic:
     Attributes:
         name: of the topic.
         message: its type.
-        first: what its first message says, or one of the first that has the robot's joints.
+        found: the names of joints in its first messages; empty if they have none.
+        called: its names of the robot's joints, in the robot's order; empty for joints by their place, None if they are
+            not in it.
+        has_effort: whether one of its first messages has efforts of these joints.
     """
 
     name: str
     message: JointMessage
-    first: JointValues
+    found: tuple[str, ...]
+    called: tuple[str, ...] | None
+    has_effort: bool
 
 
 def read_bag(path: Path, *, topic: str | None = None, joints: Sequence[str] | None = None) -> Table:
@@ -69,8 +75,7 @@ def read_bag(path: Path, *, topic: str | None = None, joints: Sequence[str] | No
         with AnyReader([path], default_typestore=_typestore()) as reader:
             chosen = _choose(path, reader, topic, joints)
             for received, raw in _raw(reader, chosen.name, chosen.message):
-                values = chosen.message.values(_unpacked(reader, raw, chosen.message.kind))
-                messages.append((values.stamp if values.stamp else 1e-9 * received, values))
+                messages.append((1e-9 * received, chosen.message.values(_unpacked(reader, raw, chosen.message.kind))))
     except InputError:
         raise
     # A damaged bag fails anywhere in the reader, which raises whatever comes up.
@@ -126,8 +131,7 @@ def _choose(path: Path, reader: Any, topic: str | None, joints: Sequence[str] | 
             message.values(_unpacked(reader, raw, kind)) for _, raw in islice(_raw(reader, name, message), _LOOKED_AT)
         ]
         if seen:
-            first = next((values for values in seen if _order_of(values, joints) is not None), seen[0])
-            candidates.append(_Topic(name=name, message=message, first=first))
+            candidates.append(_topic(name, message, seen, joints))
     if not candidates:
         others = sorted({f"{c.topic} ({c.msgtype})" for c in reader.connections})
         if unknown:
@@ -141,16 +145,19 @@ def _choose(path: Path, reader: Any, topic: str | None, joints: Sequence[str] | 
             file=path,
             allowed=f"one of {', '.join(_TYPES)}; the bag has {', '.join(others) or 'no topics'}",
         )
-    fitting = [c for c in candidates if _order_of(c.first, joints) is not None] or candidates
-    best = [c for c in fitting if len(c.first.effort)] or fitting
+    fitting = [c for c in candidates if c.called is not None] or candidates
+    best = [c for c in fitting if c.has_effort] or fitting
     best = [c for c in best if c.message is best[0].message] if topic else _preferred(best)
     names = sorted({candidate.name for candidate in best})
+    if best[0].called is None:
+        # The topic whose joints could be the robot's under other names; its message says what it has.
+        return next((c for c in best if len(c.found) == len(joints or ())), best[0])
     if len(names) > 1:
         raise InputError(
             f"{len(names)} topics with joint states: {', '.join(names)}",
             file=path,
             allowed=f"one {best[0].message.kind}",
-            remedy="choose one with `topic` in a mapping (--mapping)",
+            remedy=save_mapping(f"topic: {names[0]}"),
         )
     return best[0]
 
@@ -163,59 +170,60 @@ def _preferred(candidates: Sequence[_Topic]) -> list[_Topic]:
     return []
 
 
-def _order_of(values: JointValues, joints: Sequence[str] | None) -> list[int] | None:
-    """Where each wanted joint stands; None if the message is of other joints."""
-    if joints is None or not len(values.names):
-        count = len(values.position)
-        return list(range(count)) if joints is None or len(joints) == count else None
-    return _places(tuple(values.names), tuple(joints))
+def _topic(name: str, message: JointMessage, seen: Sequence[JointValues], joints: Sequence[str] | None) -> _Topic:
+    """Says what a topic calls the robot's joints: in one of its messages, or in several that share them."""
+    named = list(dict.fromkeys(tuple(values.names) for values in seen))
+    found = tuple(dict.fromkeys(joint for names in named for joint in names))
+    called: tuple[str, ...] | None = None
+    if not found:
+        count = max(len(values.position) for values in seen)
+        called = () if joints is None or len(joints) == count else None
+    elif joints is None:
+        called = next(names for names in named if names)
+    else:
+        order_in = ((names, places(names, joints)) for names in (*named, found))
+        called = next((tuple(names[k] for k in order) for names, order in order_in if order is not None), None)
+    has_effort = any(len(values.effort) and (not called or set(called) & set(values.names)) for values in seen)
+    return _Topic(name=name, message=message, found=found, called=called, has_effort=bool(has_effort))
 
 
-@lru_cache(maxsize=16)
-def _places(found: tuple[str, ...], wanted: tuple[str, ...]) -> list[int] | None:
-    return places(found, wanted)
+@lru_cache(maxsize=64)
+def _places(found: tuple[str, ...], called: tuple[str, ...]) -> list[int | None] | None:
+    """Where each joint stands in a message; None if the message is of other joints, such as a gripper's."""
+    order = [found.index(name) if name in found else None for name in called]
+    return None if order.count(None) == len(order) else order
 
 
 def _table(
-    path: Path, topic: _Topic, messages: Iterable[tuple[float, JointValues]], joints: Sequence[str] | None
+    path: Path, topic: _Topic, messages: Sequence[tuple[float, JointValues]], joints: Sequence[str] | None
 ) -> Table:
-    first = list(topic.first.names)
-    names = list(joints) if joints is not None else (first or None)
+    """Makes a row of each message; what a message lacks is NaN in its row."""
+    names = list(joints) if joints is not None else list(topic.called or ())
     rows: dict[str, list[list[float]]] = {"q": [], "dq": [], "tau": []}
-    times: list[float] = []
-    for row, (time, values) in enumerate(messages, start=1):
+    times: list[tuple[float, float]] = []
+    for row, (received, values) in enumerate(messages, start=1):
         _check(path, row, values, names)
-        order = _order_of(values, names)
-        if order is None:
-            continue  # a message of other joints, such as a gripper's
-        times.append(time)
-        for prefix, signal in (("q", values.position), ("dq", values.velocity), ("tau", values.effort)):
-            if len(signal) not in (0, len(values.position)):
-                raise InputError(
-                    f"{len(signal)} values for {len(values.position)} joints", file=path, column=prefix, row=row
-                )
-            rows[prefix].append([float(signal[place]) for place in order] if len(signal) else [])
-    if not times:
-        remedy = "list `joints` in a mapping (--mapping), in the robot's order"
-        if first and len(first) < len(names or ()):
-            remedy = f"record {', '.join(name for name in names or () if name not in first)}, too, or choose the robot"
-        elif first:
-            remedy += f":\njoints: [{', '.join(first)}]"
-        raise InputError(
-            f"no message has the joints {', '.join(names or ())}",
-            file=path,
-            allowed=f"names in the messages: {', '.join(first) or 'none'}",
-            remedy=remedy,
-        )
-    columns: dict[str, Column] = {"t": np.array(times)}
-    for prefix, signals in rows.items():
-        lengths = {len(signal) for signal in signals}
-        if lengths == {0}:
+        if len(values.names):
+            order = _places(tuple(values.names), topic.called or ())
+        else:
+            order = None if topic.called else list(range(len(values.position)))
+        if not order:
             continue
-        if len(lengths) > 1:
-            raise InputError("only some messages carry values", file=path, column=f"{prefix}1")
+        times.append((received, values.stamp or 0.0))
+        width = len(values.names) or len(values.position)
+        for prefix, signal in (("q", values.position), ("dq", values.velocity), ("tau", values.effort)):
+            if len(signal) not in (0, width):
+                raise InputError(f"{len(signal)} values for {width} joints", file=path, column=prefix, row=row)
+            rows[prefix].append([float(signal[k]) if k is not None and len(signal) else np.nan for k in order])
+    if not times:
+        raise _other_joints(path, topic, names)
+    received, stamps = np.array(times).T
+    # Messages of one publisher are stamped, or none is. A single one without a stamp has the time 0.
+    columns: dict[str, Column] = {"t": stamps if 2 * np.count_nonzero(stamps) >= len(stamps) else received}
+    for prefix, signals in rows.items():
         matrix = np.array(signals)
-        columns.update({f"{prefix}{joint + 1}": matrix[:, joint].copy() for joint in range(matrix.shape[1])})
+        if not np.isnan(matrix).all():
+            columns.update({f"{prefix}{joint + 1}": matrix[:, joint].copy() for joint in range(matrix.shape[1])})
     source = TorqueSource(
         format=f"{topic.message.kind} of {topic.name}",
         columns=topic.message.field,
@@ -223,20 +231,36 @@ def _table(
         measured=topic.message.measured,
         meaning=topic.message.meaning,
     )
-    metadata: dict[str, Any] = {"joints": names or []}
+    metadata: dict[str, Any] = {"joints": names}
     if "tau1" in columns:
         metadata["torque_source"] = source.to_dict()
     else:
-        metadata["no_torque"] = f"the messages of {topic.name} carry no effort; record a topic that does"
+        metadata[NO_TORQUE] = f"the messages of {topic.name} carry no effort; record a topic that does"
     return Table(columns=columns, metadata=metadata, path=path, first_row=1)
+
+
+def _other_joints(path: Path, topic: _Topic, names: Sequence[str]) -> InputError:
+    """Returns the error of a topic without the robot's joints, with the mapping that would fit if there is one."""
+    found = topic.found
+    remedy = "list `joints` in a mapping (--mapping), in the robot's order"
+    if found and len(found) < len(names):
+        remedy = f"record {', '.join(name for name in names if name not in found)}, too, or choose the robot"
+    elif len(found) == len(names):
+        remedy = save_mapping(f"joints: [{', '.join(found)}]")
+    return InputError(
+        f"no message has the joints {', '.join(names)}",
+        file=path,
+        allowed=f"names in the messages: {', '.join(found) or 'none'}",
+        remedy=remedy,
+    )
 
 
 def _check(path: Path, row: int, values: JointValues, wanted: Sequence[str] | None) -> None:
     found, count = list(values.names), len(values.position)
     if not found:
-        if wanted and len(wanted) != count:
+        if wanted and count and len(wanted) != count:
             raise InputError(f"{count} joints without names", file=path, row=row, allowed=f"{len(wanted)}")
-    elif len(found) != count:
+    elif count and len(found) != count:
         raise InputError(f"{len(found)} names for {count} positions", file=path, row=row)
     elif len(set(found)) < len(found):
         raise InputError(f"a joint name appears twice: {', '.join(found)}", file=path, row=row)

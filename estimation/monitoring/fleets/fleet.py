@@ -10,7 +10,7 @@ from os import PathLike
 from pathlib import Path
 from typing import Any
 
-from estimation.logs.mappings.mapping import read_mapping
+from estimation.logs.mappings.mapping import LogMapping, read_mapping
 from estimation.monitoring.fleets.members import Member, find_members
 from estimation.monitoring.fleets.result import FleetResult
 from estimation.monitoring.fleets.robot_row import RobotRow
@@ -46,7 +46,7 @@ class Task:
     digest: str
     settings: MonitorSettings
     kept: Path
-    mapping: Path | None
+    mapping: LogMapping | None
 
 
 def monitor_fleet(
@@ -55,7 +55,7 @@ def monitor_fleet(
     *,
     kept: str | PathLike[str],
     settings: MonitorSettings | None = None,
-    mapping: str | PathLike[str] | None = None,
+    mapping: LogMapping | str | PathLike[str] | None = None,
     workers: int | None = None,
     executor: Executor | None = None,
     progress: Progress | None = None,
@@ -86,8 +86,7 @@ def monitor_fleet(
     place = Path(model).absolute()
     file = place / "model.json" if place.is_dir() else place
     read_baseline(file)
-    if mapping is not None:
-        read_mapping(mapping)
+    columns = mapping if isinstance(mapping, LogMapping) or mapping is None else read_mapping(mapping)
     target = Path(kept).absolute()
     target.mkdir(parents=True, exist_ok=True)
     digests = {path: sha256(path) for path in {file, *(m.model for m in members if m.model is not None)}}
@@ -98,7 +97,7 @@ def monitor_fleet(
             digest=digests[member.model or file],
             settings=settings or MonitorSettings(),
             kept=target,
-            mapping=None if mapping is None else Path(mapping).absolute(),
+            mapping=columns,
         )
         for member in members
     ]
@@ -127,7 +126,7 @@ def robot_row(task: Task) -> tuple[RobotRow, bool]:
         "version": KEPT_VERSION,
         "model": task.digest,
         "settings": asdict(task.settings),
-        "mapping": None if task.mapping is None else sha256(task.mapping),
+        "mapping": None if task.mapping is None else task.mapping.model_dump(mode="json"),
     }
     kept = _read(file)
     if kept is not None and {key: kept.get(key) for key in head} != head:

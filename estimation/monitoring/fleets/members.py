@@ -7,7 +7,7 @@ from os import PathLike
 from pathlib import Path
 
 from estimation.logs.campaigns import in_natural_order
-from estimation.logs.formats import SUFFIXES, is_bag_folder
+from estimation.logs.formats import SUFFIXES, is_log_name
 from robots.common.errors import InputError
 
 MODEL = "model.json"
@@ -55,7 +55,7 @@ def find_members(folder: str | PathLike[str]) -> list[Member]:
     for entry in sorted(place.iterdir()):
         if entry.name.startswith("."):
             continue
-        if _is_log(entry):
+        if is_log_name(entry):
             members.append(Member(name=entry.stem, files=(entry,)))
         elif entry.is_dir():
             files = tuple(in_natural_order(_logs_below(entry)))
@@ -76,16 +76,12 @@ def find_members(folder: str | PathLike[str]) -> list[Member]:
     return members
 
 
-def _is_log(path: Path) -> bool:
-    return is_bag_folder(path) or (path.is_file() and path.suffix.lower() in SUFFIXES)
-
-
 def _logs_below(folder: Path) -> list[Path]:
     found = []
     for entry in folder.iterdir():
         if entry.name.startswith("."):
             continue
-        if _is_log(entry):
+        if is_log_name(entry):
             found.append(entry)
         elif entry.is_dir():
             found += _logs_below(entry)

@@ -14,9 +14,11 @@ from oed.cli.options import (
     LockOption,
     MappingOption,
     QuietOption,
+    RateOption,
     RobotOption,
     TipOption,
     robot_from,
+    with_rate,
 )
 from oed.cli.set_up import GravityOption, PayloadOption, TorqueIsOption, with_known_setup, with_torque_meaning
 
@@ -25,6 +27,7 @@ def check(
     logs: Annotated[list[Path], typer.Argument(metavar="LOG...", help="Logs, or folders of logs.", show_default=False)],
     robot: RobotOption,
     mapping: MappingOption = None,
+    rate: RateOption = None,
     payload: PayloadOption = None,
     gravity: GravityOption = None,
     torque_is: TorqueIsOption = None,
@@ -45,7 +48,7 @@ def check(
         described = robot_from(robot, tip, joints, lock)
         progress.start("checking the logs", None)
         names, kinds = described.joint_names, described.chain.kinds
-        read = read_logs(logs, n=described.n, torque=False, mapping=mapping, joints=names, kinds=kinds)
+        read = read_logs(logs, n=described.n, torque=False, mapping=with_rate(mapping, rate), joints=names, kinds=kinds)
         described, known = with_torque_meaning(described, with_known_setup(read, payload, gravity), torque_is)
         reports = [check_log(described, log) for log in known]
     refused = [report for report in reports if report.refused]

@@ -17,9 +17,11 @@ from oed.cli.options import (
     OutOption,
     PngOption,
     QuietOption,
+    RateOption,
     SeedOption,
     TipOption,
     robot_from,
+    with_rate,
 )
 
 
@@ -40,6 +42,7 @@ def compare(
         ),
     ] = None,
     mapping: MappingOption = None,
+    rate: RateOption = None,
     friction: Annotated[
         str, typer.Option(help="Friction model of logs: auto, polynomial or coulomb-viscous.")
     ] = "auto",
@@ -70,12 +73,14 @@ def compare(
         _require_kind(models, robot)
         with ResultFolder(out, force, names=["compare.json", "model.json", "report.html"]) as folder:
             if robot is None:
-                if mapping is not None:
-                    raise InputError("--mapping without --robot", remedy="it belongs to logs: give --robot as well")
+                if mapping is not None or rate is not None:
+                    raise InputError(
+                        "--mapping or --rate without --robot", remedy="it belongs to logs: give --robot as well"
+                    )
                 runs = read_model_runs(models)
             else:
                 described = robot_from(robot, tip, joints, lock)
-                logs = read_logs(models, n=described.n, mapping=mapping, joints=described.joint_names)
+                logs = read_logs(models, n=described.n, mapping=with_rate(mapping, rate), joints=described.joint_names)
                 runs = identify_runs(described, logs, friction=friction, seed=seed, progress=progress)
             result = run(runs, alpha=false_alarms)
             result.save(folder.path("model.json").parent)

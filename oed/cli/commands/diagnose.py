@@ -20,16 +20,19 @@ from oed.cli.options import (
     OutOption,
     PngOption,
     QuietOption,
+    RateOption,
     RobotOption,
     SeedOption,
     TipOption,
     robot_from,
+    with_rate,
 )
 from oed.cli.set_up import GravityOption, PayloadOption, TorqueIsOption, with_known_setup, with_torque_meaning
 from oed.cli.unfit_models import NEAREST, unfit_of
 from robots.common.progress import Progress
 
 if TYPE_CHECKING:
+    from estimation.logs.mappings.mapping import LogMapping
     from robots.robot import Robot
 
 
@@ -52,6 +55,7 @@ def diagnose(
         ),
     ] = None,
     mapping: MappingOption = None,
+    rate: RateOption = None,
     payload: PayloadOption = None,
     gravity: GravityOption = None,
     torque_is: TorqueIsOption = None,
@@ -113,10 +117,11 @@ def diagnose(
     with console.working() as progress:
         described = robot_from(robot, tip, joints, lock)
         if limits:
-            if log or held_out or mapping or payload or gravity or torque_is or urdf or mjcf or not trajectory:
+            of_logs = (log, held_out, mapping, rate, payload, gravity, torque_is, urdf, mjcf)
+            if any(of_logs) or not trajectory:
                 raise typer.BadParameter(
-                    "--limits needs --trajectory; --log, --held-out, --mapping, --payload, --gravity, --torque-is, "
-                    "--urdf and --mjcf do not apply",
+                    "--limits needs --trajectory; --log, --held-out, --mapping, --rate, --payload, --gravity, "
+                    "--torque-is, --urdf and --mjcf do not apply",
                     ctx=context,
                 )
             summary, data = _limits(described, trajectory, model, noise, out, force, progress)
@@ -129,7 +134,7 @@ def diagnose(
                 described,
                 log,
                 held_out or [],
-                mapping,
+                with_rate(mapping, rate),
                 known,
                 torque_is,
                 own_clocks,
@@ -234,7 +239,7 @@ def _diagnosis(
     robot: Robot,
     logs: list[Path],
     held_out: list[Path],
-    mapping: Path | None,
+    mapping: LogMapping | Path | None,
     known: tuple[list[str] | None, list[str] | None],
     torque_is: str | None,
     own_clocks: bool,

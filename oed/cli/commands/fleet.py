@@ -16,8 +16,10 @@ from oed.cli.options import (
     OutOption,
     PngOption,
     QuietOption,
+    RateOption,
     WorkersOption,
     executor_from,
+    with_rate,
 )
 
 
@@ -39,6 +41,7 @@ def fleet(
         ),
     ],
     mapping: MappingOption = None,
+    rate: RateOption = None,
     heat: Annotated[str, typer.Option(help="What explains common changes of friction, as for oed monitor.")] = "auto",
     false_alarm_hours: Annotated[
         float, typer.Option(help="Mean time between false alarms of each robot [h of recorded motion].")
@@ -74,7 +77,7 @@ def fleet(
                 model,
                 kept=out / "robots",
                 settings=settings,
-                mapping=mapping,
+                mapping=with_rate(mapping, rate),
                 workers=workers,
                 executor=executor,
                 progress=progress,

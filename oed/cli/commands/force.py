@@ -10,7 +10,17 @@ import typer
 
 from oed.cli.console import Console
 from oed.cli.heat import AmbientOption, BeforeOption, heat_of
-from oed.cli.options import ForceOption, JsonOption, MappingOption, OutOption, PngOption, QuietOption, numbers
+from oed.cli.options import (
+    ForceOption,
+    JsonOption,
+    MappingOption,
+    OutOption,
+    PngOption,
+    QuietOption,
+    RateOption,
+    numbers,
+    with_rate,
+)
 from oed.cli.set_up import GravityOption, PayloadOption, TorqueIsOption, with_known_setup, with_torque_meaning
 
 if TYPE_CHECKING:
@@ -37,6 +47,7 @@ def force(
         ),
     ] = None,
     mapping: MappingOption = None,
+    rate: RateOption = None,
     payload: PayloadOption = None,
     gravity: GravityOption = None,
     torque_is: TorqueIsOption = None,
@@ -100,7 +111,7 @@ def force(
         code = None if c_code is None else files.enter_context(open_atomic(c_code, force=force))
         identified = load_model(model)
         robot = identified.robot
-        options: dict[str, Any] = {"n": robot.n, "mapping": mapping, "joints": robot.joint_names}
+        options: dict[str, Any] = {"n": robot.n, "mapping": with_rate(mapping, rate), "joints": robot.joint_names}
         read = read_logs([log, *(healthy or [])], **options, kinds=robot.chain.kinds)
         _, (recorded, *normal) = with_torque_meaning(robot, with_known_setup(read, payload, gravity), torque_is)
         assumed = ""
@@ -108,7 +119,7 @@ def force(
         def predicted(sharp: Model, own: Log) -> Prediction:
             nonlocal assumed
             later, clock = clock_shift(identified, own)
-            heat = heat_of(model, identified, own, before or [], ambient, mapping, later)
+            heat = heat_of(model, identified, own, before or [], ambient, with_rate(mapping, rate), later)
             if own is recorded:
                 assumed = "\n".join(words for words in (heat.assumed, clock) if words)
             return predict(sharp, own, later=later, **heat.options)

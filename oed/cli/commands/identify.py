@@ -21,15 +21,18 @@ from oed.cli.options import (
     OutOption,
     PngOption,
     QuietOption,
+    RateOption,
     RobotOption,
     SeedOption,
     TipOption,
     robot_from,
+    with_rate,
 )
 from oed.cli.set_up import GravityOption, PayloadOption, TorqueIsOption, with_known_setup, with_torque_meaning
 
 if TYPE_CHECKING:
     from estimation import Estimate
+    from estimation.logs.mappings.mapping import LogMapping
     from estimation.logs.parquet_streams import LogStream
     from robots.robot import Robot
 
@@ -38,6 +41,7 @@ def identify(
     robot: RobotOption,
     log: LogOption,
     mapping: MappingOption = None,
+    rate: RateOption = None,
     payload: PayloadOption = None,
     gravity: GravityOption = None,
     torque_is: TorqueIsOption = None,
@@ -121,13 +125,17 @@ def identify(
             if stream or (stream is None and method in METHODS and is_large(log)):
                 result = identify_stream(
                     described,
-                    _opened(described, log, mapping, payload, gravity, torque_is),
+                    _opened(described, log, with_rate(mapping, rate), payload, gravity, torque_is),
                     method=method,
                     **options,
                 )
             else:
                 read = read_logs(
-                    log, n=described.n, mapping=mapping, joints=described.joint_names, kinds=described.chain.kinds
+                    log,
+                    n=described.n,
+                    mapping=with_rate(mapping, rate),
+                    joints=described.joint_names,
+                    kinds=described.chain.kinds,
                 )
                 described, logs = with_torque_meaning(described, with_known_setup(read, payload, gravity), torque_is)
                 table = compare_methods(described, logs, **options) if method == "all" else None
@@ -169,7 +177,7 @@ def identify(
 def _opened(
     robot: Robot,
     logs: list[Path],
-    mapping: Path | None,
+    mapping: LogMapping | Path | None,
     payload: list[str] | None,
     gravity: list[str] | None,
     torque_is: str | None,

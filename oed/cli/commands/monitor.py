@@ -8,10 +8,20 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from oed.cli.console import Console
-from oed.cli.options import ForceOption, JsonOption, MappingOption, OutOption, PngOption, QuietOption
+from oed.cli.options import (
+    ForceOption,
+    JsonOption,
+    MappingOption,
+    OutOption,
+    PngOption,
+    QuietOption,
+    RateOption,
+    with_rate,
+)
 from oed.cli.set_up import PayloadOption, TorqueIsOption, with_known_setup, with_torque_meaning
 
 if TYPE_CHECKING:
+    from estimation.logs.mappings.mapping import LogMapping
     from estimation.monitoring import LogRow
     from robots.robot import Robot
     from robots.signals import Log
@@ -37,6 +47,7 @@ def monitor(
         typer.Option("--log-dir", help="A folder of logs. A file that cannot be read is left out.", show_default=False),
     ] = None,
     mapping: MappingOption = None,
+    rate: RateOption = None,
     payload: PayloadOption = None,
     torque_is: TorqueIsOption = None,
     heat: Annotated[
@@ -85,7 +96,7 @@ def monitor(
             else:
                 watcher = Monitor(read_baseline(model), settings)
             robot = watcher.baseline.robot
-            logs, refused = _read(log or [], log_dir, robot, mapping)
+            logs, refused = _read(log or [], log_dir, robot, with_rate(mapping, rate))
             _, logs = with_torque_meaning(robot, with_known_setup(logs, payload, None), torque_is)
             result = monitor_logs(watcher, logs, refused=refused, progress=progress)
             result.save(folder.path("monitor.json").parent)
@@ -96,7 +107,9 @@ def monitor(
     console.result(f"{result.summary()}\nwritten to {out.resolve()}", result.to_dict())
 
 
-def _read(paths: list[Path], folder: Path | None, robot: Robot, mapping: Path | None) -> tuple[list[Log], list[LogRow]]:
+def _read(
+    paths: list[Path], folder: Path | None, robot: Robot, mapping: LogMapping | Path | None
+) -> tuple[list[Log], list[LogRow]]:
     """Reads logs; those of a folder that cannot be read become rows.
 
     Raises:

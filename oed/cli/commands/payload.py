@@ -19,10 +19,12 @@ from oed.cli.options import (
     OutOption,
     PngOption,
     QuietOption,
+    RateOption,
     SeedOption,
     TipOption,
     numbers,
     robot_from,
+    with_rate,
 )
 from oed.cli.set_up import GravityOption, PayloadOption, TorqueIsOption, with_known_setup, with_torque_meaning
 
@@ -54,6 +56,7 @@ def payload(
         typer.Option("--robot", help=f"The robot: {ROBOT}. Default: the model's robot.", show_default=False),
     ] = None,
     mapping: MappingOption = None,
+    rate: RateOption = None,
     payload: PayloadOption = None,
     gravity: GravityOption = None,
     torque_is: TorqueIsOption = None,
@@ -136,7 +139,11 @@ def payload(
                         f"the flange of {described.name} is elsewhere than that of the model's robot",
                         remedy="leave --robot out, state the flange by --frame, or identify the model with this robot",
                     )
-            options: dict[str, Any] = {"n": described.n, "mapping": mapping, "joints": described.joint_names}
+            options: dict[str, Any] = {
+                "n": described.n,
+                "mapping": with_rate(mapping, rate),
+                "joints": described.joint_names,
+            }
             options["kinds"] = described.chain.kinds
             loaded, free = read_logs(log, **options), read_logs(without, **options) if without else ()
             both = with_known_setup([*loaded, *free], payload, gravity)

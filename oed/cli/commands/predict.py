@@ -10,7 +10,14 @@ import typer
 
 from oed.cli.console import Console
 from oed.cli.heat import AmbientOption, BeforeOption, heat_of
-from oed.cli.options import ForceOption, JsonOption, MappingOption, QuietOption
+from oed.cli.options import (
+    ForceOption,
+    JsonOption,
+    MappingOption,
+    QuietOption,
+    RateOption,
+    with_rate,
+)
 from oed.cli.set_up import GravityOption, PayloadOption, TorqueIsOption, with_known_setup, with_torque_meaning
 
 
@@ -18,6 +25,7 @@ def predict(
     model: Annotated[Path, typer.Option("--model", help="A model.json, or its folder.", show_default=False)],
     log: Annotated[Path, typer.Option("--log", help="A log with the motion.", show_default=False)],
     mapping: MappingOption = None,
+    rate: RateOption = None,
     payload: PayloadOption = None,
     gravity: GravityOption = None,
     torque_is: TorqueIsOption = None,
@@ -53,12 +61,17 @@ def predict(
             identified = load_model(model)
             robot = identified.robot
             read = read_log(
-                log, n=robot.n, torque=False, mapping=mapping, joints=robot.joint_names, kinds=robot.chain.kinds
+                log,
+                n=robot.n,
+                torque=False,
+                mapping=with_rate(mapping, rate),
+                joints=robot.joint_names,
+                kinds=robot.chain.kinds,
             )
             _, (recorded,) = with_torque_meaning(robot, with_known_setup([read], payload, gravity), torque_is)
             progress.start("predicting", None)
             later, clock = clock_shift(identified, recorded)
-            heat = heat_of(model, identified, recorded, before or [], ambient, mapping, later)
+            heat = heat_of(model, identified, recorded, before or [], ambient, with_rate(mapping, rate), later)
             result = run(identified, recorded, later=later, **heat.options)
             result.save(out, force=force)
             if page_file is not None:

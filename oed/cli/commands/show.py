@@ -17,8 +17,10 @@ from oed.cli.options import (
     LockOption,
     MappingOption,
     QuietOption,
+    RateOption,
     TipOption,
     robot_of_file,
+    with_rate,
 )
 
 if TYPE_CHECKING:
@@ -34,6 +36,7 @@ def show(
         ),
     ] = None,
     mapping: MappingOption = None,
+    rate: RateOption = None,
     diagnosis: Annotated[
         Path | None,
         typer.Option(
@@ -69,7 +72,7 @@ def show(
             existing_file(motion)
             played: Motion | Log
             stated: dict[str, Any] = {}
-            planned = mapping is None and _is_trajectory(motion)
+            planned = mapping is None and rate is None and _is_trajectory(motion)
             if planned:
                 played, stated = read_trajectory(motion)
             described = robot_of_file(robot, stated, motion, tip, joints, lock)
@@ -82,7 +85,7 @@ def show(
                     motion,
                     n=described.n,
                     torque=False,
-                    mapping=mapping,
+                    mapping=with_rate(mapping, rate),
                     joints=described.joint_names,
                     kinds=described.chain.kinds,
                 )

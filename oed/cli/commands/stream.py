@@ -108,7 +108,7 @@ def stream(
         from oed.controllers import stream as play
         from oed.controllers.interrupts import terminate_as_interrupt
         from oed.experiments.safety_checks.freedom import FREE, require_free
-        from oed.exports import read_trajectory
+        from oed.exports import check_trajectory, read_trajectory
         from oed.exports.forms.sampling import at_period
         from robots.collision import Surroundings
 
@@ -123,6 +123,7 @@ def stream(
         around = surroundings_from(floor, no_floor, keep_out)
         # What a design has proved need not be proved again, unless other surroundings are stated.
         proved = str(metadata.get("collisions", "")).startswith(FREE) and around == Surroundings()
+        check_trajectory(motion, described, metadata, trajectory)
         if collision and not proved:
             require_free(around.model(described), motion, trajectory)
         try:

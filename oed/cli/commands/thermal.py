@@ -20,10 +20,12 @@ from oed.cli.options import (
     OutOption,
     PngOption,
     QuietOption,
+    RateOption,
     RobotOption,
     SeedOption,
     TipOption,
     robot_from,
+    with_rate,
 )
 
 if TYPE_CHECKING:
@@ -35,6 +37,7 @@ def thermal(
     robot: RobotOption,
     log: LogOption,
     mapping: MappingOption = None,
+    rate: RateOption = None,
     order: Annotated[
         str, typer.Option(help="Thermal model: 1, 2, advanced, fractional, or auto to compare them.")
     ] = "2",
@@ -96,7 +99,11 @@ def thermal(
                 raise InputError(f"--joint {joint}", allowed=f"1 to {described.n}")
             logs = _surrounded(
                 read_logs(
-                    log, n=described.n, mapping=mapping, joints=described.joint_names, kinds=described.chain.kinds
+                    log,
+                    n=described.n,
+                    mapping=with_rate(mapping, rate),
+                    joints=described.joint_names,
+                    kinds=described.chain.kinds,
                 ),
                 ambient,
             )

@@ -32,7 +32,7 @@ def left_out(context: Any) -> set[str]:
 def _compare(values: dict[str, Any], typed: _Given) -> set[str]:
     """Models need no robot; a mapping belongs to logs."""
     models = all(path.suffix == ".json" or (path / "model.json").is_file() for path in map(Path, values["models"]))
-    return {"robot", "mapping", "tip", "joints", "lock"} if models and not typed("robot") else set()
+    return {"robot", "mapping", "rate", "tip", "joints", "lock"} if models and not typed("robot") else set()
 
 
 def _design(values: dict[str, Any], typed: _Given) -> set[str]:
@@ -45,7 +45,7 @@ def _design(values: dict[str, Any], typed: _Given) -> set[str]:
 
 def _diagnose(values: dict[str, Any], typed: _Given) -> set[str]:
     if values["limits"]:
-        return {"log", "held_out", "mapping", "payload", "gravity", "torque_is", "urdf", "mjcf"}
+        return {"log", "held_out", "mapping", "rate", "payload", "gravity", "torque_is", "urdf", "mjcf"}
     return {"trajectory", "model"}
 
 

@@ -30,6 +30,7 @@ OPTIONS = {
             "before",
             "own_clocks",
             "mapping",
+            "rate",
             "config",
             "torque_is",
             "model",

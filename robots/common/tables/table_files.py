@@ -10,6 +10,7 @@ from typing import Any, BinaryIO
 
 import numpy as np
 import pyarrow as pa
+import pyarrow.compute as pc
 import pyarrow.parquet as pq
 from numpy.typing import ArrayLike
 
@@ -140,13 +141,14 @@ def parquet_names(path: Path) -> list[str]:
         InputError: no Parquet file.
     """
     try:
-        return list(pq.read_schema(path).names)
+        with pq.ParquetFile(path) as file:
+            return list(_layout(file))
     except (pa.ArrowException, OSError, ValueError) as error:
         raise _no_parquet(path, error) from error
 
 
 def read_parquet(path: Path, wanted: Callable[[str], bool]) -> Table:
-    """Reads columns of a Parquet file; a stamp of time becomes seconds.
+    """Reads columns of a Parquet file; a stamp of time becomes seconds, a list of k numbers ``name1`` to ``namek``.
 
     Args:
         path: the file.
@@ -161,9 +163,21 @@ def read_parquet(path: Path, wanted: Callable[[str], bool]) -> Table:
         with pq.ParquetFile(path, memory_map=True) as file:
             schema = file.schema_arrow
             check_unique(schema.names, path)
-            chosen = [name for name in schema.names if wanted(name)]
-            content = file.read(columns=chosen)
-        arrays = {name: parquet_column(content.column(name), name, path) for name in chosen}
+            layout = {
+                f"{name}1" if place == 0 and name == stored and not wanted(name) and wanted(f"{name}1") else name: (
+                    stored,
+                    place,
+                )
+                for name, (stored, place) in _layout(file).items()
+            }
+            check_unique(layout, path)
+            chosen = [name for name in layout if wanted(name)]
+            content = file.read(columns=list(dict.fromkeys(layout[name][0] for name in chosen)))
+        arrays = {}
+        for name in chosen:
+            stored_as, place = layout[name]
+            column = content.column(stored_as)
+            arrays[name] = parquet_column(column if place is None else _of_lists(column, place, name, path), name, path)
     except (pa.ArrowException, OSError, ValueError, KeyError) as error:
         raise _no_parquet(path, error) from error
     if content.num_rows == 0:
@@ -175,8 +189,43 @@ def read_parquet(path: Path, wanted: Callable[[str], bool]) -> Table:
         path=path,
         first_row=1,
         units=units,
-        skipped=tuple(name for name in schema.names if name not in arrays),
+        skipped=tuple(name for name in layout if name not in arrays),
     )
+
+
+def _layout(file: pq.ParquetFile) -> dict[str, tuple[str, int | None]]:
+    """Names the columns with lists split: the stored column of each, and its place in the list of a row.
+
+    How long the lists of a column are is said by its type, or by its first row.
+    """
+    schema = file.schema_arrow
+    lists = [field.name for field in schema if _is_list(field.type)]
+    first = next(iter(file.iter_batches(1, columns=lists)), None) if lists else None
+    layout: dict[str, tuple[str, int | None]] = {}
+    for name in schema.names:
+        values = first.column(name)[0].as_py() if first is not None and name in lists else None
+        if values is None:
+            layout[name] = (name, None)
+        else:
+            # A list of one number is a number.
+            named = [name] if len(values) == 1 else [f"{name}{k}" for k in range(1, len(values) + 1)]
+            layout.update({column: (name, place) for place, column in enumerate(named)})
+    return layout
+
+
+def _is_list(kind: pa.DataType) -> bool:
+    is_list = pa.types.is_list(kind) or pa.types.is_large_list(kind) or pa.types.is_fixed_size_list(kind)
+    return is_list and (pa.types.is_floating(kind.value_type) or pa.types.is_integer(kind.value_type))
+
+
+def _of_lists(column: pa.ChunkedArray, place: int, name: str, path: Path) -> pa.ChunkedArray:
+    """Gives one number of each row's list."""
+    lengths = pc.unique(pc.list_value_length(column)).drop_null().to_pylist()
+    if len(lengths) > 1:
+        raise InputError(
+            f"lists of {min(lengths)} to {max(lengths)} numbers", file=path, column=name, allowed="one length"
+        )
+    return pc.list_element(column, place)
 
 
 def _no_parquet(path: Path, error: Exception) -> InputError:

@@ -124,7 +124,7 @@ def test_patterns_name_a_column_for_each_joint(tmp_path, pattern, joints):
         ("position: {columns: [x, y], unit: '%'}\n", "lacks `rated`"),
         ("position: {columns: [x, note]}\n", "'start'"),
         ("torque_constant: [1]\nposition: {columns: [x, y]}\n", "1 torque constants"),
-        ("time: {column: t, unit: h}\nposition: {columns: [x, y]}\n", "unit 'h'"),
+        ("time: {column: t, unit: week}\nposition: {columns: [x, y]}\n", "unit 'week'"),
         ("", "empty"),
     ],
 )

@@ -69,7 +69,9 @@ def test_statement_that_is_not_understood_is_refused(tmp_path, block, word):
 def test_robot_and_period_are_kept(tmp_path):
     """What the block says of the recording is metadata of the log."""
     path = csv(tmp_path, "# robot: er3a\n# period: '0.004'\n# operator: Ann\nt,q1,tau1,x\n0,1,2,3\n1,2,3,4\n")
-    assert read_log(path).metadata == {
+    metadata = read_log(path).metadata
+    assert [note["text"] for note in metadata.pop("repairs")] == ["not read: x"]
+    assert metadata == {
         "robot": "er3a",
         "period": 0.004,
         "operator": "Ann",

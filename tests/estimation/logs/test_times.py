@@ -12,6 +12,7 @@ import pytest
 from estimation import check_log, identify, read_log
 from robots.common.errors import InputError
 from tests.estimation.gate.findings_of import found
+from tests.estimation.logs.made_logs import columns, csv, text
 
 
 @pytest.fixture
@@ -104,3 +105,19 @@ def test_other_backward_times_have_other_advice(write):
         read_log(write(t, rows))
     with pytest.raises(InputError, match="sort the rows by time"):
         read_log(write(t, np.random.default_rng(0).permutation(5000)))
+
+
+def test_serial_days_of_a_spreadsheet_become_seconds(tmp_path):
+    """45415.5 is noon of 3 May 2024; a log of seconds at such numbers stays one of seconds."""
+    from datetime import UTC, datetime
+
+    steps = 0.016 * np.arange(40)
+    noon = datetime(2024, 5, 3, 12, tzinfo=UTC).timestamp()
+    for t, expected, noted in (
+        (45415.5 + steps / 86400.0, noon + steps, True),
+        (45415.5 + steps, 45415.5 + steps, False),
+    ):
+        log = read_log(csv(tmp_path, text(columns(rows=40, t=[repr(float(time)) for time in t]))), n=2)
+        # A double near 45415 has a spacing of 7e-12 days, which are 6e-7 s.
+        np.testing.assert_allclose(log.t, expected, rtol=0, atol=1e-6)
+        assert any(note["name"] == "serial_days" for note in log.metadata.get("repairs", ())) == noted

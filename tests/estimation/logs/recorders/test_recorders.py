@@ -61,7 +61,7 @@ def test_source_of_the_torque_is_stated(tmp_path, name):
         assert source is None
         return
     assert source["columns"].startswith(form.source)
-    (note,) = log.metadata["repairs"]
+    note = next(note for note in log.metadata["repairs"] if note["name"] == "torque_source")
     assert (note["name"], note["value"]) == ("torque_source", len(T))
     assert source["columns"] in note["text"]
     assert source["meaning"] in note["text"]
@@ -256,3 +256,12 @@ def test_rostopic_table_with_fewer_values_than_names_is_refused(tmp_path):
     path = FORMATS["rostopic"].write(tmp_path / "log.csv", T, *motion(6))
     spoilt(path, "field.position5", to="other")
     assert refused(path, joints=UR_NAMES).column == "field.position5"
+
+
+@EACH
+def test_a_recording_of_another_robot_names_both_numbers(tmp_path, name):
+    """A robot of two joints cannot have a recording of six or seven."""
+    _, path, _ = written(tmp_path, name)
+    with pytest.raises(InputError, match="joints") as caught:
+        read_log(path, 2, kinds=("revolute", "revolute"))
+    assert caught.value.exit_code == 2

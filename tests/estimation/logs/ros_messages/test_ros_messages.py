@@ -86,14 +86,17 @@ class Bag:
             "std_msgs/msg/Header", **({"seq": row} if self.kind == "bag" else {}), stamp=stamp, frame_id=""
         )
 
-    def state(self, row, *, tau=TAU, names=None):
+    def state(self, row, *, tau=TAU, names=None, order=ORDER, dq=DQ, stamped=True):
+        header = self.header(row)
+        if not stamped:
+            header.stamp = self.make("builtin_interfaces/msg/Time", sec=0, nanosec=0)
         return self.make(
             JOINT_STATE,
-            header=self.header(row),
-            name=[(names or self.names)[joint] for joint in ORDER],
-            position=Q[row, ORDER],
-            velocity=DQ[row, ORDER],
-            effort=TAU[row, ORDER] if tau is not None else np.array([]),
+            header=header,
+            name=[(names or self.names)[joint] for joint in order],
+            position=Q[row, order],
+            velocity=DQ[row, order] if dq is not None else np.array([]),
+            effort=TAU[row, order] if tau is not None else np.array([]),
         )
 
     def point(self, row, *, right):
@@ -281,3 +284,89 @@ def test_torque_without_effort_says_so(tmp_path):
     with pytest.raises(InputError, match="neither tau1") as caught:
         read_log(path, 7, joints=NAMES)
     assert "/joint_states" in caught.value.remedy
+
+
+def test_velocities_with_gaps_are_left_out(tmp_path):
+    """Velocities that every fourth message lacks are left out with their number; the rest of the log is whole."""
+    bag = Bag(tmp_path / "log", "db3")
+    for row in range(len(T)):
+        bag.add("/joint_states", JOINT_STATE, row, bag.state(row, dq=None if row % 4 == 0 else DQ))
+    log = read_log(bag.close(), 7, joints=NAMES)
+    is_the_motion(log, velocity=False)
+    assert log.dq is None
+    note = next(note for note in log.metadata["repairs"] if note["name"] == "velocity_gaps")
+    assert f"10 rows of {len(T)}" in note["text"]
+
+
+def test_messages_without_effort_are_left_out(tmp_path):
+    """A second publisher that repeats positions costs nothing but its own messages."""
+    bag = Bag(tmp_path / "log", "db3")
+    for row in range(len(T)):
+        bag.add("/joint_states", JOINT_STATE, row, bag.state(row))
+        bag.add("/joint_states", JOINT_STATE, row, bag.state(row, tau=None))
+    log = read_log(bag.close(), 7, joints=NAMES)
+    is_the_motion(log)
+    note = next(note for note in log.metadata["repairs"] if note["name"] == "incomplete_rows")
+    assert f"{len(T)} of {2 * len(T)} rows have no number in tau1" in note["text"]
+
+
+def test_halves_of_the_joints_in_turns_are_put_together(tmp_path):
+    """Two publishers with some joints each give one log; in between, the motion is a straight line."""
+    bag = Bag(tmp_path / "log", "db3")
+    for row in range(len(T)):
+        bag.add("/joint_states", JOINT_STATE, row, bag.state(row, order=[0, 1, 2] if row % 2 else [6, 3, 5, 4]))
+    log = read_log(bag.close(), 7, joints=NAMES)
+    rows = np.round((log.t - 1.0) / 0.004).astype(int)
+    assert len(log) > len(T) // 2 - 2
+    # |q''| <= 1 rad/s2 and |tau''| <= 40 N m/s2; a straight line over 8 ms is off by an eighth of that times h^2.
+    np.testing.assert_allclose(log.q, Q[rows], atol=0.008**2 / 8)
+    np.testing.assert_allclose(log.tau, TAU[rows], atol=40 * 0.008**2 / 8)
+    assert log.q[0].tolist() != Q[rows[0]].tolist()
+
+
+def test_one_message_without_a_stamp_is_left_out(tmp_path):
+    """Its time is unknown; messages that all lack a stamp have the times of the recording."""
+    for lacking, rows in (([7], 39), (range(len(T)), 40)):
+        bag = Bag(tmp_path / f"log{rows}", "db3")
+        for row in range(len(T)):
+            bag.add("/joint_states", JOINT_STATE, row, bag.state(row, stamped=row not in lacking))
+        log = read_log(bag.close(), 7, joints=NAMES)
+        assert len(log) == rows
+        np.testing.assert_allclose(log.t - 1.0, np.delete(T, [7] if rows == 39 else []), atol=1e-9)
+
+
+def pasted(error, folder):
+    """Saves the mapping that a message prints."""
+    (folder / "mapping.yaml").write_text(str(error).split("mapping.yaml:\n", 1)[1])
+    return folder / "mapping.yaml"
+
+
+def test_the_mapping_of_a_message_reads_the_bag(tmp_path):
+    """The joints or the topic that a message prints read the bag, pasted as they are."""
+    names = [f"axis_{letter}" for letter in "abcdefg"]
+    bag = Bag(tmp_path / "other", "db3", names=names)
+    for row in range(len(T)):
+        bag.add("/joint_states", JOINT_STATE, row, bag.state(row, order=range(7)))
+    path = bag.close()
+    with pytest.raises(InputError, match="no message has the joints") as caught:
+        read_log(path, 7, joints=NAMES)
+    is_the_motion(read_log(path, 7, joints=NAMES, mapping=pasted(caught.value, tmp_path)))
+    bag = Bag(tmp_path / "two", "db3")
+    for row in range(len(T)):
+        for topic in ("/left/joint_states", "/right/joint_states"):
+            bag.add(topic, JOINT_STATE, row, bag.state(row))
+    path = bag.close()
+    with pytest.raises(InputError, match="2 topics") as caught:
+        read_log(path, 7, joints=NAMES)
+    is_the_motion(read_log(path, 7, joints=NAMES, mapping=pasted(caught.value, tmp_path)))
+
+
+def test_topics_without_the_robots_joints_say_what_is_missing(tmp_path):
+    """Of several topics with some joints each, none is offered as a choice that would not help."""
+    bag = Bag(tmp_path / "log", "db3")
+    for row in range(3):
+        bag.add("/left/joint_states", JOINT_STATE, row, bag.state(row, order=[0, 1, 2]))
+        bag.add("/right/joint_states", JOINT_STATE, row, bag.state(row, order=[3, 4, 5, 6]))
+    with pytest.raises(InputError, match="no message has the joints") as caught:
+        read_log(bag.close(), 7, joints=NAMES)
+    assert "record panda_joint4, panda_joint5, panda_joint6, panda_joint7, too" in caught.value.remedy

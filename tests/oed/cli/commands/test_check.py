@@ -26,12 +26,14 @@ def write(tmp_path: Path, experiment: Path):
 
 @pytest.mark.slow
 def test_usable_logs_end_with_0(run, robot: Path, experiment: Path, write) -> None:
-    """A good log is usable, also without torque; nothing is written."""
+    """A good log is usable, and so is the motion of one without torque, which is said; nothing is written."""
     bare = write("bare.csv", drop="tau")
     before = sorted(experiment.iterdir())
     done = run("check", experiment / "log.csv", bare, "--robot", robot)
     assert done.code == 0, done.err
-    assert done.out.count(": usable;") == 2
+    assert done.out.count(": usable;") == 1
+    assert "bare.csv: no torque, its motion is usable" in done.out
+    assert "neither tau1..tau2 nor i1..i2" in done.out
     assert sorted(experiment.iterdir()) == before
     assert run("check", bare, "--robot", robot, "--quiet").out == ""
 
@@ -62,3 +64,25 @@ def test_bad_input_ends_with_2(run, robot: Path, tmp_path: Path) -> None:
         done = run("check", path, "--robot", robot)
         assert (done.code, done.err.count("oed: ")) == (2, 1)
         assert str(path) in done.err
+
+
+@pytest.mark.slow
+def test_a_rate_stands_for_the_time(run, robot: Path, write, tmp_path: Path) -> None:
+    """A log without times is refused with the option that reads it, and then judged as the log with its times is."""
+    whole = write("whole.csv")
+    bare = write("untimed.csv", drop="t")
+    table = write.table.drop(columns="t")
+    table.to_csv(bare, index=False)
+    refused = run("check", bare, "--robot", robot)
+    assert refused.code == 2
+    assert "--rate 250" in refused.err
+    period = float(np.median(np.diff(write.table["t"])))
+    done = run("check", bare, "--robot", robot, "--rate", 1.0 / period, "--json")
+    assert done.code == 0, done.err
+    (found,) = done.data["logs"]
+    (expected,) = run("check", whole, "--robot", robot, "--json").data["logs"]
+    for key in ("samples", "duration", "unexplained"):
+        np.testing.assert_allclose(found[key], expected[key], rtol=1e-3)
+    both = run("check", bare, "--robot", robot, "--rate", -1)
+    assert both.code == 2
+    assert "rows per second" in both.err

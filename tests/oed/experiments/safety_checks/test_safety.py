@@ -10,10 +10,14 @@ import pytest
 
 import oed
 from oed.criteria import Prior
-from oed.experiments import Effort, InteriorPoint
+from oed.experiments import Effort, InteriorPoint, LimitOptions
+from oed.experiments.safety_checks.safety import choose_safety
+from robots.base_parameters import find_base_parameters
 from robots.collision import check_motion, collision_model
 from robots.common.errors import InfeasibleError, InputError
 from robots.loading import load_robot
+from robots.regressor import default_model
+from robots.signals import Motion
 from tests.oed import flat
 
 TINY = Effort(islands=1, starts=1, screened=10, hops=0, finish_samples=100)
@@ -99,7 +103,19 @@ def test_an_rms_limit_below_gravity_is_reported_first(er3a):
 def test_a_limit_below_gravity_is_reported_first(er3a):
     """A joint that cannot hold the home pose is named, with the torque that would do, before any search."""
     with pytest.raises(InfeasibleError, match=r"joint \d: holding the pose takes .* or more"):
-        design(weaker(er3a, 0.05))
+        design(weaker(er3a, 0.05), home=np.zeros(6))
+
+
+def test_another_home_is_taken_where_the_usual_one_cannot_be_held(er3a):
+    """Without a stated home the experiment starts where the motors can hold the arm, by pinocchio, and says so."""
+    weak = weaker(er3a, 0.12)
+    with pytest.raises(InfeasibleError, match="holding the pose takes"):
+        design(weak, home=np.zeros(6))
+    robot, base = weak, find_base_parameters(default_model(weak))
+    found = choose_safety(robot, base, np.zeros(6), LimitOptions(), movable=True)
+    assert found.moved
+    still = Motion(np.array([0.0, 1.0]), *(np.tile(x, (2, 1)) for x in (found.home, np.zeros(6), np.zeros(6))))
+    assert (np.abs(pinocchio_torque(er3a, still)[0]) < 0.9 * np.asarray(weak.limits.torque)).all()
 
 
 @pytest.mark.slow
