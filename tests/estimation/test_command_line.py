@@ -121,7 +121,7 @@ FAULTS = {
     "a missing position": (_delete("q3"), ("column q3", "missing")),
     "a missing torque": (_delete("tau2"), ("column tau2", "missing")),
     "no time": (_delete("t"), ("column t", "missing")),
-    "NaN": (_write(7, "tau4", "nan"), ("column tau4", "row 8", "nan")),
+    "infinity": (_write(7, "tau4", "inf"), ("column tau4", "row 8", "inf")),
     "text": (_write(9, "q1", "high"), ("column q1", "row 10", "high")),
     "backward time": (_swap(20, 21), ("column t", "row 22", "backward")),
     "five joints": (_last_joint, ("5 joints", "robot has 6")),
@@ -193,7 +193,7 @@ def test_the_installed_command_says_the_same(edited, tmp_path):
     script = shutil.which("oed", path=str(Path(sys.executable).parent)) or shutil.which("oed")
     if script is None:
         pytest.skip("the command is not installed")
-    path = edited(_write(7, "tau4", "nan"))
+    path = edited(_write(7, "tau4", "inf"))
     arguments = [script, "identify", "--robot", "er3a", "--log", str(path), "--out", str(tmp_path / "out")]
     ended = subprocess.run(arguments, capture_output=True, text=True, timeout=60, check=False)
     refused(Ended(ended.returncode, ended.stdout, ended.stderr), 2, str(path), "column tau4", "row 8")

@@ -90,7 +90,7 @@ def coal() -> Any:
 
 @dataclass(frozen=True, eq=False)
 class DrawnBodies:
-    """Tells whether the drawn shapes of two bodies meet, by coal.
+    """Judges by coal whether the drawn shapes of two bodies meet.
 
     Attributes:
         shapes: of all bodies; those that cannot be read do not count.

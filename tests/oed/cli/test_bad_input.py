@@ -230,7 +230,7 @@ def test_simulating_the_unknown(run, experiment: Path, robot: Path, out: Path, t
 
 @pytest.mark.slow
 @pytest.mark.parametrize("command", ["identify", "predict"])
-@pytest.mark.parametrize("fault", ["missing", "no torque", "joints", "nan", "backward"])
+@pytest.mark.parametrize("fault", ["missing", "no torque", "joints", "infinite", "backward"])
 def test_logs(command: str, fault: str, run, robot: Path, experiment: Path, out: Path, tmp_path: Path) -> None:
     """A log that cannot serve is refused by file and column."""
     path = tmp_path / "spoilt.csv"
@@ -242,8 +242,8 @@ def test_logs(command: str, fault: str, run, robot: Path, experiment: Path, out:
     elif fault == "joints":
         log = log.drop(columns=["q2", "tau2"])
         words += ("q2",)
-    elif fault == "nan":
-        log.loc[5, "q1"] = float("nan")
+    elif fault == "infinite":
+        log.loc[5, "q1"] = float("inf")
         words += ("q1",)
     elif fault == "backward":
         log.loc[6, "t"] = log.loc[4, "t"] - 0.1
