@@ -57,7 +57,7 @@ class Requests(Channel):
         return Kind.JOINT_TRAJ_PT_FULL if self._options.points == "full" else Kind.JOINT_TRAJ_PT
 
     def start(self) -> None:
-        """Makes a driver ready that must be told to, as Motoman's: its drives get power.
+        """Makes a driver ready that waits for a command, as Motoman's: its drives get power.
 
         Raises:
             ControllerError: it does not become ready; the message says why.
