@@ -100,7 +100,7 @@ def lacking(quantity: str, where: ArrayLike, names: Sequence[str]) -> list[str]:
 
 
 def unknown_masses(inertia: Array, names: Sequence[str]) -> tuple[str, ...]:
-    """Says of which links the masses are not known, in one sentence alone in a tuple.
+    """Names the links whose masses are not known, in one sentence alone in a tuple.
 
     Args:
         inertia: (n, 10), a row of NaN where unknown.

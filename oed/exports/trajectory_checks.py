@@ -18,6 +18,9 @@ from robots.signals import Motion
 REST = 1e-3
 """Speed at both ends up to which the robot stands [rad/s or m/s]."""
 
+FREE = "No collision"
+"""How the text under ``collisions`` begins, in a trajectory that is proved free of them."""
+
 UNKNOWN_COLLISIONS = "NOT CHECKED for collisions, as far as its file says."
 """What is said of a trajectory whose file does not state under ``collisions`` what was checked."""
 
@@ -26,6 +29,16 @@ SHARE = 1e-6
 
 TORQUE_SHARE = 1e-2
 """The same of the torque: a model's torques are known no better."""
+
+
+def stated_collisions(metadata: Mapping[str, Any]) -> tuple[str, bool]:
+    """Reads what a trajectory's file states of collisions, and whether it is proved free of them.
+
+    Args:
+        metadata: what the file says of itself.
+    """
+    text = str(metadata.get("collisions") or UNKNOWN_COLLISIONS)
+    return text, text.startswith(FREE)
 
 
 def is_made_for(stated: str, robot: Robot) -> bool:

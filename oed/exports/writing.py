@@ -10,7 +10,7 @@ from typing import Any
 
 from oed.exports.forms import FORMS, ExportOptions
 from oed.exports.forms.sampling import at_period
-from oed.exports.trajectory_checks import UNKNOWN_COLLISIONS, check_trajectory
+from oed.exports.trajectory_checks import check_trajectory, stated_collisions
 from robots.common.errors import InputError
 from robots.common.files import write_atomic
 from robots.robot import Robot
@@ -66,7 +66,7 @@ def export_trajectory(
     if step is None:
         raise InputError("the motion is not uniform in time", remedy="give a period (--period)")
     sampled = at_period(motion, step)
-    remark = str((metadata or {}).get("collisions") or UNKNOWN_COLLISIONS)
+    remark, _ = stated_collisions(metadata or {})
     write_atomic(
         path, chosen.content(sampled, robot, replace(options or ExportOptions(), remark=remark), suffix), force=force
     )

@@ -27,12 +27,13 @@ def base_plane(chain: Chain, limits: Limits, span: tuple[float, float] | None = 
     turning = [joint for joint, kind in enumerate(chain.kinds) if kind != "prismatic"]
     if not turning:
         return None
-    poses = chain.transforms(random_poses(limits, 100))
+    q = random_poses(limits, 100)
+    poses = chain.transforms(q)
     axis = poses[:, turning[0], :3, :3] @ chain.joints[turning[0]].axis
     if np.abs(axis[:, 2]).min() < UPRIGHT:
         return None
     low, high = span or (0.0, 0.0)
-    arm = float(np.mean(chain.flange(random_poses(limits, 100))[:, 2, 3])) - (low + high) / 2.0
+    arm = float(np.mean(chain.flange(q)[:, 2, 3])) - (low + high) / 2.0
     below = arm >= 0.0
     # Meshes end somewhere near a round height.
     offset = round(low if below else -high, 4) + 0.0  # not -0

@@ -86,7 +86,7 @@ def export(
             write_trajectory,
         )
         from oed.exports.forms.sampling import at_period
-        from oed.exports.trajectory_checks import UNKNOWN_COLLISIONS
+        from oed.exports.trajectory_checks import stated_collisions
         from robots.common.errors import AssumedValueWarning, InputError
 
         if to not in FORMS:
@@ -96,8 +96,8 @@ def export(
         suffix = ".csv" if to == "csv" else CONTROLLER_FORMS[to].suffixes[0]
         target = out or trajectory.with_name(f"{trajectory.stem}-{to}{suffix}")
         motion, metadata = read_trajectory(trajectory)
-        collisions = str(metadata.get("collisions") or UNKNOWN_COLLISIONS)
-        if not collisions.startswith("No "):
+        collisions, proved = stated_collisions(metadata)
+        if not proved:
             warnings.warn(f"{trajectory}: {collisions} Do not play it.", AssumedValueWarning, stacklevel=1)
         # Only the trajectory file itself can be written without knowing whose joints move.
         unknown = to == "csv" and not robot and not metadata.get("robot")

@@ -107,9 +107,10 @@ def stream(
         from oed.cli.spaces import surroundings_from
         from oed.controllers import stream as play
         from oed.controllers.interrupts import terminate_as_interrupt
-        from oed.experiments.safety_checks.freedom import FREE, require_free
+        from oed.experiments.safety_checks.freedom import require_free
         from oed.exports import check_trajectory, read_trajectory
         from oed.exports.forms.sampling import at_period
+        from oed.exports.trajectory_checks import stated_collisions
         from robots.collision import Surroundings
 
         place = endpoint(context, host)
@@ -122,7 +123,7 @@ def stream(
         described = robot_of_file(robot, metadata, trajectory, tip, joints, lock)
         around = surroundings_from(floor, no_floor, keep_out)
         # What a design has proved need not be proved again, unless other surroundings are stated.
-        proved = str(metadata.get("collisions", "")).startswith(FREE) and around == Surroundings()
+        proved = stated_collisions(metadata)[1] and around == Surroundings()
         check_trajectory(motion, described, metadata, trajectory)
         if collision and not proved:
             require_free(around.model(described), motion, trajectory)

@@ -7,13 +7,11 @@ from collections.abc import Mapping
 from os import PathLike
 from typing import Any
 
+from oed.exports.trajectory_checks import FREE
 from robots.collision import CollisionModel, CollisionReport, Plane, check_motion
 from robots.collision.boxes import FLOOR
 from robots.common.errors import AssumedValueWarning, InfeasibleError
 from robots.signals import Motion
-
-FREE = "No collision"
-"""How the text about a motion begins that was checked and meets nothing."""
 
 UNCHECKED = "NOT CHECKED for collisions"
 """How every text about a motion that was not checked begins."""
@@ -115,13 +113,15 @@ def freedom_text(freedom: Mapping[str, Any] | None) -> str:
         pair, time = freedom["meetings"][0]
         return f"COLLIDES: {pair} at {time:.2f} s, by the shapes of the robot's file."
     if freedom["pair"] is None:
-        return "No two bodies of the robot can meet."
+        return f"{FREE}: no two bodies of the robot can meet."
     near = f"{freedom['pair']}, {1e3 * freedom['clearance']:.0f} mm at {freedom['time']:.2f} s"
     if freedom["clearance"] < 0.0:
         return f"COLLIDES: {near}."
-    proof = "proved at all times" if freedom["certified"] else "NOT proved between the samples"
+    free, proof = (FREE, "proved at all times")
+    if not freedom["certified"]:
+        free, proof = ("NOT PROVED free of collisions", "at the samples")
     shapes = " The shapes of the links are assumed." if freedom.get("assumed") else ""
-    return f"{FREE} with itself{_around(freedom.get('obstacles', {}))}; closest: {near}, {proof}.{shapes}"
+    return f"{free} with itself{_around(freedom.get('obstacles', {}))}; closest: {near}, {proof}.{shapes}"
 
 
 def _around(obstacles: Mapping[str, float | None]) -> str:

@@ -47,7 +47,7 @@ class FanucReader:
 
 
 class FramedReader:
-    """ROS-Industrial's reader: the length field tells where a message ends, its type what it is."""
+    """ROS-Industrial's reader: the length field says where a message ends, its type what it is."""
 
     def __init__(self, order: str) -> None:
         self._order, self._held = order, b""

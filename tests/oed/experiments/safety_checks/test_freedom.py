@@ -11,6 +11,7 @@ import oed
 from oed.experiments import LimitOptions, SearchOptions, TrajectoryOptions
 from oed.experiments.safety_checks.freedom import UNCHECKED, collides, collision_data, freedom_text, is_free
 from oed.exports import export_trajectory, read_trajectory
+from oed.exports.trajectory_checks import stated_collisions
 from oed.reports.pages.design_report import design_page
 from robots.collision import Box, Scene, Surroundings, check_motion, collision_model
 from robots.loading import load_robot
@@ -43,6 +44,10 @@ def test_each_state_has_one_sentence(er3a):
     assert freedom_text(free).startswith("No collision with itself, floor at z = 0 m; closest: ")
     assert "The shapes of the links are assumed." in freedom_text(free)
     assert freedom_text(hit).startswith("COLLIDES: post / ")
+    unproved = {**free, "certified": False}
+    assert freedom_text(unproved).startswith("NOT PROVED free of collisions with itself, floor at z = 0 m; closest: ")
+    for freedom, proved in ((None, False), (free, True), (hit, False), (unproved, False)):
+        assert stated_collisions({"collisions": freedom_text(freedom)})[1] == proved
     assert [is_free(f) for f in (None, free, hit)] == [False, True, False]
     assert [collides(f) for f in (None, free, hit)] == [False, False, True]
     json.dumps([free, hit], allow_nan=False)
