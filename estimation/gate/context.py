@@ -6,6 +6,7 @@ from collections.abc import Iterable
 from enum import IntEnum
 from functools import cached_property
 
+from estimation.gate.candidates.candidate_fits import Meaning, as_meant
 from estimation.gate.finding import Finding
 from estimation.gate.stages.cleaned import Cleaned
 from estimation.gate.stages.fitted import Fitted
@@ -13,6 +14,9 @@ from estimation.gate.stages.recorded import Recorded
 from estimation.gate.stages.smoothed import Smoothed
 from robots.robot import Robot
 from robots.signals import Log
+
+# Causes for which a log is refused: what other checks would find behind them follows from them.
+CAUSES = ("other_robot", "static_poses", "motor_side_position", "unit_of_position", "unit_of_time", "wrapped_angle")
 
 
 class Stage(IntEnum):
@@ -39,7 +43,7 @@ class Context:
         recorded: the log with all its rows.
         cleaned: the log without the rows that a fit leaves out.
         findings: of the checks so far, in their order.
-        explained: joints, from 1, that fit badly as logged, but not under the likeliest other meaning of the log.
+        meaning: of the log, with which it fits best; None before this is decided, and as logged.
     """
 
     def __init__(self, robot: Robot, log: Log) -> None:
@@ -47,7 +51,7 @@ class Context:
         self.recorded = Recorded(robot, log)
         self.cleaned = Cleaned(self.recorded)
         self.findings: list[Finding] = []
-        self.explained: frozenset[int] = frozenset()
+        self.meaning: Meaning | None = None
 
     @cached_property
     def smoothed(self) -> Smoothed:
@@ -56,32 +60,55 @@ class Context:
         Raises:
             RuntimeError: the log does not reach this stage.
         """
-        self._require(Stage.SMOOTHED)
+        if not self.cleaned.can_be_smoothed:
+            raise RuntimeError("the log does not reach the stage SMOOTHED: see Check.stage")
         return Smoothed(self.cleaned)
 
     @cached_property
-    def fitted(self) -> Fitted:
-        """Quick fits to these excerpts.
+    def logged(self) -> Fitted:
+        """Quick fits to these excerpts, as they were logged.
 
         Raises:
             RuntimeError: the log does not reach this stage.
         """
-        self._require(Stage.FITTED)
-        rows = self.smoothed.rows
-        assert rows is not None
-        return Fitted(self.cleaned, self.smoothed, rows)
+        if not self.can_be_fitted:
+            raise RuntimeError("the log does not reach the stage FITTED: see Check.stage")
+        choice = self.smoothed.choice
+        assert choice.rows is not None
+        assert choice.sharp is not None
+        return Fitted(self.cleaned, self.smoothed, choice.rows, choice.sharp)
+
+    @property
+    def fitted(self) -> Fitted:
+        """Quick fits to these excerpts, as they are meant: what another meaning explains is no fault of its own.
+
+        Raises:
+            RuntimeError: the log does not reach this stage.
+        """
+        return self.logged if self.meaning is None else self._meant
+
+    @cached_property
+    def _meant(self) -> Fitted:
+        assert self.meaning is not None
+        logged = self.logged
+        rows = as_meant(self.robot, logged.rows, self.meaning)
+        sharp = rows if logged.sharp is logged.rows else as_meant(self.robot, logged.sharp, self.meaning)
+        return Fitted(self.cleaned, self.smoothed, rows, sharp)
+
+    @property
+    def can_be_fitted(self) -> bool:
+        """Whether the log has torques, enough rows, and possible values."""
+        return self.cleaned.can_be_smoothed and self.smoothed.rows is not None
 
     def reaches(self, stage: Stage) -> bool:
-        """Whether the log is good enough for the checks of a stage."""
-        if stage <= Stage.CLEANED:
+        """Whether the log is good enough for the checks of a stage, and not refused for a cause that spoils it."""
+        if stage == Stage.RECORDED:
             return True
-        return self.cleaned.can_be_smoothed and (stage < Stage.FITTED or self.smoothed.rows is not None)
+        if any(finding.severity == "refuse" for finding in self.found(CAUSES)):
+            return False
+        return stage == Stage.CLEANED or (self.can_be_fitted if stage == Stage.FITTED else self.cleaned.can_be_smoothed)
 
     def found(self, names: Iterable[str]) -> list[Finding]:
         """Gives the findings so far that have one of these names."""
         chosen = frozenset(names)
         return [finding for finding in self.findings if finding.name in chosen]
-
-    def _require(self, stage: Stage) -> None:
-        if not self.reaches(stage):
-            raise RuntimeError(f"the log does not reach the stage {stage.name}: see Check.stage")

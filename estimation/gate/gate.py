@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
 
 import numpy as np
 
 from estimation.gate.checks import checks_in_order
-from estimation.gate.context import Context, Stage
+from estimation.gate.context import Context
 from estimation.gate.finding import Finding
 from estimation.gate.report import GateReport, worst_first
 from estimation.logs.known_setup import robot_for_log
@@ -19,33 +18,9 @@ from robots.signals import Log
 
 # Units are found by several checks; one finding of each kind is enough.
 UNITS = ("unit_of_time", "unit_of_position", "motor_side_position")
-# Causes, those of them that count as warnings, too, and findings of the fits that they explain.
-CAUSES = (
-    "coupled_axes",
-    "gravity_direction",
-    "other_robot",
-    "static_poses",
-    "swapped_columns",
-    "torque_meaning",
-    "unit_of_position",
-    "unit_of_time",
-    "wrapped_angle",
-)
-FITTED = ("gravity_direction", "other_robot", "swapped_columns")
-CONSEQUENCES = (
-    "badly_excited",
-    "beyond_limits",
-    "delay",
-    "moved_by_others",
-    "negative_friction",
-    "poorly_explained",
-    "position_sign",
-    "too_fast",
-    "torque_sign",
-    "unit_of_torque",
-)
-# Causes at single joints, with which the torques fit.
-JOINT_CAUSES = ("position_sign", "torque_meaning", "torque_sign")
+# Other meanings of positions, of one joint or of all, and findings on their range.
+MEANINGS = ("coupled_axes", "position_sign", "swapped_columns", "unit_of_position")
+RANGES = ("beyond_limits", "too_fast")
 
 
 # Values of 1e300 overflow when they are squared. They are reported, and never fitted.
@@ -81,7 +56,7 @@ def check_log(robot: Robot, log: Log) -> GateReport:
 
 def _report(context: Context, file: str) -> GateReport:
     recorded, robot = context.recorded, context.robot
-    fitted = context.fitted if context.reaches(Stage.FITTED) else None
+    fitted = context.logged if context.can_be_fitted else None
     unknown = np.full(robot.n, np.nan)
     return GateReport(
         robot=robot.name,
@@ -89,13 +64,14 @@ def _report(context: Context, file: str) -> GateReport:
         samples=len(recorded.log),
         duration=recorded.original.duration,
         period=recorded.timing.period,
-        findings=worst_first(_without_consequences(context, _without_repetitions(context.findings))),
+        findings=worst_first(_without_repetitions(context.findings)),
         parts=recorded.parts,
         motion_parts=recorded.motion_parts,
         spikes=recorded.spikes,
         stale=recorded.stale,
         t=recorded.times.t,
         q=recorded.log.q,
+        updates=recorded.updates,
         delay=unknown if fitted is None else fitted.delay_values,
         delay_error=unknown if fitted is None else fitted.delay_errors,
         unexplained=unknown if fitted is None else fitted.unexplained,
@@ -104,7 +80,16 @@ def _report(context: Context, file: str) -> GateReport:
 
 
 def _without_repetitions(findings: Sequence[Finding]) -> list[Finding]:
-    """Keeps the first finding of each unit: of a refused unit, or of the motors' positions at one joint."""
+    """Keeps the first finding of each unit: of a refused unit, or of the motors' positions at one joint.
+
+    What follows from another finding is left out: the pauses between static poses, and the range of positions that mean
+    something else.
+    """
+    if any(finding.name == "static_poses" for finding in findings):
+        return [finding for finding in findings if finding.name == "static_poses"]
+    meant = {finding.joint for finding in findings if finding.name in MEANINGS}
+    if meant:
+        findings = [f for f in findings if f.name not in RANGES or not {f.joint, None} & meant]
     kept: list[Finding] = []
     known: set[tuple[str, int | None]] = set()
     for finding in findings:
@@ -115,29 +100,3 @@ def _without_repetitions(findings: Sequence[Finding]) -> list[Finding]:
         known.add(key)
         kept.append(finding)
     return kept
-
-
-def _without_consequences(context: Context, findings: Sequence[Finding]) -> list[Finding]:
-    """Leaves out what a cause explains: its advice would mislead."""
-    sure = (finding.severity == "refuse" or finding.name in FITTED for finding in findings if finding.name in CAUSES)
-    if any(sure):
-        if any(finding.name == "static_poses" for finding in findings):
-            return [finding for finding in findings if finding.name == "static_poses"]
-        return [finding for finding in findings if finding.name not in CONSEQUENCES]
-    if not context.explained or not any(finding.name in JOINT_CAUSES for finding in findings):
-        return list(findings)
-    follows = [_only_fits_badly(finding, context.explained) for finding in findings]
-    # The log is refused for the cause if it was refused for what follows from it.
-    refused = any(bad and finding.severity == "refuse" for bad, finding in zip(follows, findings, strict=True))
-    return [
-        replace(finding, severity="refuse") if refused and finding.name in JOINT_CAUSES else finding
-        for bad, finding in zip(follows, findings, strict=True)
-        if not bad
-    ]
-
-
-def _only_fits_badly(finding: Finding, explained: frozenset[int]) -> bool:
-    """Whether a finding says no more than that explained joints, or all joints together, fit badly."""
-    if finding.name == "unit_of_torque":
-        return finding.joint is None
-    return finding.name in ("badly_excited", "poorly_explained") and finding.joint in explained

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from estimation.gate.finding import SEVERITIES, Finding, Severity
+from estimation.gate.measurements.held_torque import between_updates
 from estimation.gate.measurements.timing import FEWEST
 from estimation.logs.torque_source import NO_TORQUE
 from robots.common.errors import InputError, NotIdentifiableError
@@ -61,6 +62,7 @@ class GateReport:
             that were written late by an unknown time.
         t: times of the rows (N,) [s], corrected for rows that were written late, if possible.
         q: positions (N, n) [rad or m], with unwrapped angles.
+        updates: rows (K,) in which the torques are updated, where others repeat them; they are interpolated between.
         delay: by which the torque lags the position (n,) [s], NaN if the log does not determine it.
         delay_error: its standard error (n,) [s].
         unexplained: held-out torque error over the torque's standard deviation (n,), from a quick fit of rigid body
@@ -81,6 +83,7 @@ class GateReport:
     stale: NDArray[np.intp]
     t: Array
     q: Array
+    updates: NDArray[np.intp]
     delay: Array
     delay_error: Array
     unexplained: Array
@@ -155,11 +158,11 @@ class GateReport:
         return logs
 
     def corrected(self, log: Log) -> Log:
-        """Gives the checked log with corrected time stamps and unwrapped angles."""
+        """Gives the checked log with corrected times, unwrapped angles, and torques between their updates."""
         same_times, same_angles = np.array_equal(self.t, log.t), np.array_equal(self.q, log.q)
-        if same_times and same_angles:
-            return log
-        return replace(log, t=log.t if same_times else self.t, q=log.q if same_angles else self.q)
+        if not same_times or not same_angles:
+            log = replace(log, t=log.t if same_times else self.t, q=log.q if same_angles else self.q)
+        return between_updates(log, self.updates)
 
     def left_out(self) -> GateReport:
         """Gives the report for a log that is left out of a fit to several logs: nothing is refused or usable."""

@@ -37,6 +37,23 @@ def clustered_errors(changes: Array) -> Array:
     return np.asarray(np.sqrt(np.sum(changes**2, axis=0) * blocks / max(blocks - 1, 1)))
 
 
+def correlated_errors(changes: Array) -> Array:
+    """Computes cluster-robust standard errors where errors may be correlated for longer than a block.
+
+    Neighbouring blocks are joined as long as that makes the errors larger, down to a quarter of the blocks.
+
+    Args:
+        changes: by each block (B, ...), in the order of time.
+
+    Returns:
+        Standard errors (...).
+
+    Source: Flyvbjerg and Petersen 1989.
+    """
+    joined = [np.add.reduceat(changes, np.arange(0, len(changes), size), axis=0) for size in (1, 2, 4)]
+    return np.asarray(np.max([clustered_errors(sums) for sums in joined], axis=0))
+
+
 def widened_by_blocks(covariance: Array, matrix: Array, residual: Array) -> Array:
     """Widens a covariance to that of scores that are independent between blocks of time, but not within them.
 

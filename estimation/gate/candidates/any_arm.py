@@ -33,6 +33,7 @@ def any_arm(fitted: Fitted) -> Array:
     """
     rows, spread = fitted.rows, fitted.logged_spread
     kept = rows.thinned(max(1, -(-len(rows.q) // ROWS)))
+    kept = kept[~rows.rest[kept].all(axis=1)]
     joints = np.flatnonzero(spread > 0)
     tau = np.column_stack([rows.raw(int(joint))[kept] for joint in joints])
     tau = (tau - tau.mean(axis=0)) / spread[joints]

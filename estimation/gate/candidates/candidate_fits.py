@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -10,6 +11,7 @@ from numpy.typing import NDArray
 from scipy.optimize import minimize
 
 from estimation.gate.quick_fits.cutoff_choice import CHOICE_ROWS
+from estimation.gate.quick_fits.excerpts import Excerpt
 from estimation.gate.quick_fits.gravity_rows import gravity_rows
 from estimation.gate.quick_fits.joint_columns import OWN
 from estimation.gate.quick_fits.joint_fit import Rows
@@ -50,10 +52,63 @@ class Meaning:
     coupling: Array | None = None
     coupled_torques: bool = False
 
+    def motion(self, values: Array) -> Array:
+        """Gives positions, velocities or accelerations (M, n) of the joints from the logged ones."""
+        values = values if self.q_from is None else values[:, self.q_from]
+        values = values if self.q_factor is None else values * self.q_factor
+        return values if self.coupling is None else values @ np.linalg.inv(self.coupling).T
+
+    def torque(self, values: Array) -> Array:
+        """Gives torques (M, n) of the joints from the logged ones, without those that a controller subtracted."""
+        values = values if self.tau_from is None else values[:, self.tau_from]
+        values = values if self.tau_factor is None else values * self.tau_factor
+        return values @ self.coupling if self.coupled_torques and self.coupling is not None else values
+
 
 def mean_log(unexplained: Array) -> float:
     """Gives the mean log of held-out errors (n,); no joint counts worse than a constant."""
     return float(np.nanmean(np.log(np.clip(unexplained, 1e-9, 1.0))))
+
+
+def as_meant(robot: Robot, rows: Rows, meaning: Meaning) -> Rows:
+    """Gives the rows of a log as they are meant."""
+    moved = _moved(robot, rows.excerpts, meaning)
+    return _with_torques(robot, moved, rows.excerpts, meaning)
+
+
+def _moved(robot: Robot, excerpts: Sequence[Excerpt], meaning: Meaning) -> Rows:
+    """Gives rows with the positions and the gravity of a meaning, and torques as logged."""
+    changed = []
+    for part in excerpts:
+        # Meanings are compared on the same rows: those in which the logged column of a joint moves.
+        rest = part.rest if meaning.q_from is None else part.rest[:, meaning.q_from]
+        q, dq, ddq = (meaning.motion(values) for values in (part.q, part.dq, part.ddq))
+        changed.append(replace(part, rest=rest, q=q, dq=dq, ddq=ddq))
+    return Rows.of(robot, changed, gravity=meaning.gravity)
+
+
+def _with_torques(robot: Robot, rows: Rows, logged: Sequence[Excerpt], meaning: Meaning) -> Rows:
+    """Gives rows with the torques of a meaning."""
+    changed = []
+    for part, before in zip(rows.excerpts, logged, strict=True):
+        assert before.raw is not None
+        assert before.smoothed is not None
+        raw, smoothed = meaning.torque(before.raw), meaning.torque(before.smoothed)
+        if meaning.compensated:
+            weight = _weight(robot, part.q)
+            raw = raw + weight
+            smoothed = smoothed + np.column_stack([np.interp(part.grid, part.t, own) for own in weight.T])
+        changed.append(replace(part, raw=raw, smoothed=smoothed))
+    # The regressor does not depend on the torques, nor do its products.
+    found = replace(rows, excerpts=tuple(changed))
+    found.__dict__["_grams"] = rows._grams
+    return found
+
+
+def _weight(robot: Robot, q: Array) -> Array:
+    """Torque (M, n) of the described gravity at positions (M, n)."""
+    described = np.asarray(robot.inertia, dtype=float).ravel()
+    return (gravity_rows(robot, q) @ described @ np.asarray(robot.chain.gravity)).T
 
 
 class CandidateFits:
@@ -63,6 +118,11 @@ class CandidateFits:
         self.robot: Robot = fitted.robot
         self._rows, self._spread = fitted.rows, fitted.logged_spread
         self._kept: dict[tuple[object, ...], Rows] = {}
+
+    @property
+    def travel(self) -> Array:
+        """Range of each joint's position (n,)."""
+        return np.asarray(np.ptp(self._rows.q, axis=0))
 
     def cost(self, meaning: Meaning, *, few: bool = False) -> float:
         """Gives the mean log of the held-out error over the torque's standard deviation.
@@ -75,8 +135,8 @@ class CandidateFits:
         return mean_log(self._errors(meaning, most, ridges))
 
     def unexplained(self, meaning: Meaning) -> Array:
-        """Gives the held-out error of each joint (n,), without rows at rest; NaN without a fit."""
-        return self._errors(meaning, CHOICE_ROWS, RIDGES, moving=True)
+        """Gives the held-out error of each joint (n,), NaN without a fit."""
+        return self._errors(meaning, CHOICE_ROWS, RIDGES)
 
     def described_gravity(self) -> Array | None:
         """Estimates gravity (3,) [m/s2] from the described links, with free friction, offset and rotor inertia.
@@ -94,7 +154,8 @@ class CandidateFits:
             own = columns.Y[:, -OWN:]
             whole = columns.Y[:, :-OWN] @ (columns.scale[:-OWN] * described[columns.used])
             still = whole - heavy[joint] @ np.asarray(self.robot.chain.gravity)
-            both = np.column_stack([heavy[joint], rows.raw(int(joint)) - still])
+            both = np.column_stack([heavy[joint], rows.raw(int(joint)) - still])[~rows.rest[:, joint]]
+            own = own[~rows.rest[:, joint]]
             both = (both - own @ np.linalg.lstsq(own, both, rcond=None)[0]) / self._spread[joint]
             normal += both[:, :3].T @ both[:, :3]
             right += both[:, :3].T @ both[:, 3]
@@ -120,52 +181,19 @@ class CandidateFits:
         )
         return direction(found.x)
 
-    def _errors(self, meaning: Meaning, most: int, ridges: tuple[float, ...], *, moving: bool = False) -> Array:
+    def _errors(self, meaning: Meaning, most: int, ridges: tuple[float, ...]) -> Array:
         rows = self._meant(meaning, most)
         # Torques of coupled axes count by the spread of the logged ones: the same numbers are compared.
         spread = self._spread if meaning.tau_from is None else self._spread[meaning.tau_from]
         spread = spread if meaning.tau_factor is None else spread * np.abs(meaning.tau_factor)
-        moments = rows.moments(np.flatnonzero(spread > 0), raw=True, moving=moving)
-        return fit_all(moments, spread, ridges).unexplained
+        return fit_all(rows.moments(np.flatnonzero(spread > 0), raw=True), spread, ridges).unexplained
 
     def _meant(self, meaning: Meaning, most: int) -> Rows:
-        rows = self._moved(meaning, most)
-        plain = meaning.tau_from is None and meaning.tau_factor is None
-        if plain and not meaning.compensated and not meaning.coupled_torques:
-            return rows
-        excerpts = []
-        for part in rows.excerpts:
-            assert part.raw is not None
-            raw = part.raw if meaning.tau_from is None else part.raw[:, meaning.tau_from]
-            raw = raw if meaning.tau_factor is None else raw * meaning.tau_factor
-            if meaning.coupled_torques and meaning.coupling is not None:
-                raw = raw @ meaning.coupling
-            excerpts.append(replace(part, raw=raw + self._weight(part.q) if meaning.compensated else raw))
-        # The regressor does not depend on the torques, nor do its products.
-        changed = replace(rows, excerpts=tuple(excerpts))
-        changed.__dict__["_grams"] = rows._grams
-        return changed
-
-    def _weight(self, q: Array) -> Array:
-        """Torque (M, n) of the described gravity at positions (M, n)."""
-        described = np.asarray(self.robot.inertia, dtype=float).ravel()
-        return (gravity_rows(self.robot, q) @ described @ np.asarray(self.robot.chain.gravity)).T
-
-    def _moved(self, meaning: Meaning, most: int) -> Rows:
-        """Gives the rows with other positions or another gravity; the last ones are kept."""
+        """Gives some rows as they are meant; the last ones with other positions or another gravity are kept."""
+        stride = max(1, len(self._rows.q) // most)
+        thin = [part.thinned(stride) for part in self._rows.excerpts]
         parts = (meaning.q_from, meaning.q_factor, meaning.gravity, meaning.coupling)
         key = (most, *(None if part is None else part.tobytes() for part in parts))
         if key not in self._kept:
-            stride = max(1, len(self._rows.q) // most)
-            excerpts = []
-            for part in self._rows.excerpts:
-                thin = part.thinned(stride)
-                changed = {}
-                for name in ("q", "dq", "ddq"):
-                    values = getattr(thin, name)
-                    values = values if meaning.q_from is None else values[:, meaning.q_from]
-                    values = values if meaning.q_factor is None else values * meaning.q_factor
-                    changed[name] = values if meaning.coupling is None else values @ np.linalg.inv(meaning.coupling).T
-                excerpts.append(replace(thin, **changed))
-            self._kept = {key: Rows.of(self.robot, tuple(excerpts), gravity=meaning.gravity)}
-        return self._kept[key]
+            self._kept = {key: _moved(self.robot, thin, meaning)}
+        return _with_torques(self.robot, self._kept[key], thin, meaning)

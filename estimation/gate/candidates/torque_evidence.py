@@ -95,10 +95,11 @@ def joint_evidence(fitted: Fitted) -> list[JointEvidence]:
     rows, robot = fitted.rows, fitted.robot
     kept = rows.thinned(max(1, len(rows.q) // CHOICE_ROWS))
     heavy = np.einsum("jmkp,k->jmp", gravity_rows(robot, rows.q[kept]), np.asarray(robot.chain.gravity))
+    moves = ~rows.rest[kept]
     sure = [d is not None and abs(d.value) > d.sticks + SURE * d.error for d in fitted.delays]
     late = np.where(sure, fitted.delay_values, 0.0)
     return [
-        _evidence_of(fitted, joint, kept, heavy[joint], float(late[joint]))
+        _evidence_of(fitted, joint, kept[moves[:, joint]], heavy[joint][moves[:, joint]], float(late[joint]))
         for joint, fit in enumerate(fitted.fits)
         if fit is not None
     ]
@@ -110,9 +111,9 @@ def _evidence_of(fitted: Fitted, joint: int, kept: NDArray[np.intp], heavy: Arra
     inertia = np.asarray(robot.inertia, dtype=float)
     described, sizes = inertia.ravel(), link_spreads(inertia).ravel()
     light = np.tile(np.arange(LINK) < HEAVY, robot.n)
-    whole = np.zeros_like(heavy)
-    whole[:, fit.used] = fit.Y[kept, :-OWN] * fit.scale[:-OWN]
-    own, drive, rotor = fit.Y[kept, -OWN:], np.zeros((len(kept), 1)), float(robot.rotor_inertia[joint])
+    whole, Y = np.zeros_like(heavy), fitted.rows.joints[joint].Y[kept]
+    whole[:, fit.used] = Y[:, :-OWN] * fit.scale[:-OWN]
+    own, drive, rotor = Y[:, -OWN:], np.zeros((len(kept), 1)), float(robot.rotor_inertia[joint])
     if rotor:
         drive[:, 0], own = rotor * fitted.rows.ddq[kept, joint], own[:, 1:]
     tau = fitted.rows.torques(late)[kept, joint]
@@ -130,8 +131,8 @@ def _evidence_of(fitted: Fitted, joint: int, kept: NDArray[np.intp], heavy: Arra
     columns, shared, (torque, weightless, measured) = root * columns, root * shared, root * mean.T
     factors, scatters = (np.arange(np.log(low), np.log(high), STEP) for low, high in (FACTORS, EXTERNAL))
     near = np.arange(-3 * COMMON, 3 * COMMON + STEP, STEP)
-    friction = fit.Y[kept, -OWN + 1 : -1] @ fit.values[-OWN + 1 : -1]
-    others = np.delete(fit.Y[kept], np.s_[-OWN + 1 : -1], axis=1)
+    friction = Y[:, -OWN + 1 : -1] @ fit.values[-OWN + 1 : -1]
+    others = np.delete(Y, np.s_[-OWN + 1 : -1], axis=1)
     friction = friction - others @ solve_ridge(others.T @ others, others.T @ friction, OWN_RIDGE)
     return JointEvidence(
         joint=joint,

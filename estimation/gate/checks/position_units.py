@@ -26,74 +26,124 @@ AGREE = 0.5
 CERTAIN = 8.0
 # Decrease of the held-out torque error (mean log) with the other unit, from which it is accepted otherwise.
 BETTER = 0.1
+# Positions in percent of a range stay below this.
+FULL = 101.0
 
 
 class PositionUnits(Check):
     """Refuses positions in another unit. Reports joints beyond their limits if no other unit explains them."""
 
     name: ClassVar[str] = "position_units"
-    stage: ClassVar[Stage] = Stage.SMOOTHED
-    order: ClassVar[int] = 10
+    stage: ClassVar[Stage] = Stage.CLEANED
+    order: ClassVar[int] = 5
 
     def run(self, context: Context) -> list[Finding]:
-        """Compares positions with the limits, and the fits with both units."""
-        robot, columns = context.robot, context.cleaned.columns
-        suspicion = _suspect(robot, columns)
-        if suspicion is not None and (suspicion.certain or _fits_better(context, suspicion.factor)):
-            return [suspicion.finding]
+        """Compares positions with the limits, and the fits with all units that bring them inside."""
+        robot, columns = context.robot, context.recorded.columns
+        beyond = _beyond(robot, columns.lowest, columns.highest)
+        moving = columns.travel > 0
+        found, whole = int((beyond & moving).sum()), max(int(moving.sum()), 1)
+        if found >= AGREE * whole and (whole != 2 or found == whole):
+            units = [unit for unit in _units(robot, columns) if not unit.beyond(robot, columns).any()]
+            if not units and beyond.any() and all(_is_whole(q) for q in columns.q[moving]):
+                units = [COUNTS]
+            if units and (chosen := _chosen(context, units)) is not None:
+                return [_finding(robot, columns, beyond, chosen)]
         return [
             _single(robot, columns, int(j)) or _beyond_finding(robot, columns.extreme(int(j)), int(j))
-            for j in np.flatnonzero(_beyond(robot, columns))
+            for j in np.flatnonzero(beyond)
         ]
 
 
 @dataclass(frozen=True, eq=False)
-class _Suspicion:
-    """Another unit that the positions may be in.
+class _Unit:
+    """A unit that the positions may be in: joint positions are ``q * scale + offset``.
 
     Attributes:
-        factor: by which to divide them (n,).
-        finding: if that unit is right.
-        certain: whether the positions alone prove it.
+        name: of the finding.
+        words: for it.
+        remedy: what to state.
+        scale: (n,), or a number.
+        offset: (n,), or a number [rad or m].
     """
 
-    factor: Array
-    finding: Finding
-    certain: bool
+    name: str
+    words: str
+    remedy: str
+    scale: Array | float = 1.0
+    offset: Array | float = 0.0
+
+    def beyond(self, robot: Robot, columns: Columns) -> NDArray[np.bool_]:
+        """Finds the joints (n,) that are beyond their limits in this unit."""
+        low, high = (values * self.scale + self.offset for values in (columns.lowest, columns.highest))
+        return _beyond(robot, low, high)
 
 
-def _suspect(robot: Robot, columns: Columns) -> _Suspicion | None:
-    """Finds the unit that brings all positions inside the joints' limits."""
-    beyond = _beyond(robot, columns)
-    moving = columns.travel > 0
-    found, whole = int((beyond & moving).sum()), max(int(moving.sum()), 1)
-    if found < AGREE * whole or (whole == 2 and found < whole):
-        return None
+COUNTS = _Unit(
+    "unit_of_position",
+    "counts of an encoder",
+    "state for the position unit: turn and side: motor, with gear_ratio: counts a turn of each joint, in a mapping "
+    "(--mapping)",
+)
+
+
+def _units(robot: Robot, columns: Columns) -> list[_Unit]:
+    """Lists the units in which positions may be logged: all joints have the same one."""
     revolute = np.array([joint.kind == "revolute" for joint in robot.chain.joints])
-    candidates = {
-        "unit_of_position": (np.where(revolute, 180.0 / np.pi, 1000.0), "in degrees (or millimetres)", "unit"),
-        "motor_side_position": (np.abs(np.asarray(robot.gear_ratio)), "of the motors, not the links", "gear ratios"),
-    }
-    for name, (factor, words, what) in candidates.items():
-        # All joints have the same unit; those that move little stay inside their limits in any unit.
-        if np.allclose(factor[beyond], 1.0) or _beyond(robot, columns, factor).any():
-            continue
-        extremes = np.array([columns.extreme(joint) for joint in range(robot.n)])
-        worst = int(np.argmax(np.where(beyond, np.abs(extremes), 0.0)))
-        extreme = float(extremes[worst])
-        finding = Finding(
-            name=name,
-            severity="refuse",
-            text=f"reaches {extreme:.4g}, and {int(beyond.sum())} of {robot.n} joints exceed their range: "
-            f"positions seem to be {words}",
-            action=f"set the {what} in the file's head or in a mapping (--mapping)",
-            value=abs(extreme),
-            unit="rad or m",
-            column=f"q{worst + 1}",
-            joint=worst + 1,
+    head = "in the file's head or in a mapping (--mapping)"
+    units = [
+        _Unit(
+            "unit_of_position",
+            "in degrees" if revolute.all() else "in degrees (or millimetres)",
+            f"set the unit {head}",
+            np.where(revolute, np.pi / 180.0, 1e-3),
         )
-        return _Suspicion(np.asarray(factor, dtype=float), finding, abs(extreme) > CERTAIN * _range(robot, worst))
-    return None
+    ]
+    gears = np.abs(np.asarray(robot.gear_ratio, dtype=float))
+    if not np.allclose(gears, 1.0):
+        words = "of the motors, not the links"
+        units.append(_Unit("motor_side_position", words, f"set the gear ratios {head}", 1.0 / gears))
+    lower, upper = (np.asarray(bound, dtype=float) for bound in (robot.limits.lower, robot.limits.upper))
+    shares = np.concatenate([columns.lowest, columns.highest])
+    if np.isfinite(upper - lower).all() and np.abs(shares).max() < FULL:
+        scale, offset = (upper - lower) / 200.0, (upper + lower) / 2.0
+        listed = [", ".join(f"{value:.5g}" for value in values) for values in (scale, offset)]
+        remedy = f"state `scale: [{listed[0]}]` and `offset: [{listed[1]}]` for the position in a mapping (--mapping)"
+        units.append(_Unit("unit_of_position", "percent of each joint's range, -100 to 100", remedy, scale, offset))
+    return units
+
+
+def _is_whole(q: Array) -> bool:
+    return bool(np.all(q == np.round(q)))
+
+
+def _chosen(context: Context, units: list[_Unit]) -> _Unit | None:
+    """Gives the unit with which the torques fit best; the first one where the positions alone prove another unit."""
+    columns = context.recorded.columns
+    ranges = [_range(context.robot, joint) for joint in range(context.robot.n)]
+    certain = any(abs(columns.extreme(joint)) > CERTAIN * width for joint, width in enumerate(ranges))
+    if (len(units) == 1 and certain) or not context.can_be_fitted:
+        return units[0] if certain else None
+    q = context.cleaned.log.q
+    errors = [context.smoothed.error_with_positions(q * unit.scale + unit.offset) for unit in units]
+    best = int(np.argmin(errors))
+    return units[best] if certain or errors[best] < context.smoothed.choice.cost - BETTER else None
+
+
+def _finding(robot: Robot, columns: Columns, beyond: NDArray[np.bool_], unit: _Unit) -> Finding:
+    extremes = np.array([columns.extreme(joint) for joint in range(robot.n)])
+    worst = int(np.argmax(np.where(beyond, np.abs(extremes), 0.0)))
+    return Finding(
+        name=unit.name,
+        severity="refuse",
+        text=f"reaches {extremes[worst]:.4g}, and {int(beyond.sum())} of {robot.n} joints exceed their range: "
+        f"positions seem to be {unit.words}",
+        action=unit.remedy,
+        value=abs(float(extremes[worst])),
+        unit="rad or m",
+        column=f"q{worst + 1}",
+        joint=worst + 1,
+    )
 
 
 def _single(robot: Robot, columns: Columns, joint: int) -> Finding | None:
@@ -102,7 +152,8 @@ def _single(robot: Robot, columns: Columns, joint: int) -> Finding | None:
     revolute = robot.chain.kinds[joint] == "revolute"
     factors = np.ones(robot.n)
     factors[joint] = np.pi / 180 if revolute else 1e-3
-    if abs(extreme) < CERTAIN * _range(robot, joint) or _beyond(robot, columns, 1 / factors)[joint]:
+    inside = not _beyond(robot, columns.lowest * factors, columns.highest * factors)[joint]
+    if abs(extreme) < CERTAIN * _range(robot, joint) or not inside:
         return None
     scale, unit = ", ".join(f"{factor:.5g}" for factor in factors), "degrees" if revolute else "millimetres"
     return Finding(
@@ -117,19 +168,10 @@ def _single(robot: Robot, columns: Columns, joint: int) -> Finding | None:
     )
 
 
-def _fits_better(context: Context, factor: Array) -> bool:
-    """Whether torques fit better with the positions divided by a factor (n,)."""
-    smoothed = context.smoothed
-    if smoothed.rows is None:
-        return False
-    other = smoothed.error_with_positions(context.cleaned.log.q / factor)
-    return other < smoothed.choice.cost - BETTER
-
-
-def _beyond(robot: Robot, columns: Columns, factor: Array | float = 1.0) -> NDArray[np.bool_]:
-    """Finds the joints (n,) that are beyond their limits with positions divided by a factor (n,)."""
-    bounds = zip(columns.lowest / factor, columns.highest / factor, strict=True)
-    return np.array([_is_beyond(robot, float(low), float(high), joint) for joint, (low, high) in enumerate(bounds)])
+def _beyond(robot: Robot, lowest: Array, highest: Array) -> NDArray[np.bool_]:
+    """Finds the joints (n,) whose lowest or highest positions (n,) are beyond their limits."""
+    bounds = zip(lowest.tolist(), highest.tolist(), strict=True)
+    return np.array([_is_beyond(robot, low, high, joint) for joint, (low, high) in enumerate(bounds)])
 
 
 def _is_beyond(robot: Robot, low: float, high: float, joint: int) -> bool:

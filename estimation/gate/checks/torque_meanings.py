@@ -8,10 +8,10 @@ from typing import ClassVar
 
 import numpy as np
 
+from estimation.gate.candidates.cause_findings import without_gravity
 from estimation.gate.candidates.torque_evidence import JointEvidence, joint_evidence
 from estimation.gate.candidates.torque_hypotheses import GEARED, Hypothesis, hypotheses
 from estimation.gate.check import Check
-from estimation.gate.checks.likely_causes import without_gravity
 from estimation.gate.context import Context, Stage
 from estimation.gate.finding import Finding
 from estimation.gate.quick_fits.whole_fit import HOPELESS
@@ -69,9 +69,9 @@ class TorqueMeanings(Check):
         explained = any(finding.severity != "info" for finding in context.found(EXPLAINED))
         if not context.robot.has_masses or explained:
             return []
-        if context.cleaned.columns.prefix != "tau" or not (context.fitted.unexplained < HOPELESS).any():
+        if context.cleaned.columns.prefix != "tau" or not (context.logged.unexplained < HOPELESS).any():
             return []
-        evidence = joint_evidence(context.fitted)
+        evidence = joint_evidence(context.logged)
         if not evidence:
             return []
         if (found := _computed(context, evidence)) is not None:
@@ -146,7 +146,7 @@ def _frictionless(evidence: Sequence[JointEvidence]) -> bool:
 
 def _computed(context: Context, evidence: Sequence[JointEvidence]) -> Finding | None:
     """Names torques without friction and noise: a controller has computed them."""
-    unexplained = context.fitted.unexplained
+    unexplained = context.logged.unexplained
     worst = float(np.nanmax(unexplained))
     noisy = float(np.nanmedian(unexplained)) > COMPUTED or worst > AT_MOST
     if noisy or any(one.friction > FRICTIONLESS for one in evidence):
@@ -164,7 +164,7 @@ def _computed(context: Context, evidence: Sequence[JointEvidence]) -> Finding | 
 
 def _nominal(context: Context, evidence: Sequence[JointEvidence]) -> list[Finding]:
     """Reports a description that is far off although the fit is good."""
-    fitted = context.fitted
+    fitted = context.logged
     large = [t for t in evidence if 1 / max(t.size, 1e-12) > NOMINAL and fitted.unexplained[t.joint] < WELL]
     if not large:
         return []

@@ -7,12 +7,14 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
+from estimation.gate.candidates.candidate_fits import CandidateFits, Meaning
 from estimation.gate.check import Check
 from estimation.gate.context import Context, Stage
 from estimation.gate.finding import Finding
 from estimation.gate.quick_fits.joint_columns import OWN
 from estimation.gate.quick_fits.joint_fit import JointFit
-from estimation.gate.quick_fits.joint_physics import JointPhysics
+from estimation.gate.quick_fits.joint_physics import JointPhysics, described_ratio
+from estimation.gate.quick_fits.whole_fit import POOR
 from estimation.gate.stages.fitted import Fitted
 from robots.robot import Robot
 
@@ -23,9 +25,10 @@ Array = NDArray[np.float64]
 SURE, CLEAR = 5.0, 15.0
 # Friction drives if its power is below minus this share of the joint's power.
 DRIVES = 0.2
-# Change of the cost of the fit of all joints (mean log variance) with the opposite sign of a torque, from which the
-# logged sign is certainly right, or wrong.
-SIGN_COST = 0.3
+# Increase of the error of all joints (mean log) by the opposite sign of a torque, from which the sign is right.
+SIGN_COST = 0.15
+# Correlation with the described torque from which a torque has the described sign.
+ALIKE = 0.9
 # RMS torque over the joint's limit, below which a torque is too small for a refusal.
 FAINT = 0.01
 # Least ratio of inertia to first moment of mass of a link [m], and the acceleration of gravity [m/s2].
@@ -43,6 +46,7 @@ class TorqueSigns(Check):
         """Looks at inertia and friction of each joint, then at the fit of all joints."""
         fitted, prefix = context.fitted, context.cleaned.columns.prefix
         significances = [(0.0, 0.0) if found is None else found.significances for found in fitted.physics]
+        backwards = 2 * sum(friction < -CLEAR for _, friction in significances) > len(significances)
         plausible = [inertia > SURE or friction > CLEAR for inertia, friction in significances]
         findings = []
         opposite: dict[int, bool] = {}  # joints with a torque of opposite sign, and whether that is certain
@@ -53,23 +57,32 @@ class TorqueSigns(Check):
             drives = -found.loss > DRIVES * found.power
             negative = inertia < -SURE and friction < SURE / 2
             # The other joints move the same links: the opposite sign would fit them better if this one were wrong.
-            contradicted = any(plausible[:joint] + plausible[joint + 1 :]) and fitted.sign_costs[joint] > SIGN_COST
+            contradicted = any(plausible[:joint] + plausible[joint + 1 :]) and _sign_cost(fitted, joint) > SIGN_COST
             if _is_moved_by_others(fit, found, joint, context.robot):
                 findings.append(_moved_by_others(found, prefix, joint))
             elif friction < -CLEAR and inertia > SURE and drives:
-                findings.append(_negative_friction(found, prefix, joint))
+                # Time that runs backwards makes the friction of all joints drive.
+                certain = backwards and fitted.unexplained[joint] < POOR
+                findings.append(_negative_friction(found, prefix, joint, certain))
             elif (negative or (friction < -SURE and inertia < SURE / 2 and drives)) and not contradicted:
+                described = described_ratio(context.robot, fit)
+                if described is not None and described[0] > 0 and described[1] > ALIKE:
+                    continue
                 large = _rms_torque(fitted, joint) > FAINT * _finite(context.robot.limits.torque[joint])
-                opposite[joint] = negative or (friction < -CLEAR and large)
-        worst = int(np.argmin(fitted.sign_costs))
-        if not opposite and fitted.sign_costs[worst] < -SIGN_COST and significances[worst][1] < SURE / 2:
-            opposite[worst] = True
+                opposite[joint] = fitted.unexplained[joint] < POOR and (negative or (friction < -CLEAR and large))
         return findings + [
             _torque_sign(found, prefix, joint, certain)
             for joint, certain in opposite.items()
             for found in [fitted.physics[joint]]
             if found is not None
         ]
+
+
+def _sign_cost(fitted: Fitted, joint: int) -> float:
+    """Gives the increase of the error (mean log) by the opposite sign of a joint's torque."""
+    fits, sign = CandidateFits(fitted), np.ones(fitted.robot.n)
+    sign[joint] = -1.0
+    return fits.cost(Meaning(tau_factor=sign)) - fits.cost(Meaning())
 
 
 def _rms_torque(fitted: Fitted, joint: int) -> float:
@@ -90,7 +103,8 @@ def _is_moved_by_others(fit: JointFit, found: JointPhysics, joint: int, robot: R
         return False
     weight = fit.Y[:, :-OWN] @ fit.values[:-OWN]
     moment = float(weight.std()) / GRAVITY
-    return abs(found.inertia) + SURE * found.inertia_error < COMPACT * moment
+    # An inverted torque has an inertia that is as large as any link's, of the wrong sign.
+    return abs(found.inertia + SURE * found.inertia_error) < COMPACT * moment
 
 
 def _moved_by_others(found: JointPhysics, prefix: str, joint: int) -> Finding:
@@ -107,10 +121,10 @@ def _moved_by_others(found: JointPhysics, prefix: str, joint: int) -> Finding:
     )
 
 
-def _negative_friction(found: JointPhysics, prefix: str, joint: int) -> Finding:
+def _negative_friction(found: JointPhysics, prefix: str, joint: int, certain: bool) -> Finding:
     return Finding(
         name="negative_friction",
-        severity="refuse",
+        severity="refuse" if certain else "warning",
         text=f"friction delivers {-found.loss:.3g} W (standard error {found.loss_error:.2g}) instead of consuming "
         "power, but the inertia is positive: time runs backwards, or friction was overcompensated",
         action="check the order of the rows and the meaning of the torque column",

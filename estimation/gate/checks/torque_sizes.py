@@ -4,24 +4,15 @@ from __future__ import annotations
 
 from typing import ClassVar
 
-import numpy as np
-from numpy.typing import NDArray
-
 from estimation.gate.check import Check
 from estimation.gate.context import Context, Stage
 from estimation.gate.finding import Finding
-from estimation.gate.quick_fits.joint_columns import OWN
-from estimation.gate.quick_fits.joint_fit import JointFit
-from estimation.gate.quick_fits.rigid_body import rigid_body
+from estimation.gate.quick_fits.joint_physics import described_ratio
 from robots.common.plain import two_digits
 from robots.robot import Robot
 
-Array = NDArray[np.float64]
-
 # A torque is reported from this correlation with the described torque on, if their ratio is beyond this factor.
 ALIKE, FACTOR = 0.9, 20.0
-# Share of the described torque's energy that must remain without friction and offset.
-REMAINS = 1e-4
 # Findings after which the torque of a joint is not compared.
 EXPLAINED = (
     "torque_sign",
@@ -47,33 +38,15 @@ class TorqueSizes(Check):
         if context.cleaned.columns.prefix != "tau" or not robot.has_masses:
             return []
         explained = {finding.joint for finding in context.found(EXPLAINED)}
-        described = rigid_body(robot).nominal
         findings = []
         for joint, fit in enumerate(fitted.fits):
-            compared = None if fit is None or joint + 1 in explained else _compare(fit, described)
+            compared = None if fit is None or joint + 1 in explained else described_ratio(robot, fit)
             if compared is None:
                 continue
             slope, correlation = compared
             if abs(correlation) >= ALIKE and not 1 / FACTOR < slope < FACTOR:
                 findings.append(_finding(robot, joint, slope, correlation))
         return findings
-
-
-def _compare(fit: JointFit, described: Array) -> tuple[float, float] | None:
-    """Gives the factor between a torque and that of described parameters (p,), and the correlation; None without any.
-
-    Rotor inertia, friction and offset are no part of the described links: what they can explain is left out.
-    """
-    tau = fit.Y @ fit.values + fit.residual
-    own = fit.Y[:, -OWN:]
-    expected = fit.Y[:, :-OWN] @ (fit.scale[:-OWN] * described[fit.used])
-    both = np.column_stack([expected, tau])
-    both = both - own @ np.linalg.lstsq(own, both, rcond=None)[0]
-    model, rest = both.T
-    if not model @ model > REMAINS * (expected @ expected) or not rest @ rest > 0:
-        return None
-    product = model @ rest
-    return float(product / (model @ model)), float(product / np.sqrt((model @ model) * (rest @ rest)))
 
 
 def _finding(robot: Robot, joint: int, slope: float, correlation: float) -> Finding:

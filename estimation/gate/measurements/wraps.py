@@ -58,7 +58,8 @@ def find_wraps(joint: int, q: Array, t: Array) -> Wraps | None:
     if len(q) < 2 * AROUND + 2:
         return None
     for turn in TURNS:
-        found = _find(joint, q, t, turn)
+        # An angle that wraps stays inside one turn: a large step of a wider one is a step in another unit.
+        found = _find(joint, q, t, turn) if np.ptp(q) < (1 + SMOOTH) * turn else None
         if found is not None:
             return found
     return None

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from estimation.gate.quick_fits.joint_fit import OWN_RIDGE, JointFit, Rows
 from estimation.linear_algebra.scaled import solve_ridge
-from estimation.uncertainty.blocks import clustered_errors
+from estimation.uncertainty.blocks import correlated_errors
 
 Array = NDArray[np.float64]
 
@@ -164,7 +164,7 @@ def _refined(rows: Rows, fit: JointFit, joint: int, search: _Search) -> Delay:
     residual = tau - fit.Y @ (fit.inverse @ (fit.Y.T @ tau))
     scores = rows.block_sums(slope * residual, fit.counted)
     curvature = float(slope @ slope)
-    error = float(clustered_errors(scores)) / curvature if curvature > 0 else np.inf
+    error = float(correlated_errors(scores)) / curvature if curvature > 0 else np.inf
     return Delay(value, error, float(1 - np.sqrt(_remaining(fit, tau) / zero)) if zero > 0 else 0.0, sticks)
 
 

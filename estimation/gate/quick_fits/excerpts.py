@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 from scipy.signal import sosfiltfilt
 
+from estimation.preprocessing import rows_at_rest
 from estimation.preprocessing.smoothing import butterworth
 from robots.signals import Log
 
@@ -64,6 +65,8 @@ class Excerpt:
         q: smoothed positions (M, n).
         dq: their derivative (M, n).
         ddq: their second derivative (M, n).
+        rest: whether each joint stands (M, n). Friction or a brake may hold it with any torque, so that these rows
+            count in no fit of the joint.
         raw: torque or current as it was logged (M, n); None without.
         column: the log's own velocities, smoothed by the same filter (M, n); None without.
         place: of the thinned rows on the grid (M,).
@@ -75,6 +78,7 @@ class Excerpt:
     q: Array
     dq: Array
     ddq: Array
+    rest: NDArray[np.bool_]
     raw: Array | None
     column: Array | None
     place: NDArray[np.intp]
@@ -85,7 +89,7 @@ class Excerpt:
         """Keeps one of `stride` rows."""
         kept: dict[str, Any] = {
             name: None if array is None else array[::stride]
-            for name in ("t", "q", "dq", "ddq", "raw", "column", "place")
+            for name in ("t", "q", "dq", "ddq", "rest", "raw", "column", "place")
             for array in [getattr(self, name)]
         }
         return replace(self, **kept)
@@ -197,7 +201,10 @@ def excerpts_of(parts: Sequence[Stretch], period: float, cutoff: float) -> tuple
         widths = np.cumsum([signal.shape[1] for signal in signals])
         smoothed[length] = iter(np.split(_low_pass(np.hstack(signals), period, cutoff), widths[:-1], axis=1))
     found = (_excerpt(part, [next(smoothed[len(part.t)]) for _ in part.signals], period, cutoff) for part in parts)
-    return tuple(part for part in found if part is not None)
+    excerpts = [part for part in found if part is not None]
+    rows = max(sum(len(part.t) for part in excerpts), 1)
+    speed = np.sqrt(sum(np.sum(part.dq**2, axis=0) for part in excerpts) / rows)
+    return tuple(replace(part, rest=rows_at_rest(part.t, part.q, speed)) for part in excerpts)
 
 
 def _excerpt(part: Stretch, smoothed: Sequence[Array], period: float, cutoff: float) -> Excerpt | None:
@@ -220,6 +227,7 @@ def _excerpt(part: Stretch, smoothed: Sequence[Array], period: float, cutoff: fl
         slope(inside),
         # The ends that are left out are much longer than a sample.
         (slope(inside + 1) - slope(inside - 1)) / (2 * period),
+        np.zeros((len(inside), q.shape[1]), dtype=bool),
         None if part.torque is None else part.torque[inside],
         None if part.velocity is None else next(smooth)[inside],
         inside,

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise
 
@@ -14,9 +14,8 @@ from estimation.gate.quick_fits.excerpts import Excerpt
 from estimation.gate.quick_fits.joint_columns import OWN, JointColumns, joined, under_gravity
 from estimation.gate.quick_fits.rigid_body import joint_rows, rigid_body, used_columns
 from estimation.linear_algebra.scaled import solve_ridge
-from estimation.preprocessing import rows_at_rest
 from estimation.regressions.blocks import Blocks
-from estimation.uncertainty.blocks import block_numbers, clustered_errors
+from estimation.uncertainty.blocks import block_numbers, correlated_errors
 from robots.robot import Robot
 
 Array = NDArray[np.float64]
@@ -33,14 +32,14 @@ class JointFit:
     """The fit of one joint.
 
     Attributes:
-        Y: regressor (M, k), scaled to unit mean square.
-        scale: RMS of the unscaled columns (k,).
+        Y: regressor of the counted rows (M', k), scaled.
+        scale: of its columns (k,).
         used: parameters of the rigid body that the first columns belong to.
         values: parameters of the scaled columns (k,).
         inverse: inverse of the Gram matrix with its ridge (k, k).
-        residual: (M,).
+        residual: of the counted rows (M',).
         scores: Y' residual of each block (B, k).
-        counted: which of all rows these are.
+        counted: rows (M,) in which the joint moves.
     """
 
     Y: Array
@@ -60,7 +59,7 @@ class JointFit:
         """
         direction = weights / self.scale
         value = float(direction @ self.values)
-        return value, float(clustered_errors(self.scores @ (self.inverse @ direction)))
+        return value, float(correlated_errors(self.scores @ (self.inverse @ direction)))
 
 
 @dataclass(frozen=True, eq=False)
@@ -76,6 +75,7 @@ class Rows:
         bodies: number of the rigid body's parameters.
         block: number of each row's block (M,).
         speed: RMS speed of each joint (n,).
+        rest: rows (M, n) that count in no fit of a joint, for it stands.
     """
 
     excerpts: tuple[Excerpt, ...]
@@ -86,6 +86,7 @@ class Rows:
     bodies: int
     block: NDArray[np.intp]
     speed: Array
+    rest: NDArray[np.bool_]
 
     @staticmethod
     def of(
@@ -111,6 +112,7 @@ class Rows:
         rows = len(q)
         block = block_numbers(rows, BLOCKS)
         speed = np.sqrt(np.mean(dq**2, axis=0))
+        rest = np.concatenate([part.rest for part in excerpts])
         own = np.zeros_like(ddq) if static else ddq
         bodies, used = joint_rows(robot, q, np.zeros_like(dq) if static else dq, own), used_columns(robot)
         if gravity is not None:
@@ -119,7 +121,7 @@ class Rows:
             joined(body, columns, dq[:, j], own[:, j], float(speed[j]))
             for j, (body, columns) in enumerate(zip(bodies, used, strict=True))
         )
-        return Rows(tuple(excerpts), q, dq, ddq, joints, rigid_body(robot).size, block, speed)
+        return Rows(tuple(excerpts), q, dq, ddq, joints, rigid_body(robot).size, block, speed, rest)
 
     def raw(self, joint: int) -> Array:
         """Gives the torque of a joint (M,), counted from 0, as it was logged."""
@@ -156,15 +158,13 @@ class Rows:
         starts = np.concatenate([[0], ends[:-1]])
         return np.concatenate([np.arange(start, end, stride) for start, end in zip(starts, ends, strict=True)])
 
-    def fit(self, joint: int, *, moving: bool = False) -> JointFit:
-        """Fits one joint alone: a fault of another joint has no effect on it.
+    def spread(self, joint: int, *, raw: bool = False) -> float:
+        """Gives the standard deviation of a joint's torque, as it was logged or smoothed, while the joint moves."""
+        return float((self.raw(joint) if raw else self.torque(joint))[~self.rest[:, joint]].std())
 
-        Args:
-            joint: counted from 0.
-            moving: without the rows in which it is at rest.
-        """
-        own = self.joints[joint]
-        counted = ~self.rest[:, joint] if moving else np.ones(len(self.q), dtype=bool)
+    def fit(self, joint: int) -> JointFit:
+        """Fits one joint alone, counted from 0: a fault of another joint has no effect on it."""
+        own, counted = self.joints[joint], ~self.rest[:, joint]
         Y, tau = own.Y[counted], self.torque(joint)[counted]
         gram = Y.T @ Y
         values = solve_ridge(gram, Y.T @ tau, OWN_RIDGE)
@@ -177,42 +177,25 @@ class Rows:
         """Sums values (M', ...) of the counted rows over each block (B, ...)."""
         return np.add.reduceat(values, np.flatnonzero(np.diff(self.block[counted], prepend=-1)), axis=0)
 
-    @cached_property
-    def rest(self) -> NDArray[np.bool_]:
-        """Rows (M, n) in which each joint stands: friction may hold it with any torque."""
-        return np.concatenate([rows_at_rest(part.t, part.q, self.speed) for part in self.excerpts])
-
-    def in_motion(self) -> Rows:
-        """Gives the same rows, those of joints at rest as zeros."""
-        joints = tuple(replace(own, Y=np.where(self.rest[:, j, None], 0.0, own.Y)) for j, own in enumerate(self.joints))
-        return replace(self, joints=joints)
-
-    def moments(self, joints: NDArray[np.intp], *, raw: bool = False, moving: bool = False) -> Blocks:
-        """Sums the normal equations of some joints, fold by fold.
+    def moments(self, joints: NDArray[np.intp], *, raw: bool = False) -> Blocks:
+        """Sums the normal equations of some joints, counted from 0, fold by fold.
 
         Args:
-            joints: counted from 0.
+            joints: some.
             raw: of the torques as logged, not of smoothed ones.
-            moving: without the rows in which a joint is at rest.
         """
-        if moving and self.rest.any():
-            return self.in_motion()._sums(joints, raw, ~self.rest)
-        return self._sums(joints, raw, np.ones(self.q.shape, dtype=bool))
-
-    def _sums(self, joints: NDArray[np.intp], raw: bool, counted: NDArray[np.bool_]) -> Blocks:
         chosen = tuple(map(int, joints))
         gram, scale, places = self._gram(chosen)
         n, folds, p = gram.shape[:3]
-        cross, square = np.zeros((n, folds, p)), np.zeros((n, folds))
+        cross, square, count = np.zeros((n, folds, p)), np.zeros((n, folds)), np.zeros((n, folds))
         for joint in chosen:
-            own = self.joints[joint]
-            tau = (self.raw(joint) if raw else self.torque(joint)) * counted[:, joint]
+            own, tau = self.joints[joint], self.raw(joint) if raw else self.torque(joint)
             acts, place = places[joint]
             factor = own.scale[acts] / scale[place]
-            for k, rows in enumerate(self._folds):
+            for k, rows in enumerate(self._folds(joint)):
                 cross[joint, k, place] = factor * (own.Y[rows].T @ tau[rows])[acts]
                 square[joint, k] = float(tau[rows] @ tau[rows])
-        count = np.array([counted[rows].sum(axis=0) for rows in self._folds], dtype=float).T
+                count[joint, k] = len(tau[rows])
         return Blocks(gram, cross, square, count)
 
     def _gram(self, joints: tuple[int, ...]) -> tuple[Array, Array, dict[int, tuple[Places, Places]]]:
@@ -229,7 +212,7 @@ class Rows:
             parts = {}
             for joint in joints:
                 own = self.joints[joint]
-                parts[joint] = np.array([own.Y[rows].T @ own.Y[rows] for rows in self._folds])
+                parts[joint] = np.array([own.Y[rows].T @ own.Y[rows] for rows in self._folds(joint)])
                 energy[self._place(joint)] += own.scale**2 * sum(np.diag(part) for part in parts[joint])
             kept = np.flatnonzero(energy > 0)
             scale = np.sqrt(energy[kept] / len(self.q))
@@ -251,10 +234,12 @@ class Rows:
     def _grams(self) -> dict[tuple[int, ...], tuple[Array, Array, dict[int, tuple[Places, Places]]]]:
         return {}
 
-    @property
-    def _folds(self) -> list[slice]:
+    def _folds(self, joint: int) -> list[slice | NDArray[np.intp]]:
+        """Gives the counted rows of each fold."""
         bounds = np.linspace(0, len(self.q), FOLDS + 1).astype(int).tolist()
-        return [slice(first, stop) for first, stop in pairwise(bounds)]
+        if not self.rest[:, joint].any():
+            return [slice(first, stop) for first, stop in pairwise(bounds)]
+        return [first + np.flatnonzero(~self.rest[first:stop, joint]) for first, stop in pairwise(bounds)]
 
     def _place(self, joint: int) -> NDArray[np.intp]:
         """Gives the places of a joint's columns among those of all joints."""

@@ -11,10 +11,9 @@ from estimation.gate.quick_fits.cutoff_choice import CHOICE_ROWS
 from estimation.gate.quick_fits.delays import Delay, estimate_delays
 from estimation.gate.quick_fits.joint_fit import JointFit, Rows
 from estimation.gate.quick_fits.joint_physics import JointPhysics, joint_physics, mean_inertias
-from estimation.gate.quick_fits.whole_fit import HOPELESS, WholeFit, fit_all
+from estimation.gate.quick_fits.whole_fit import HOPELESS, fit_all
 from estimation.gate.stages.cleaned import Cleaned
 from estimation.gate.stages.smoothed import Smoothed
-from estimation.regressions.blocks import Blocks
 
 Array = NDArray[np.float64]
 
@@ -25,13 +24,16 @@ class Fitted:
     Attributes:
         robot: with n joints.
         rows: that are fitted.
-        logged_spread: standard deviations of the torques as logged (n,), zero for a joint that is not fitted.
+        sharp: the same with a higher cut-off, for delays.
+        logged_spread: standard deviations of the torques as logged while the joints move (n,), zero for a joint that is
+            not fitted.
     """
 
-    def __init__(self, cleaned: Cleaned, smoothed: Smoothed, rows: Rows) -> None:
-        self.robot, self.rows, self.logged_spread = cleaned.robot, rows, cleaned.spread
-        self._smoothed = smoothed
-        self._joints = np.flatnonzero(self.logged_spread > 0)
+    def __init__(self, cleaned: Cleaned, smoothed: Smoothed, rows: Rows, sharp: Rows) -> None:
+        self.robot, self.rows, self.sharp, self._smoothed = cleaned.robot, rows, sharp, smoothed
+        self._joints = np.flatnonzero(cleaned.spread > 0)
+        self.logged_spread = np.zeros(self.robot.n)
+        self.logged_spread[self._joints] = [rows.spread(j, raw=True) for j in self._joints.tolist()]
 
     @cached_property
     def fits(self) -> tuple[JointFit | None, ...]:
@@ -47,58 +49,32 @@ class Fitted:
         )
 
     @cached_property
-    def spread(self) -> Array:
-        """Standard deviations of the smoothed torques (n,), zero for a joint that is not fitted."""
-        return np.array([self.rows.torque(j).std() if self.logged_spread[j] > 0 else 0.0 for j in range(self.robot.n)])
-
-    @cached_property
-    def moments(self) -> Blocks:
-        """Normal equations of the smoothed torques."""
-        return self.rows.moments(self._joints)
-
-    @cached_property
-    def whole(self) -> WholeFit:
-        """The fit of all joints together to the smoothed torques."""
-        return fit_all(self.moments, self.spread)
-
-    @cached_property
     def unexplained(self) -> Array:
         """Held-out error of all joints together over the torque's standard deviation (n,), NaN without a fit.
 
-        With torques as logged: smoothing would remove the noise that hides the torque of a joint. Without rows at rest.
+        With torques as logged: smoothing would remove the noise that hides the torque of a joint.
         """
-        return fit_all(self.rows.moments(self._joints, raw=True, moving=True), self.logged_spread).unexplained
+        return fit_all(self.rows.moments(self._joints, raw=True), self.logged_spread).unexplained
 
     @cached_property
     def dynamic_gain(self) -> Array:
         """Decrease of the held-out error (log) by velocities and accelerations (n,), NaN without a fit.
 
-        On some rows only, for torques as logged, without rows at rest.
+        On some rows only, for torques as logged.
         """
         errors = []
         for static in (False, True):
             rows = Rows.of(self.robot, self.rows.excerpts, CHOICE_ROWS, static=static)
-            errors.append(fit_all(rows.moments(self._joints, raw=True, moving=True), self.logged_spread).unexplained)
+            errors.append(fit_all(rows.moments(self._joints, raw=True), self.logged_spread).unexplained)
         dynamic, still = np.maximum(errors, 1e-9)
         return np.asarray(np.log(still / dynamic))
 
     @cached_property
-    def sign_costs(self) -> Array:
-        """Increase of the cost of `whole` with the opposite sign of each torque (n,); zero for a single joint."""
-        if len(self._joints) < 2:
-            return np.zeros(self.robot.n)
-        signs = 1.0 - 2.0 * np.eye(self.robot.n)
-        return np.array([fit_all(self.moments.scaled(sign), self.spread).cost for sign in signs]) - self.whole.cost
-
-    @cached_property
     def delays(self) -> tuple[Delay | None, ...]:
         """Delay of each joint's torque (n), None of a joint whose torque the motion does not explain."""
-        sharp = self._smoothed.choice.sharp
-        assert sharp is not None
+        sharp = self.sharp
         fits = {
-            j: fit if sharp is self.rows and not sharp.rest[:, j].any() else sharp.fit(j, moving=True)
-            for j, fit in enumerate(self.fits)
-            if fit is not None and self.unexplained[j] < HOPELESS
+            j: sharp.fit(j) for j, fit in enumerate(self.fits) if fit is not None and self.unexplained[j] < HOPELESS
         }
         period, cutoff = self._smoothed.period, self._smoothed.choice.sharp_cutoff
         return tuple(estimate_delays(sharp, fits, period, cutoff, self.unexplained))

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from estimation.gate.measurements.clock_steps import ClockSteps, find_clock_steps
 from estimation.gate.measurements.columns import Columns
+from estimation.gate.measurements.held_torque import between_updates, find_updates
 from estimation.gate.measurements.hung_columns import Hang, cut_hangs, find_hangs
 from estimation.gate.measurements.late_rows import CorrectedTimes, correct_times
 from estimation.gate.measurements.motion import moving_rows, standing_joints
@@ -61,9 +62,17 @@ class Recorded:
 
     @cached_property
     def log(self) -> Log:
-        """The log with corrected times and unwrapped angles."""
+        """The log with corrected times, unwrapped angles, and torques between their updates."""
         log = self.unwrapped
-        return log if self.times.t is self.original.t else replace(log, t=self.times.t)
+        log = log if self.times.t is self.original.t else replace(log, t=self.times.t)
+        return between_updates(log, self.updates)
+
+    @cached_property
+    def updates(self) -> Rows:
+        """Rows in which the torques are updated, where others repeat them."""
+        columns = Columns.of(self.unwrapped)
+        copied = len(find_repeated_rows(self.unwrapped, columns, moving_rows(self.unwrapped, columns)).copies)
+        return np.zeros(0, dtype=np.intp) if copied else find_updates(columns)
 
     @cached_property
     def timing(self) -> Timing:

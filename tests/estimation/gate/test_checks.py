@@ -23,6 +23,7 @@ ORDER = {
         "sampling",
         "late_rows",
         "repeated_rows",
+        "held_torques",
         "stuck_columns",
         "resolution",
         "wrapped_angles",
@@ -34,14 +35,13 @@ ORDER = {
         "travel",
         "jumps",
     ],
-    Stage.CLEANED: ["impossible_values"],
-    Stage.SMOOTHED: ["position_units", "speeds", "velocity_columns", "too_few_smoothed_rows"],
+    Stage.CLEANED: ["position_units", "impossible_values"],
+    Stage.SMOOTHED: ["speeds", "velocity_columns", "too_few_smoothed_rows"],
     Stage.FITTED: [
         "few_rows_per_parameter",
         "likely_causes",
+        "unloaded_rest",
         "torque_signs",
-        "torque_units",
-        "joint_directions",
         "excitation",
         "undetermined",
         "torque_sizes",
@@ -129,7 +129,7 @@ def coverage():
 def test_an_own_check_takes_part(er3a, good, coverage):
     """A registered check finds its faults beside the built-in ones, with their severities sorted together."""
     log = good()
-    report = check_log(er3a, Log(1e3 * log.t, log.q * np.array([1, 0.2, 1, 1, 1, 1]), tau=log.tau))
+    report = check_log(er3a, Log(log.t, log.q * np.array([1, 0.2, 1, 1, 1, 1]), tau=-log.tau))
     (finding,) = (each for each in found(report, "coverage") if each.joint == 2)
     assert finding.severity == "warning"
     assert report.findings[0].severity == "refuse"

@@ -1,0 +1,77 @@
+"""An arm that stands against gravity with hardly any torque: its brakes are closed, or its drives are off."""
+
+from __future__ import annotations
+
+from typing import ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from estimation.gate.check import Check
+from estimation.gate.context import Context, Stage
+from estimation.gate.finding import Finding
+from estimation.gate.quick_fits.gravity_rows import gravity_rows
+from estimation.gate.quick_fits.joint_columns import OWN
+from estimation.gate.stages.fitted import Fitted
+from robots.common.plain import joints_in_words, two_digits
+from robots.common.stretches import spans
+
+Array = NDArray[np.float64]
+
+# Share of the fitted weight that the torque at rest has at most, and of the largest torque that this weight has at
+# least.
+UNLOADED, HEAVY = 0.1, 0.2
+# Stretches that are listed.
+LISTED = 3
+
+
+class UnloadedRest(Check):
+    """Names the stretches in which the torque at rest is about zero, against gravity. They count in no fit."""
+
+    name: ClassVar[str] = "unloaded_rest"
+    stage: ClassVar[Stage] = Stage.FITTED
+    order: ClassVar[int] = 18
+
+    def run(self, context: Context) -> list[Finding]:
+        """Compares the torques at rest with the weight that the fit of the motion gives."""
+        fitted = context.fitted
+        weight = _static_torques(fitted)
+        tau = np.column_stack([fitted.rows.raw(j) for j in range(fitted.robot.n)])
+        rest = fitted.rows.rest & (np.abs(weight) > HEAVY * np.abs(tau).max(axis=0)) & (weight != 0)
+        unloaded = rest & (np.abs(tau) < UNLOADED * np.abs(weight))
+        joints = [j for j in range(fitted.robot.n) if unloaded[:, j].sum() > 0.5 * rest[:, j].sum() > 0]
+        if not joints:
+            return []
+        t = np.concatenate([part.t for part in fitted.rows.excerpts]) - context.recorded.log.t[0]
+        times = [f"{t[a]:.3g} to {t[b - 1]:.3g} s" for a, b in spans(unloaded[:, joints].any(axis=1)) if b - a > 1]
+        where = ", ".join(times[:LISTED]) + (f" and {len(times) - LISTED} times more" if len(times) > LISTED else "")
+        most = [float(np.abs(weight[unloaded[:, j], j]).max()) for j in joints]
+        return [
+            Finding(
+                name="unloaded_rest",
+                severity="info",
+                text=f"the torque of {joints_in_words(j + 1 for j in joints)} is about 0 while the arm stands against "
+                f"gravity ({', '.join(map(two_digits, most))} N m; from {where}): the brakes are closed or the drives "
+                "off",
+                action="these rows are left out, as all rows at rest",
+                value=max(most),
+                unit="N m",
+            )
+        ]
+
+
+def _static_torques(fitted: Fitted) -> Array:
+    """Gives the torque of gravity and offset (M, n) by the fits of the joints, as far as friction cannot hold it.
+
+    It is zero for a joint without a fit.
+    """
+    rows, robot = fitted.rows, fitted.robot
+    heavy = np.einsum("jmkp,k->jmp", gravity_rows(robot, rows.q), np.asarray(robot.chain.gravity))
+    torques = np.zeros(rows.q.shape)
+    for joint, fit in enumerate(fitted.fits):
+        if fit is not None:
+            values = fit.values / fit.scale
+            coulomb, offset = abs(values[-OWN + 1]), values[-1]
+            torque = heavy[joint][:, fit.used] @ values[:-OWN] + offset
+            torques[:, joint] = np.sign(torque) * np.maximum(np.abs(torque) - coulomb, 0.0)
+    return torques
