@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -74,29 +73,14 @@ def repair_log(robot: Robot, log: Log, which: str) -> RepairedLog:
     """
     log = as_joint_torque(robot, log)
     gate = check_log(robot, log)
-    sizes = [f for f in gate.findings if f.name == "unit_of_torque" and f.joint is not None]
-    strange = 2 * len(sizes) >= max(robot.n, 3)
-    tolerated = TOLERATED - {"unit_of_torque"} if strange else TOLERATED
-    replace(gate, findings=tuple(f for f in gate.findings if f.name not in tolerated)).raise_if_refused()
-    notes = [_SIZES.format(which, len(sizes), robot.n, _range([f.value for f in sizes]))] if strange else []
-    notes += [
+    replace(gate, findings=tuple(f for f in gate.findings if f.name not in TOLERATED)).raise_if_refused()
+    notes = [
         f"{which}{_BY_FIT if finding.name in TOLERATED else ''}: {finding}."
         for finding in gate.findings
         if _is_reported(finding)
     ]
     log = gate.corrected(log)
     return RepairedLog(_stretches(interpolated(log) if len(gate.spikes) else log, gate), tuple(notes))
-
-
-_SIZES = (
-    "{}: the torques of {} of {} joints are {} times those of the robot's description. Check torque units and gear "
-    "ratios first (a mapping states them); otherwise the description is wrong by this factor."
-)
-
-
-def _range(values: Sequence[float]) -> str:
-    low, high = (f"{float(f'{value:.2g}'):g}" for value in (min(values), max(values)))
-    return low if low == high else f"{low} to {high}"
 
 
 def _is_reported(finding: Finding) -> bool:

@@ -117,9 +117,11 @@ def _finding(robot: Robot, best: Hypothesis) -> Finding:
         where = "on some joints" if some else "on all joints"
         if (gears > GEARED).all():
             stated = ", ".join(f"{gear:.4g}" for gear in gears)
-            return _meaning(
+            finding = _meaning(
                 best, f"the torque of the motor {where}: {why} (gears {stated})", f"--torque-is motor{some}"
             )
+            # No description is wrong by the gear ratio at each joint.
+            return replace(finding, severity="refuse") if best.odds > CERTAIN and not some else finding
         about = ", ".join(two_digits(1 / factor) for factor in best.factors)
         option = f"gear_ratio in the robot's description, and --torque-is motor{some}"
         return _meaning(best, f"the torque of the motor {where}: {why} (gears of about {about})", option)

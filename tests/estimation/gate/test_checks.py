@@ -44,7 +44,6 @@ ORDER = {
         "torque_signs",
         "excitation",
         "undetermined",
-        "torque_sizes",
         "torque_meanings",
         "delays",
     ],
