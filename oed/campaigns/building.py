@@ -22,6 +22,7 @@ from oed.campaigns.timetable import make_timetable
 from oed.experiments import Design, LimitOptions, SearchOptions, usable_limits
 from oed.experiments import design as design_experiment
 from oed.experiments.checks import velocity_share
+from oed.experiments.safety_checks.freedom import freedom_of
 from oed.trajectories import PiecewisePolynomial
 from robots.collision import Surroundings
 from robots.common.errors import InputError
@@ -138,13 +139,14 @@ def campaign(
             stages += fitted
             notes += remarks
         stages = [checked(stage, robot, home, torque) for stage in stages]
+        stages = [replace(stage, freedom=freedom_of(bodies, stage.motion)) for stage in stages]
         slots = make_timetable(plan, {stage.name: len(stage.motion) for stage in stages}, robot.period)
         known = thermal or known_thermal(robot, ambient=ambient)
         if known is not None and len(known.models) != robot.n:
             raise InputError(f"{len(known.models)} thermal models", allowed=f"{robot.n}, one per joint")
         if known is not None:
             known = replace(known, models=tuple(replace(model, ambient=ambient) for model in known.models))
-        notes += campaign_notes(stages, planner, known, bodies)
+        notes += campaign_notes(stages, planner, known)
     finally:
         listener.finish()
     return Campaign(

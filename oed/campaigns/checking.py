@@ -9,7 +9,6 @@ from numpy.typing import NDArray
 
 from oed.campaigns.stages import Stage
 from oed.trajectories.sequence import ACCELERATION_TOLERANCE, POSITION_TOLERANCE, VELOCITY_TOLERANCE
-from robots.collision import CollisionModel
 from robots.common.errors import InfeasibleError, InputError
 from robots.limits import Margin, symmetric_margins
 from robots.regressor import TorqueModel, default_model
@@ -20,9 +19,6 @@ Array = NDArray[np.float64]
 
 COULOMB_SCALE = 1e-3
 """Speed below which Coulomb friction fades [rad/s], as in the virtual robot."""
-
-CLEARANCE_STEP = 5
-"""Of so many samples one is looked at for collisions: at 4 ms a joint at 400 deg/s moves by 8 deg between them."""
 
 
 class TorqueCheck:
@@ -119,21 +115,3 @@ def require_rest(stage: Stage, home: Array) -> None:
                     joint=int(off.argmax()) + 1,
                     allowed=f"{tolerance:g}",
                 )
-
-
-def closest_bodies(bodies: CollisionModel, motion: Motion) -> tuple[str, float, float] | None:
-    """Looks for the smallest clearance between the robot's own bodies and its stated surroundings.
-
-    Args:
-        bodies: of the robot, and what stands around it.
-        motion: looked at in every fifth sample.
-
-    Returns:
-        The pair's name, its clearance [m], negative where bodies overlap, and when [s]; None without any pair.
-    """
-    if not bodies.names:
-        return None
-    rows = slice(None, None, CLEARANCE_STEP)
-    clearance = np.asarray(bodies.clearance(motion.q[rows]))
-    row, pair = (int(index) for index in np.unravel_index(clearance.argmin(), clearance.shape))
-    return bodies.names[pair], float(clearance[row, pair]), float(motion.t[rows][row])

@@ -6,47 +6,37 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from oed.campaigns.checking import closest_bodies
 from oed.campaigns.planning import ALIGNED, Planner
 from oed.campaigns.stages import Stage
-from robots.collision import CollisionModel
+from oed.experiments.safety_checks.freedom import collides, freedom_text
 from robots.thermal import KnownThermal
 
 SHOWN_REDUCTION = 0.99
 """Part of what was asked below which a joint's warm-up range counts as narrowed."""
 
 
-def campaign_notes(
-    stages: Sequence[Stage], planner: Planner, known: KnownThermal | None, bodies: CollisionModel
-) -> tuple[str, ...]:
+def campaign_notes(stages: Sequence[Stage], planner: Planner, known: KnownThermal | None) -> tuple[str, ...]:
     """Lists changes, missing checks, and collisions or small margins of the stages.
 
     Args:
         stages: the stages, with their margins.
         planner: that planned them.
         known: the thermal models, if there are any.
-        bodies: what should stay apart.
 
     Returns:
         Sentences, collisions first.
     """
-    collisions = [remark for stage in stages for remark in _collisions(stage, bodies)]
+    collisions = [remark for stage in stages for remark in _collisions(stage)]
     others = [remark for stage in stages for remark in _notes(stage, planner)]
     return (*collisions, *others, *_unknown(planner, known))
 
 
-def _collisions(stage: Stage, bodies: CollisionModel) -> Iterator[str]:
-    closest = closest_bodies(bodies, stage.motion)
-    if closest is None or closest[1] >= 0.0:
-        return
-    pair, clearance, time = closest
-    remedy = "Check it before playing."
-    if stage.kind == "excitation":
-        remedy = "Design it again with `oed design`, which avoids collisions."
-    yield (
-        f"COLLISION in the {stage.name} stage: in the collision model {pair} overlap by "
-        f"{-1e3 * clearance:.0f} mm at {time:.1f} s. {remedy}"
-    )
+def _collisions(stage: Stage) -> Iterator[str]:
+    if collides(stage.freedom):
+        remedy = "Check it before playing."
+        if stage.kind == "excitation":
+            remedy = "Design it again with `oed design`, which avoids collisions."
+        yield f"COLLISION in the {stage.name} stage: {freedom_text(stage.freedom)} {remedy}"
 
 
 def _notes(stage: Stage, planner: Planner) -> Iterator[str]:

@@ -18,6 +18,7 @@ from oed.campaigns.heat import Temperatures, expected_temperatures, stage_heat
 from oed.campaigns.programme import Programme
 from oed.campaigns.stages import Stage
 from oed.campaigns.timetable import Slot
+from oed.experiments.safety_checks.freedom import freedom_text
 from oed.experiments.safety_checks.margins import assumed_values
 from oed.exports import read_trajectory, write_trajectory
 from robots.collision import Surroundings
@@ -228,7 +229,12 @@ class Campaign:
         folder = Path(folder)
         digests, name = {}, self.robot.origin or self.robot.name
         for stage in self.stages:
-            metadata = {"robot": name, "stage": stage.name, "tool": f"robot-oed {VERSION}"}
+            metadata = {
+                "robot": name,
+                "stage": stage.name,
+                "tool": f"robot-oed {VERSION}",
+                "collisions": freedom_text(stage.freedom),
+            }
             write_trajectory(folder / stage.file, stage.motion, metadata, kinds=self.robot.chain.kinds, force=force)
             digests[stage.name] = sha256(folder / stage.file)
         text = json.dumps(self.to_dict(digests), indent=2, allow_nan=False) + "\n"

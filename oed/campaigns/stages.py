@@ -32,6 +32,7 @@ class Stage:
             friction stage.
         details: what else is worth knowing of it, as plain data.
         margins: the closest approach to each limit, by its own samples.
+        freedom: of collisions, as `collision_data` writes it; None where they were not checked.
 
     Raises:
         InputError: an unknown kind, or a motion that is not uniform in time from zero.
@@ -44,6 +45,7 @@ class Stage:
     plateaus: tuple[Mapping[str, Any], ...] = ()
     details: Mapping[str, Any] = field(default_factory=dict)
     margins: tuple[Margin, ...] = ()
+    freedom: Mapping[str, Any] | None = None
 
     def __post_init__(self) -> None:
         if self.kind not in STAGE_KINDS:
@@ -84,6 +86,7 @@ class Stage:
             "plateaus": [dict(plateau) for plateau in self.plateaus],
             "details": dict(self.details),
             "smallest_margins": [margin_data(margin, limits) for margin in self.margins],
+            "collision": None if self.freedom is None else dict(self.freedom),
         }
 
     @classmethod
@@ -98,4 +101,5 @@ class Stage:
             plateaus=tuple(data["plateaus"]),
             details=data["details"],
             margins=margins,
+            freedom=data.get("collision"),
         )

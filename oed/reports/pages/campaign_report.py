@@ -3,18 +3,16 @@
 from __future__ import annotations
 
 from itertools import groupby
-from warnings import catch_warnings, simplefilter
 
 import numpy as np
 
 from oed.campaigns import Campaign, Slot, Stage
-from oed.campaigns.checking import closest_bodies
+from oed.experiments.safety_checks.freedom import collides, freedom_text
 from oed.reports.pages.motions.assumption_findings import assumption_findings
 from oed.reports.pictures.campaign_pictures import temperature_picture, velocity_picture
 from oed.reports.rendering.page import Cell, Fact, Finding, Page, Section, Table, findings_of
 from oed.reports.rendering.provenance import footer
 from oed.reports.rendering.saving import save_page
-from robots.common.errors import AssumedValueWarning
 from robots.common.files import ResultFolder
 
 
@@ -101,13 +99,8 @@ def _findings(campaign: Campaign) -> tuple[Finding, ...]:
     ]
     colliding = []
     for stage in campaign.stages:
-        with catch_warnings():
-            # The first screen has assumed values as a finding.
-            simplefilter("ignore", AssumedValueWarning)
-            closest = closest_bodies(campaign.surroundings.model(campaign.robot), stage.motion)
-        if closest is not None and closest[1] < 0.0:
-            pair, clearance, time = closest
-            text = f"in the collision model {pair} overlap by {-1e3 * clearance:.0f} mm at {time:.1f} s."
+        if collides(stage.freedom):
+            text = freedom_text(stage.freedom)
             action = (
                 "Design it again with oed design, which avoids collisions."
                 if stage.kind == "excitation"

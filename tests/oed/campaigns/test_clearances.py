@@ -14,6 +14,7 @@ from oed.campaigns.checking import TorqueCheck
 from oed.campaigns.clearances import CollisionFreeRanges
 from oed.campaigns.planning import Planner
 from oed.experiments import Design
+from oed.experiments.safety_checks.freedom import is_free
 from oed.trajectories import Segment
 from robots.collision import Box, CoalChecker, Scene, check_motion, collision_model
 from robots.loading import load_robot
@@ -85,6 +86,7 @@ def test_planned_stages_are_proved_free(thesis_campaign: Campaign) -> None:
     for stage in thesis_campaign.stages:
         if stage.kind != "excitation":
             assert check_motion(model, stage.motion, confirm=False).certified, stage.name
+            assert is_free(stage.freedom), stage.name
             assert CoalChecker(model).clearance(stage.motion.q[::SPARSE]).min() > 0.0
     assert any("To avoid collisions" in note for note in thesis_campaign.notes)
 

@@ -11,7 +11,9 @@ import pytest
 
 import oed
 from oed.campaigns import Campaign, Programme, friction_power
+from oed.experiments.safety_checks.freedom import is_free
 from oed.exports import read_trajectory
+from oed.exports.trajectory_checks import stated_collisions
 from robots.common.errors import InfeasibleError
 from robots.plants import nominal_plant
 from robots.robot import Robot
@@ -34,6 +36,14 @@ def test_every_file_keeps_all_limits(saved: Path, er3a: Robot, name: str) -> Non
     plant = nominal_plant(er3a)
     tau = plant.model.torque(motion.q, motion.dq, motion.ddq, plant.parameters)
     assert np.all(np.abs(tau) <= 0.9 * limits.torque * (1 + 1e-9))
+
+
+def test_every_file_states_its_check_for_collisions(saved: Path, thesis_campaign: Campaign) -> None:
+    """A file of a stage says what `stream` and the exports must know: whether its motion was proved free."""
+    for stage in thesis_campaign.stages:
+        text, free = stated_collisions(read_trajectory(saved / stage.file)[1])
+        assert free == is_free(stage.freedom), text
+        assert "NOT CHECKED" not in text
 
 
 @pytest.mark.parametrize("name", STAGES)
