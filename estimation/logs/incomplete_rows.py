@@ -95,7 +95,7 @@ def _timed_rows(table: Table) -> tuple[NDArray[np.bool_], Notes]:
     timed = ~np.isnan(t)
     zero = t == 0.0
     others = t[timed & ~zero]
-    if zero.any() and len(others) > 1 and zero.sum() < len(others) and (np.diff(others) > 0).all():
+    if zero.any() and len(others) > 1 and zero.sum() < len(others) and (others[1:] > others[:-1]).all():
         # A log may start at 0, but then its other times are not seconds since 1970; or count down to 0 and on.
         at_start = np.cumsum(timed & ~zero) == 0
         before = others[np.maximum(np.cumsum(timed & ~zero) - 1, 0)]

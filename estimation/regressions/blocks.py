@@ -113,10 +113,14 @@ class Blocks:
 
     def squares(self, values: Array) -> Array:
         """Sums each joint's squared errors (n,) over the blocks, each predicted by its own parameters (B, p)."""
+        return np.asarray(self.squares_by_block(values).sum(axis=1))
+
+    def squares_by_block(self, values: Array) -> Array:
+        """Sums each joint's squared errors in each block (n, B), predicted by its own parameters (B, p)."""
         columns = values[:, :, None]
         quadratic = (values[:, None, :] @ (self.gram @ columns))[..., 0, 0]
         linear = (self.cross[:, :, None, :] @ columns)[..., 0, 0]
-        return np.asarray(np.maximum(self.square - 2 * linear + quadratic, 0.0).sum(axis=1))
+        return np.asarray(np.maximum(self.square - 2 * linear + quadratic, 0.0))
 
 
 @dataclass(frozen=True, eq=False)

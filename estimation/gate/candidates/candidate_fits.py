@@ -15,7 +15,7 @@ from estimation.gate.quick_fits.excerpts import Excerpt
 from estimation.gate.quick_fits.gravity_rows import gravity_rows
 from estimation.gate.quick_fits.joint_columns import OWN
 from estimation.gate.quick_fits.joint_fit import Rows
-from estimation.gate.quick_fits.whole_fit import RIDGES, fit_all
+from estimation.gate.quick_fits.whole_fit import RIDGES, WholeFit, fit_all
 from estimation.gate.stages.fitted import Fitted
 from robots.robot import Robot
 
@@ -132,11 +132,11 @@ class CandidateFits:
             few: on few rows with one ridge, for a first choice.
         """
         most, ridges = (FEW_ROWS, (RIDGE,)) if few else (CHOICE_ROWS, RIDGES)
-        return mean_log(self._errors(meaning, most, ridges))
+        return mean_log(self._fit(meaning, most, ridges).unexplained)
 
-    def unexplained(self, meaning: Meaning) -> Array:
-        """Gives the held-out error of each joint (n,), NaN without a fit."""
-        return self._errors(meaning, CHOICE_ROWS, RIDGES)
+    def fit(self, meaning: Meaning) -> WholeFit:
+        """Gives the held-out error of each joint, whole and in each fold."""
+        return self._fit(meaning, CHOICE_ROWS, RIDGES)
 
     def described_gravity(self) -> Array | None:
         """Estimates gravity (3,) [m/s2] from the described links, with free friction, offset and rotor inertia.
@@ -181,12 +181,12 @@ class CandidateFits:
         )
         return direction(found.x)
 
-    def _errors(self, meaning: Meaning, most: int, ridges: tuple[float, ...]) -> Array:
+    def _fit(self, meaning: Meaning, most: int, ridges: tuple[float, ...]) -> WholeFit:
         rows = self._meant(meaning, most)
         # Torques of coupled axes count by the spread of the logged ones: the same numbers are compared.
         spread = self._spread if meaning.tau_from is None else self._spread[meaning.tau_from]
         spread = spread if meaning.tau_factor is None else spread * np.abs(meaning.tau_factor)
-        return fit_all(rows.moments(np.flatnonzero(spread > 0), raw=True), spread, ridges).unexplained
+        return fit_all(rows.moments(np.flatnonzero(spread > 0), raw=True), spread, ridges)
 
     def _meant(self, meaning: Meaning, most: int) -> Rows:
         """Gives some rows as they are meant; the last ones with other positions or another gravity are kept."""

@@ -31,7 +31,9 @@ DOUBTFUL = 0.2
 FOLLOWED, SNAP = 0.01, 0.02
 # Least decrease of the held-out error (mean log) by another gravity or unit of all torques, and by other columns. Right
 # simulated logs, with descriptions that are 20 % off, stay below 0.05, and measured ones below 0.35.
-BETTER, CERTAIN = 0.15, 0.4
+BETTER, OTHER_COLUMNS = 0.15, 0.4
+# Standard errors of the gain, over the folds, from which another meaning is certain.
+SURE = 5.0
 # A log is of another robot if so many joints, one of them doubtful, have less than this share of their error with a
 # model of any arm.
 JOINTS, HALF = 2, 0.5
@@ -41,8 +43,8 @@ class LikelyCauses(Check):
     """Fits the log under other meanings, and reports the one that explains the torques best.
 
     All meanings are compared by the same number: the held-out error of all joints together. A log is refused only if
-    it does not fit as it is, and every joint fits well with the other meaning. The checks that follow see the log as it
-    is meant.
+    it does not fit as it is, and every joint fits well with the other meaning, in all parts of the log. The checks that
+    follow see the log as it is meant.
     """
 
     name: ClassVar[str] = "likely_causes"
@@ -52,7 +54,8 @@ class LikelyCauses(Check):
     def run(self, context: Context) -> list[Finding]:
         """Reports at most one cause."""
         fits = CandidateFits(context.logged)
-        before = fits.unexplained(Meaning())
+        logged = fits.fit(Meaning())
+        before = logged.unexplained
         doubtful = mean_log(before) > np.log(WELL) or float(np.nanmax(before, initial=0.0)) > DOUBTFUL
         if mean_log(before) < np.log(VERY_WELL) and not doubtful:
             return []
@@ -60,25 +63,32 @@ class LikelyCauses(Check):
         if doubtful:
             bad = np.flatnonzero(before > DOUBTFUL).tolist()
             # A wrong sign may show at the joints that share the links.
-            causes += [
-                *signs(context.robot, np.flatnonzero(np.isfinite(before)).tolist()),
-                *torque_units(context.robot),
-            ]
+            causes += signs(context.robot, np.flatnonzero(np.isfinite(before)).tolist())
             causes += [_ordered(fits, mean_log(before), bad), *units(context.robot, bad), *coupled(fits, bad)]
             causes += [*torque_units(context.robot), *_sizes(context)]
         found = _best(fits, causes, mean_log(before))
         found = None if found is None else _refined(fits, found)
         best = Meaning() if found is None else found.meaning
-        after = np.minimum(fits.unexplained(best), 1.0)
+        meant = fits.fit(best)
+        after = np.minimum(meant.unexplained, 1.0)
         if (other := _other_robot(context, best, after)) is not None:
             return [other]
         if found is None:
             return []
         context.meaning = found.meaning
-        before, judged = np.minimum(before, 1.0), np.isfinite(after)
-        better = mean_log(before) - mean_log(after)
-        certain = better > CERTAIN and bool((before > DOUBTFUL).any() and (after[judged] < WELL).all())
+        better = mean_log(np.minimum(before, 1.0)) - mean_log(after)
+        misfit = float(np.nanmax(before)) > DOUBTFUL or better > -np.log(HALF)
+        certain = misfit and float(np.nanmax(after)) < WELL and _better_everywhere(logged.by_fold, meant.by_fold)
         return cause_findings(context.robot, context.cleaned.columns.prefix, found, better, certain)
+
+
+def _better_everywhere(before: Array, after: Array) -> bool:
+    """Whether the errors of the joints in the folds (n, F) become smaller by much more than the folds differ."""
+    gains = np.log(np.maximum(before, 1e-9)) - np.log(np.maximum(after, 1e-9))
+    known = np.isfinite(gains)
+    mean = np.where(known, gains, 0.0).sum(axis=0) / np.maximum(known.sum(axis=0), 1)
+    mean = mean[known.any(axis=0)]
+    return len(mean) > 1 and float(mean.mean()) > SURE * float(mean.std(ddof=1)) / np.sqrt(len(mean))
 
 
 def _other_robot(context: Context, best: Meaning, left: Array) -> Finding | None:
@@ -168,7 +178,7 @@ def _best(fits: CandidateFits, causes: list[Cause], before: float) -> Cause | No
     found, lowest = None, np.inf
     for place in np.argsort(few)[:3]:
         after = fits.cost(causes[place].meaning)
-        least = BETTER if causes[place].kind in ("gravity", "weightless", "torque_unit") else CERTAIN
+        least = BETTER if causes[place].kind in ("gravity", "weightless", "torque_unit") else OTHER_COLUMNS
         if before - after > least and after < lowest:
             found, lowest = causes[place], after
     weightless = [cause for cause in causes if cause.kind == "weightless"]

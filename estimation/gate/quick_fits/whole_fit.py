@@ -32,11 +32,11 @@ class WholeFit:
 
     Attributes:
         unexplained: held-out error over the standard deviation of the torque (n,), NaN for a joint that is not fitted.
-        cost: mean over the joints of the log of the residual's variance.
+        by_fold: the same in each fold (n, F), NaN where it has no rows.
     """
 
     unexplained: Array
-    cost: float
+    by_fold: Array
 
 
 def fit_all(blocks: Blocks, spread: Array, ridges: Sequence[float] = RIDGES) -> WholeFit:
@@ -54,14 +54,15 @@ def fit_all(blocks: Blocks, spread: Array, ridges: Sequence[float] = RIDGES) -> 
     for _ in range(ROUNDS):
         variance = np.maximum(total.residual(total.solve(weights, RIDGES[1])) / rows, floor)
         weights = np.where(used, 1.0 / variance, 0.0)
-    best = np.full(len(spread), np.inf)
-    ridge, lowest = ridges[0], np.inf
+    best, lowest = np.full(blocks.square.shape, np.inf), np.inf
+    scale = np.where(used, spread, np.inf)
     for candidate in ridges:
-        error = blocks.squares(blocks.without(weights, candidate, None))
-        relative = np.sqrt(error / rows) / np.where(used, spread, np.inf)
+        errors = blocks.squares_by_block(blocks.without(weights, candidate, None))
+        relative = np.sqrt(errors.sum(axis=1) / rows) / scale
         cost = float(np.mean(np.log(np.clip(relative[used], 1e-9, 1.0)))) if used.any() else 0.0
         if cost < lowest - LOWER:
-            lowest, ridge, best = cost, candidate, relative
-    variance = np.maximum(total.residual(total.solve(weights, ridge)) / rows, floor)
-    cost = float(np.mean(np.log(variance[used]))) if used.any() else 0.0
-    return WholeFit(np.where(used, best, np.nan), cost)
+            lowest, best = cost, errors
+    unexplained = np.sqrt(best.sum(axis=1) / rows) / scale
+    with np.errstate(invalid="ignore", divide="ignore"):
+        by_fold = np.where(blocks.count > 0, np.sqrt(best / blocks.count) / scale[:, None], np.nan)
+    return WholeFit(np.where(used, unexplained, np.nan), np.where(used[:, None], by_fold, np.nan))
