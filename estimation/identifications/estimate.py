@@ -187,6 +187,10 @@ class Estimate:
         lines += [f"  {warning}" for warning in self.warnings]
         return "\n".join(lines)
 
+    def conf_int(self, level: float = 0.95) -> pd.DataFrame:
+        """Gives the confidence interval of each parameter, see `Model.conf_int`."""
+        return self.model.conf_int(level)
+
     def to_frame(self) -> pd.DataFrame:
         """Gives a row per parameter, see `Model.to_frame`."""
         return self.model.to_frame()

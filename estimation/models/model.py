@@ -15,6 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 from estimation.logs.known_setup import require_known
 from estimation.models.extension import Extension, extension_torque, read_extension, read_gear_load, write_gear_load
 from estimation.models.robot_in_file import build_robot, describe_robot, require_described
+from estimation.uncertainty.quantiles import normal_quantile
 from robots.common.errors import InputError
 from robots.common.files import write_atomic
 from robots.regressor import TorqueModel
@@ -154,6 +155,26 @@ class Model:
         cut = any(extension.source.reading is Reading.CUTS for extension in self.extensions)
         extended = extension_torque(self.extensions, state(felt), state(parameters) if cut else None, self.bearing)
         return own + extended[-len(own) :]
+
+    def conf_int(self, level: float = 0.95) -> pd.DataFrame:
+        """Gives the confidence interval of each parameter, by the normal distribution and its standard error.
+
+        Args:
+            level: chance that an interval holds the parameter, between 0 and 1.
+
+        Returns:
+            A row per parameter: lower, upper; infinite where the data do not determine it.
+
+        Raises:
+            InputError: a level outside 0 to 1.
+        """
+        import pandas as pd
+
+        if not 0.0 < level < 1.0:
+            raise InputError(f"confidence level {level:g}", allowed="between 0 and 1")
+        half = normal_quantile(0.5 + level / 2) * self.standard_errors
+        limits = {"lower": self.values - half, "upper": self.values + half}
+        return pd.DataFrame(limits, index=pd.Index(self.names, name="parameter"))
 
     def to_frame(self) -> pd.DataFrame:
         """Gives a row per parameter: joint, value, standard error, percent, unit, determined, formula."""

@@ -4,6 +4,7 @@ import shutil
 
 import numpy as np
 import pytest
+import scipy.stats
 
 from estimation import identify, load_model, predict
 from robots.common.errors import InputError
@@ -89,6 +90,19 @@ def test_undetermined_parameters_have_no_standard_error(estimate):
     frame = model.to_frame()
     assert not frame["determined"].any()
     assert list(frame.index) == list(model.names)
+
+
+@pytest.mark.parametrize("level", [0.5, 0.95])
+def test_confidence_intervals_are_those_of_the_normal_distribution(estimate, level):
+    """An interval is symmetric about its value, and infinite for a parameter that is not determined."""
+    model = estimate.model
+    limits = estimate.conf_int(level)
+    known = model.determined
+    expected = scipy.stats.norm.interval(level, model.values[known], model.standard_errors[known])
+    np.testing.assert_allclose(limits.to_numpy()[known].T, expected, rtol=1e-12)
+    assert np.isinf(limits.to_numpy()[~known]).all()
+    with pytest.raises(InputError, match="confidence level 2"):
+        model.conf_int(2.0)
 
 
 def test_an_existing_file_is_kept(estimate, tmp_path):
