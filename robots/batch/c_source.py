@@ -96,9 +96,33 @@ void batch_sums(long long groups, long long size, const double** in, double** ou
 }
 """
 
+# Only of functions (state, inputs, ...) -> state.
+_STEPS = """
+// The first output is the first input of the next step; the second input has its own rows in each step.
+void batch_steps(long long samples, long long steps, const double** in, double** out) {
+  vec x[%(x_size)d], y[%(y_size)d];
+  const long long k = %(state)d, m = %(driven)d;
+  for (long long start = 0; start < samples; start += W) {
+    const int left = samples - start < W ? (int)(samples - start) : W;
+    gather(x, in, start, 1, left);
+    for (long long step = 0; step < steps; ++step) {
+      for (long long j = 0; j < m; ++j)
+        for (int l = 0; l < W; ++l)
+          x[k + j][l] = in[1][(step * samples + start + (l < left ? l : left - 1)) * m + j];
+      evaluate(x, y);
+      for (long long j = 0; j < k; ++j) x[j] = y[j];
+      for (int l = 0; l < left; ++l)
+        for (long long j = 0; j < k; ++j) out[0][(step * samples + start + l) * k + j] = y[j][l];
+    }
+  }
+}
+"""
+
 
 def c_source(function: casadi.Function) -> str:
     """Writes the C of ``batch_all(samples, inputs, outputs)`` and ``batch_sums(groups, size, inputs, outputs)``.
+
+    That of a step, (state, inputs, ...) -> state, also has ``batch_steps(samples, steps, inputs, states)``.
 
     Args:
         function: a function of SX with dense column vectors as inputs and outputs.
@@ -135,6 +159,13 @@ def c_source(function: casadi.Function) -> str:
         "n_in": len(inputs),
         "n_out": len(outputs),
     }
+    if len(outputs) == 1 and len(inputs) > 1 and outputs[0] == inputs[0]:
+        tail += _STEPS % {
+            "x_size": sum(inputs),
+            "y_size": sum(outputs),
+            "state": inputs[0],
+            "driven": inputs[1],
+        }
     return _HEAD + "\n".join(lines) + "\n" + tail
 
 

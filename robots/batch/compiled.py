@@ -48,6 +48,7 @@ class CompiledFunction(BatchFunction):
         try:
             loaded = ctypes.CDLL(str(library))
             self._all, self._sums = loaded.batch_all, loaded.batch_sums
+            self._steps = getattr(loaded, "batch_steps", None)
         except (OSError, AttributeError) as error:
             raise CompilerError(f"{library} cannot be loaded: {error}") from error
         self._all.restype = self._sums.restype = None
@@ -63,6 +64,11 @@ class CompiledFunction(BatchFunction):
             call(count, *pointers)
 
         return run
+
+    def _run(self, samples: int, arguments: list[Array], inputs: Array, states: Array) -> None:
+        counts = ctypes.c_longlong(samples), ctypes.c_longlong(len(inputs))
+        assert self._steps is not None
+        self._steps(*counts, _pointers([arguments[0], inputs, *arguments[2:]]), _pointers([states]))
 
     def _sum(self, groups: int, size: int, arguments: list[Array], outputs: tuple[Array, ...]) -> None:
         counts = ctypes.c_longlong(groups), ctypes.c_longlong(size)

@@ -1,0 +1,37 @@
+"""Drives: the chain from a position command to the torque at a joint, and robots simulated in their closed loop."""
+
+from __future__ import annotations
+
+from robots.drives.base import DriveParameter, Instant, Member
+from robots.drives.delay import Delay, HeldCommand
+from robots.drives.drive import Drive
+from robots.drives.dynamics import DriveDynamics
+from robots.drives.gear import Armature, Friction, LoadFriction, Offset, PositionFriction, StribeckFriction
+from robots.drives.laws import LAWS, CascadeLaw, PdLaw, ServoLaw, VelocityLaw
+from robots.drives.motor import MotorLimit
+from robots.drives.simulation import Simulated, Start, simulate_drives
+
+__all__ = [
+    "Armature",
+    "CascadeLaw",
+    "Delay",
+    "Drive",
+    "DriveDynamics",
+    "DriveParameter",
+    "Friction",
+    "HeldCommand",
+    "Instant",
+    "LAWS",
+    "LoadFriction",
+    "Member",
+    "MotorLimit",
+    "Offset",
+    "PdLaw",
+    "PositionFriction",
+    "ServoLaw",
+    "Simulated",
+    "Start",
+    "StribeckFriction",
+    "VelocityLaw",
+    "simulate_drives",
+]
