@@ -18,6 +18,7 @@ from pathlib import Path
 import casadi
 
 from robots.batch.base import Array, BatchFunction, row_major
+from robots.batch.building import builds_expressions
 from robots.batch.c_source import c_source
 
 log = logging.getLogger(__name__)
@@ -78,6 +79,7 @@ class CompiledFunction(BatchFunction):
 _SOURCES: OrderedDict[bytes, str] = OrderedDict()
 
 
+@builds_expressions
 def _source(function: casadi.Function) -> str:
     key = hashlib.sha256(function.serialize().encode()).digest()
     source = _SOURCES.pop(key, None) or c_source(row_major(function))

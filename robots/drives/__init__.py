@@ -6,7 +6,7 @@ from robots.drives.base import DriveParameter, Instant, Member
 from robots.drives.delay import Delay, HeldCommand
 from robots.drives.drive import Drive
 from robots.drives.dynamics import DriveDynamics
-from robots.drives.gear import Armature, Friction, LoadFriction, Offset, PositionFriction, StribeckFriction
+from robots.drives.gear import Armature, EndStop, Friction, LoadFriction, Offset, PositionFriction, StribeckFriction
 from robots.drives.laws import LAWS, CascadeLaw, PdLaw, ServoLaw, VelocityLaw
 from robots.drives.motor import MotorLimit
 from robots.drives.simulation import Simulated, Start, simulate_drives
@@ -18,6 +18,7 @@ __all__ = [
     "Drive",
     "DriveDynamics",
     "DriveParameter",
+    "EndStop",
     "Friction",
     "HeldCommand",
     "Instant",

@@ -12,7 +12,15 @@ import numpy as np
 from robots.common.errors import InputError
 from robots.drives.base import DriveParameter, Instant, Member, Values
 from robots.drives.delay import Delay
-from robots.drives.gear import Armature, Friction
+from robots.drives.gear import (
+    Armature,
+    EndStop,
+    Friction,
+    LoadFriction,
+    Offset,
+    PositionFriction,
+    StribeckFriction,
+)
 from robots.drives.motor import MotorLimit
 
 ENCODER = (
@@ -50,16 +58,16 @@ class Drive:
         object.__setattr__(self, "values", MappingProxyType(complete))
 
     @classmethod
-    def usual(cls, law: Member, *more: Member, values: Mapping[str, float] | None = None, curve: bool = False) -> Drive:
-        """Makes a drive of a delay, a law, a limited motor, and a gear with rotor inertia and friction.
+    def usual(cls, law: Member, *, values: Mapping[str, float] | None = None, curve: bool = False) -> Drive:
+        """Makes a drive of a delay, a law, a limited motor, and a gear with all effects; those not stated are zero.
 
         Args:
             law: the control law.
-            *more: further members of the gear.
             values: of the parameters.
             curve: whether the motor's torque falls with its speed.
         """
-        return cls(members=(Delay(), law, MotorLimit(curve), Armature(), Friction(), *more), values=values or {})
+        gear = (Armature(), Friction(), StribeckFriction(), LoadFriction(), PositionFriction(), Offset(), EndStop())
+        return cls(members=(Delay(), law, MotorLimit(curve), *gear), values=values or {})
 
     @property
     def parameters(self) -> tuple[DriveParameter, ...]:
@@ -80,19 +88,6 @@ class Drive:
     def step(self) -> float:
         """Resolution of the command [rad or m]; 0 for a continuous one."""
         return max(member.steps() for member in self.members)
-
-    def has(self, name: str) -> bool:
-        """Whether a member of this name is part of the drive."""
-        return any(member.name == name for member in self.members)
-
-    def with_member(self, member: Member) -> Drive:
-        """Gives the drive with one more member, at the end or in the place of one of the same name."""
-        if self.has(member.name):
-            members = tuple(member if own.name == member.name else own for own in self.members)
-        else:
-            members = (*self.members, member)
-        known = {parameter.name for own in members for parameter in own.parameters()} | {p.name for p in ENCODER}
-        return Drive(members=members, values={name: value for name, value in self.values.items() if name in known})
 
     def with_values(self, values: Mapping[str, float]) -> Drive:
         """Gives the drive with other values."""

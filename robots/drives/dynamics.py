@@ -109,9 +109,21 @@ class DriveDynamics:
         return casadi.Function("balance", [q, dq, ddq, command, state, p], outputs)
 
     @cached_property
-    @builds_expressions
     def step(self) -> BatchFunction:
         """(state (3 n + s), [h, command] (n + 1), p) -> state after a step; it holds q, dq, ddq and drive states."""
+        return batch_function(self._step())
+
+    @cached_property
+    def slopes(self) -> BatchFunction:
+        """(q, dq, ddq, command, state, p) -> residual (n,), its Jacobian by [q, dq, ddq, command, state], by p; rates'.
+
+        The residual includes dry friction. A parameter acts on its own joint alone, except the links' mass factors; so
+        the derivatives by p are (1, P), and those by the n mass factors (n, n).
+        """
+        return batch_function(self._slopes())
+
+    @builds_expressions
+    def _step(self) -> casadi.Function:
         n, s = self.n, len(self.owners)
         state, inputs, p = casadi.SX.sym("x", 3 * n + s), casadi.SX.sym("u", n + 1), casadi.SX.sym("p", self.size)
         q, v, a, own = state[:n], state[n : 2 * n], state[2 * n : 3 * n], state[3 * n :]
@@ -134,16 +146,10 @@ class DriveDynamics:
             velocity = dry_velocities(matrix, right, size, velocity, self.width, last=index == PASSES - 1)
         final = self.balance(q + h / 2 * velocity, velocity, 2 * (velocity - v) / h, command, own, p)[3]
         new = casadi.vertcat(q + h * velocity, 2 * velocity - v, 2 * (velocity - v) / h, own + h * final)
-        return batch_function(casadi.Function("step", [state, inputs, p], [new]))
+        return casadi.Function("step", [state, inputs, p], [new])
 
-    @cached_property
     @builds_expressions
-    def slopes(self) -> BatchFunction:
-        """(q, dq, ddq, command, state, p) -> residual (n,), its Jacobian by [q, dq, ddq, command, state], by p; rates'.
-
-        The residual includes dry friction. A parameter acts on its own joint alone, except the links' mass factors; so
-        the derivatives by p are (1, P), and those by the n mass factors (n, n).
-        """
+    def _slopes(self) -> casadi.Function:
         n, s = self.n, len(self.owners)
         names = ("q", "dq", "ddq", "command")
         inputs = [*(casadi.SX.sym(name, n) for name in names), casadi.SX.sym("s", s), casadi.SX.sym("p", self.size)]
@@ -158,4 +164,4 @@ class DriveDynamics:
         ]
         if s:
             outputs += [casadi.jacobian(rates, moving), casadi.jacobian(casadi.sum1(rates), inputs[5])]
-        return batch_function(casadi.Function("slopes", inputs, [casadi.densify(out) for out in outputs]))
+        return casadi.Function("slopes", inputs, [casadi.densify(out) for out in outputs])

@@ -117,6 +117,29 @@ class PositionFriction(Member):
 
 
 @dataclass(frozen=True)
+class EndStop(Member):
+    """Elastic stops at both ends of the range: torque grows from the position where the joint touches one."""
+
+    name: ClassVar[str] = "end_stop"
+    title: ClassVar[str] = "end stops"
+
+    def parameters(self) -> tuple[DriveParameter, ...]:
+        """Describes the positions of the stops, far away by default, and their stiffness."""
+        return (
+            DriveParameter(name="stop_lower", unit="rad", default=-1e3, lower=-1e4, upper=1e4, size=0.01),
+            DriveParameter(name="stop_upper", unit="rad", default=1e3, lower=-1e4, upper=1e4, size=0.01),
+            DriveParameter(name="stop_stiffness", unit="N m/rad", default=1e3, lower=1.0, size=1e3),
+        )
+
+    def transmit(self, signal: casadi.SX, now: Instant, values: Values) -> casadi.SX:
+        """Builds the torque that is left."""
+        beyond = casadi.fmax(now.measured - values["stop_upper"], 0) + casadi.fmin(
+            now.measured - values["stop_lower"], 0
+        )
+        return signal - values["stop_stiffness"] * beyond
+
+
+@dataclass(frozen=True)
 class Offset(Member):
     """A constant torque, as the term `TorqueOffset` has it: a spring, a cable, or a command off by offset / kp."""
 

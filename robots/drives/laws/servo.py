@@ -1,19 +1,18 @@
-"""Position servo of hobby class: integer steps, a dead band, and a derivative part that is mostly back-EMF."""
+"""Position servo of hobby class, whose command has integer steps."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 from typing import ClassVar
 
-import casadi
-
-from robots.drives.base import DriveParameter, Instant, Member, Values
-from robots.drives.laws.pd import KD, KP
+from robots.drives.laws.pd import PdLaw
 
 
 @dataclass(frozen=True)
-class ServoLaw(Member):
-    """tau = kp e' - kd dq, e' = q_ref - q without the part within the dead band on either side.
+class ServoLaw(PdLaw):
+    """tau = kp e' - kd dq as `PdLaw` has it, of a command that is rounded to steps.
+
+    The derivative part is mostly the motor's back-EMF.
 
     Attributes:
         step: resolution of the command [rad or m], such as 2 pi / 4096; 0 for a continuous one.
@@ -22,16 +21,6 @@ class ServoLaw(Member):
     step: float = 0.0
     name: ClassVar[str] = "servo"
     title: ClassVar[str] = "position servo"
-
-    def parameters(self) -> tuple[DriveParameter, ...]:
-        """Describes gains and dead band."""
-        return KP, KD, DriveParameter(name="dead_band", unit="rad", upper=0.2, size=5e-3)
-
-    def transmit(self, signal: casadi.SX, now: Instant, values: Values) -> casadi.SX:
-        """Builds the torque of a position command."""
-        error, band = signal - now.measured, values["dead_band"]
-        outside = error - casadi.fmax(casadi.fmin(error, band), -band)
-        return values["kp"] * outside - values["kd"] * now.dq
 
     def steps(self) -> float:
         """Returns the resolution of the command."""
