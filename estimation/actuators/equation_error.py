@@ -19,7 +19,7 @@ CUTOFF, HIGHEST = 0.1, 20.0
 """Cut-off as a share of the sampling rate, and its largest value [Hz]: a start needs no more."""
 DELAYS = np.concatenate([np.arange(0.0, 0.02, 0.002), np.arange(0.02, 0.1, 0.005)])
 """Delays that are tried [s]."""
-ROWS = 4000
+ROWS = 2000
 """Rows of the balance that are used, evenly over the runs."""
 RIDGE = 1e-3
 """Weight of the description's values, relative to the mean square of the columns: what no row shows stays there."""
@@ -55,11 +55,11 @@ def started(freedom: Freedom, values: Sequence[Array], runs: Sequence[Run]) -> t
                 matrix.append(columns[:, linear])
                 right.append(residual)
         A, b = np.concatenate(matrix), -np.concatenate(right)
-        scale = np.sqrt(RIDGE * np.maximum((A**2).sum(axis=0), 1e-12 * (A**2).sum()))
+        gram = A.T @ A
+        size = np.maximum(np.diag(gram), 1e-12 * np.trace(gram))
+        root = np.linalg.cholesky(gram + RIDGE * np.diag(size)).T
         lower, upper = (bound[linear] - trial[linear] for bound in freedom.bounds)
-        found = lsq_linear(
-            np.concatenate([A, np.diag(scale)]), np.concatenate([b, np.zeros(len(linear))]), (lower - 1e-9, upper + 1e-9)
-        )
+        found = lsq_linear(root, np.linalg.solve(root.T, A.T @ b), (lower - 1e-9, upper + 1e-9), method="bvls")
         cost = float(((A @ found.x - b) ** 2).sum())
         if best is None or cost < best[0]:
             trial[linear] += found.x

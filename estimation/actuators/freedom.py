@@ -47,17 +47,23 @@ class Fleet:
     Args:
         robots: the chains.
         drives: of all joints, in the order of the chains.
+        dynamics: of the chains, where they are known: they are compiled.
     """
 
-    def __init__(self, robots: Sequence[Robot], drives: Sequence[Drive]) -> None:
+    def __init__(
+        self, robots: Sequence[Robot], drives: Sequence[Drive], dynamics: Sequence[DriveDynamics] | None = None
+    ) -> None:
         self.robots, self.drives = tuple(robots), tuple(drives)
         ends = np.cumsum([robot.n for robot in robots])
         self.columns = tuple(np.arange(end - robot.n, end) for robot, end in zip(robots, ends, strict=True))
         if len(drives) != ends[-1]:
             raise InputError(f"{len(drives)} drives", allowed=f"{ends[-1]}, one per joint")
         self.dynamics = tuple(
-            DriveDynamics(robot, [drives[j] for j in columns])
-            for robot, columns in zip(robots, self.columns, strict=True)
+            dynamics
+            or (
+                DriveDynamics(robot, [drives[j] for j in columns])
+                for robot, columns in zip(robots, self.columns, strict=True)
+            )
         )
         self.names = tuple(name for robot in robots for name in robot.joint_names)
         self.place = {int(j): (c, k) for c, columns in enumerate(self.columns) for k, j in enumerate(columns)}
@@ -81,6 +87,11 @@ class Fleet:
         """One value."""
         chain, index = self.index(joint, name)
         return float(values[chain][index])
+
+    def part(self, chain: int) -> Fleet:
+        """Gives one chain alone, with its compiled functions."""
+        drives = [self.drives[j] for j in self.columns[chain]]
+        return Fleet([self.robots[chain]], drives, [self.dynamics[chain]])
 
     def changed(self, values: Sequence[Array], name: str, joints: Iterable[int], value: float) -> tuple[Array, ...]:
         """Gives values with another one of some joints."""
@@ -149,6 +160,16 @@ class Freedom:
                 chain, index = self.fleet.index(joint, parameter.name)
                 new[chain][index] = value
         return tuple(new)
+
+    def part(self, chain: int) -> Freedom:
+        """Gives what is free of one chain alone; what it shares with others is free of it alone, but for the delay."""
+        own = {int(j): k for k, j in enumerate(self.fleet.columns[chain])}
+        mine = []
+        for parameter in self.free:
+            joints = tuple(own[j] for j in parameter.joints if j in own)
+            if joints and (len(self.fleet.robots) == 1 or parameter.name != "delay"):
+                mine.append(replace(parameter, joints=joints))
+        return Freedom(fleet=self.fleet.part(chain), free=tuple(mine))
 
     def with_free(self, more: Iterable[FreeParameter]) -> Freedom:
         """Adds parameters; those that are free already stay as they are."""

@@ -69,6 +69,17 @@ class Run:
         """Samples that count (N,)."""
         return self.t - self.t[0] >= min(SETTLING, 0.1 * (self.t[-1] - self.t[0]))
 
+    def joints(self, columns: NDArray[np.intp]) -> Run:
+        """Gives some of the joints."""
+        return Run(
+            name=self.name,
+            t=self.t,
+            q=self.q[:, columns],
+            log_t=self.log_t,
+            command=self.command[:, columns],
+            steps=self.steps[columns],
+        )
+
     def cut(self, share: float) -> tuple[Run, Run]:
         """Cuts the run at a share of its time."""
         at = int(np.searchsorted(self.t, self.t[0] + share * (self.t[-1] - self.t[0])))

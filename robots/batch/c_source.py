@@ -13,7 +13,9 @@ from robots.batch.operations import operation
 # VECTOR_LIBM is defined where the C library has sines of whole vectors (glibc's libmvec, to some 1e-16): one by one
 # they cost as much as the rest of a regressor.
 _HEAD = """#include <math.h>
-#if defined(__AVX512F__)
+#if defined(ONE_LANE)
+#define W 1
+#elif defined(__AVX512F__)
 #define W 8
 #elif defined(__AVX__)
 #define W 4
@@ -30,7 +32,7 @@ typedef double vec __attribute__((vector_size(8 * W)));
 #else
 #define VECTOR(name) _ZGVbN2v_##name
 #endif
-#ifdef VECTOR_LIBM
+#if defined(VECTOR_LIBM) && !defined(ONE_LANE)
 vec VECTOR(sin)(vec), VECTOR(cos)(vec), VECTOR(tanh)(vec);
 #define OF(name, target, argument) target = VECTOR(name)(argument);
 #else
@@ -96,7 +98,7 @@ void batch_sums(long long groups, long long size, const double** in, double** ou
 }
 """
 
-# Only of functions (state, inputs, ...) -> state.
+# Only of functions (state, inputs, ...) -> state. One step follows the other, so that most lanes would idle.
 _STEPS = """
 // The first output is the first input of the next step; the second input has its own rows in each step.
 void batch_steps(long long samples, long long steps, const double** in, double** out) {
@@ -166,6 +168,7 @@ def c_source(function: casadi.Function) -> str:
             "state": inputs[0],
             "driven": inputs[1],
         }
+        return "#define ONE_LANE\n" + _HEAD + "\n".join(lines) + "\n" + tail
     return _HEAD + "\n".join(lines) + "\n" + tail
 
 

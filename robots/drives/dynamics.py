@@ -20,7 +20,7 @@ from robots.terms import RigidBody
 
 Array = NDArray[np.float64]
 
-PASSES = 4
+PASSES = 2
 """Times that a step's smooth torques are evaluated again: each brings the velocity at its end h / T nearer, T the time
 constant of the fastest loop."""
 

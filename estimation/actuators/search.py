@@ -1,0 +1,309 @@
+"""Search for effects in the loop: scanned by derivatives, fitted by simulation, accepted by held-out error."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from estimation.actuators.effects import EFFECTS, LoopEffect, Seen
+from estimation.actuators.fitting import FLOOR, Fit, FitOptions, fit_drives, normal_equations
+from estimation.actuators.freedom import Freedom, free_parameters
+from estimation.actuators.runs import Run
+from estimation.actuators.simulated_error import Errors, linearised_runs, rms, simulate_runs
+from estimation.uncertainty.correlations import correlation_rows
+from robots.common.errors import SolverError
+from robots.common.progress import SILENT, Progress
+
+Array = NDArray[np.float64]
+
+WORTH = 0.04
+"""Share of a joint's squared error that an effect must promise to be fitted, and bring on held-out data."""
+TRIED = 3
+"""Alternatives of a joint that are fitted in a round: those that promise most."""
+ROUNDS = 6
+"""Rounds of the search on a chain: each may accept one effect per joint."""
+SURE = 3.0
+"""Standard errors by which the logarithm of the held-out squared error must fall."""
+MEMORIES, FEWEST_BLOCKS, MOST_BLOCKS = 2, 6, 40
+"""Length of a block in times of the error's memory, and the least and most blocks."""
+QUICK = FitOptions(iterations=8, rounds=1)
+
+
+@dataclass(frozen=True, kw_only=True)
+class LoopFinding:
+    """An effect that was found.
+
+    Attributes:
+        effect: its name.
+        title: for people.
+        joint: counted from 1.
+        name: the joint's name.
+        states: its values in words.
+        before: held-out error of the joint without it [rad or m].
+        after: with it.
+        rivals: names of other effects that bring nearly as much, with their held-out errors.
+    """
+
+    effect: str
+    title: str
+    joint: int
+    name: str
+    states: str
+    before: float
+    after: float
+    rivals: tuple[tuple[str, float], ...] = ()
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Promise:
+    joint: int
+    effect: LoopEffect
+    start: dict[str, float]
+    share: float
+
+
+def search_effects(
+    fit: Fit, runs: Sequence[Run], held_out: Sequence[Run], progress: Progress = SILENT
+) -> tuple[Freedom, tuple[Array, ...], tuple[LoopFinding, ...]]:
+    """Looks for effects chain by chain.
+
+    Args:
+        fit: of the drives without them.
+        runs: that were fitted.
+        held_out: of which nothing was fitted.
+        progress: is told of each finding.
+
+    Returns:
+        What is free with the effects, values to start a fit of all from, and the findings, strongest first.
+    """
+    fleet = fit.freedom.fleet
+    freedom, values, findings = fit.freedom, list(fit.values), list[LoopFinding]()
+    for chain, columns in enumerate(fleet.columns):
+        own, found = _search_chain(
+            fit.freedom.part(chain),
+            (fit.values[chain],),
+            [run.joints(columns) for run in runs],
+            [run.joints(columns) for run in held_out],
+            fit.weights[columns],
+            progress,
+        )
+        values[chain] = own[0]
+        findings += [replace(finding, joint=int(columns[finding.joint - 1]) + 1) for finding, _ in found]
+        for finding, effect in found:
+            joint = int(columns[finding.joint - 1])
+            alone = {fleet.names[joint]: (joint,)}
+            freedom = freedom.with_free(free_parameters(fleet, effect.free, alone, [joint]))
+    findings.sort(key=lambda finding: finding.after - finding.before)
+    return freedom, tuple(values), tuple(findings)
+
+
+def _search_chain(
+    freedom: Freedom,
+    values: tuple[Array, ...],
+    runs: Sequence[Run],
+    held_out: Sequence[Run],
+    weights: Array,
+    progress: Progress,
+) -> tuple[tuple[Array, ...], list[tuple[LoopFinding, LoopEffect]]]:
+    accepted: list[tuple[LoopFinding, LoopEffect]] = []
+    now = linearised_runs(freedom, values, runs)
+    outside = simulate_runs(freedom.fleet, values, held_out)
+    for _ in range(ROUNDS):
+        taken = {(finding.joint - 1, effect.name) for finding, effect in accepted}
+        promises = [p for p in _promises(freedom, values, runs, now, weights) if (p.joint, p.effect.name) not in taken]
+        best: tuple[float, _Promise, Fit, list[Errors]] | None = None
+        rivals: list[tuple[int, str, float]] = []
+        for promise in promises[:TRIED]:
+            trial = _fitted(freedom, values, runs, promise)
+            if trial is None:
+                continue
+            try:
+                seen = simulate_runs(freedom.fleet, trial.values, held_out)
+            except SolverError:
+                continue
+            gain = _gain(outside, seen, promise.joint, weights)
+            rivals.append((promise.joint, promise.effect.name, float(rms(seen)[promise.joint])))
+            if gain > 0 and (best is None or gain > best[0]):
+                best = gain, promise, trial, seen
+        if best is None:
+            break
+        _, promise, trial, seen = best
+        finding = _finding(freedom, promise, trial, outside, seen, rivals)
+        accepted.append((finding, promise.effect))
+        progress.update(0.0, f"{finding.name}: {finding.title}")
+        freedom, values, outside = trial.freedom, trial.values, seen
+        now = list(trial.errors)
+    return values, accepted
+
+
+def _promises(
+    freedom: Freedom, values: tuple[Array, ...], runs: Sequence[Run], now: Sequence[Errors], weights: Array
+) -> list[_Promise]:
+    """What each effect would take off a joint's squared error, by derivatives or at its first values; most first."""
+    fleet = freedom.fleet
+    costs = np.array([sum(float((part.error[:, j] ** 2).sum()) for part in now) for j in range(fleet.n)]) * weights
+    found: list[_Promise] = []
+    starts: dict[tuple[int, str], Sequence[dict[str, float]]] = {}
+    for joint in range(fleet.n):
+        q = np.concatenate([run.q[:, joint] for run in runs])
+        command = np.concatenate([np.interp(run.t, run.log_t, run.command[:, joint]) for run in runs])
+        known = {name: fleet.of(values, joint, name) for name in fleet.drives[joint].names}
+        for effect in EFFECTS:
+            if all(name in known for name in effect.free) or effect.name == "joint_limit":
+                starts[joint, effect.name] = effect.starts(Seen(q, command, known))
+    for effect in EFFECTS:
+        alternatives = max((len(starts.get((j, effect.name), ())) for j in range(fleet.n)), default=0)
+        for index in range(alternatives):
+            changed, having = values, []
+            for joint in range(fleet.n):
+                options = starts.get((joint, effect.name), ())
+                if index < len(options):
+                    having.append(joint)
+                    for name, value in options[index].items():
+                        changed = fleet.changed(changed, name, [joint], value)
+            shares = (
+                _shares_there(freedom, changed, runs, having, costs, weights)
+                if effect.bends
+                else _shares_by_slopes(freedom, changed, runs, now, having, effect, costs, weights)
+            )
+            for joint, share in zip(having, shares, strict=True):
+                found.append(_Promise(joint=joint, effect=effect, start=starts[joint, effect.name][index], share=share))
+    best: dict[tuple[int, str], _Promise] = {}
+    for promise in found:
+        key = (promise.joint, promise.effect.name)
+        if promise.share > WORTH and (key not in best or promise.share > best[key].share):
+            best[key] = promise
+    # A promise counts by what it takes off the whole chain's error.
+    return sorted(best.values(), key=lambda p: -p.share * costs[p.joint])
+
+
+def _shares_there(
+    freedom: Freedom, values: tuple[Array, ...], runs: Sequence[Run], joints: Sequence[int], costs: Array, weights: Array
+) -> list[float]:
+    """Decrease of each joint's squared error with these values."""
+    try:
+        errors = simulate_runs(freedom.fleet, values, runs)
+    except SolverError:
+        return [0.0] * len(joints)
+    new = np.array([sum(float((part.error[:, j] ** 2).sum()) for part in errors) for j in joints]) * weights[list(joints)]
+    # Without a new fit of the rest even the right effect brings a part only, so little is asked of it.
+    return [float(max(0.0, 1 - a / b) + WORTH) if a < b else 0.0 for a, b in zip(new, costs[list(joints)], strict=True)]
+
+
+def _shares_by_slopes(
+    freedom: Freedom,
+    values: tuple[Array, ...],
+    runs: Sequence[Run],
+    now: Sequence[Errors],
+    joints: Sequence[int],
+    effect: LoopEffect,
+    costs: Array,
+    weights: Array,
+) -> list[float]:
+    """Decrease that a linear fit of the effect beside the free parameters promises, as a share of the joint's cost."""
+    fleet = freedom.fleet
+    alone = {fleet.names[j]: (j,) for j in range(fleet.n)}
+    more = free_parameters(fleet, effect.free, alone, joints)
+    known = {(p.name, j) for p in freedom.free for j in p.joints if len(p.joints) == 1}
+    more = tuple(p for p in more if (p.name, p.joints[0]) not in known)
+    if not more:
+        return [0.0] * len(joints)
+    both = Freedom(fleet=fleet, free=(*freedom.free, *more))
+    errors = [
+        replace(part, simulated=old.simulated)
+        for part, old in zip(linearised_runs(Freedom(fleet=fleet, free=more), values, runs), now, strict=True)
+    ]
+    joined = [
+        replace(part, jacobian=np.concatenate([_of(old), _of(part)], axis=2))
+        for part, old in zip(errors, now, strict=True)
+    ]
+    gram, right = normal_equations(joined, weights)
+    gram[np.diag_indices(len(gram))] *= 1 + 1e-9
+    size = len(freedom.free)
+    inner = gram[:size, :size] + 1e-9 * np.eye(size)
+    solved = np.linalg.solve(inner, gram[:size, size:])
+    left, effort = gram[size:, size:] - gram[size:, :size] @ solved, right[size:] - solved.T @ right[:size]
+    shares = []
+    for joint in joints:
+        mine = [k for k, p in enumerate(more) if p.joints == (joint,)]
+        # Parameters without an effect at these values, such as a speed of no friction, have no slope.
+        mine = [k for k in mine if left[k, k] > 1e-12 * max(gram[size + k, size + k], 1e-300) and left[k, k] > 0]
+        if not mine:
+            shares.append(0.0)
+            continue
+        C, b = left[np.ix_(mine, mine)], effort[mine]
+        step = np.linalg.solve(C + 1e-9 * np.diag(np.diag(C)), b)
+        bounds = [(more[k].lower / more[k].size, more[k].upper / more[k].size) for k in mine]
+        at = [fleet.of(values, joint, more[k].name) / more[k].size for k in mine]
+        inside = all(low <= x + d <= high for (low, high), x, d in zip(bounds, at, step, strict=True))
+        shares.append(float(b @ step / costs[joint]) if inside or len(mine) > 1 else 0.0)
+    del both
+    return shares
+
+
+def _of(part: Errors) -> Array:
+    assert part.jacobian is not None
+    return part.jacobian
+
+
+def _fitted(freedom: Freedom, values: tuple[Array, ...], runs: Sequence[Run], promise: _Promise) -> Fit | None:
+    """Fits an effect with everything that was free; None where the loop is not stable."""
+    fleet = freedom.fleet
+    changed = values
+    for name, value in promise.start.items():
+        changed = fleet.changed(changed, name, [promise.joint], value)
+    names = [name for name in promise.effect.free if name in promise.start or not promise.effect.bends]
+    alone = {fleet.names[promise.joint]: (promise.joint,)}
+    try:
+        return fit_drives(freedom.with_free(free_parameters(fleet, names, alone, [promise.joint])), changed, runs, QUICK)
+    except SolverError:
+        return None
+
+
+def _gain(before: Sequence[Errors], after: Sequence[Errors], joint: int, weights: Array) -> float:
+    """Decrease of the weighted squared error over all joints of the chain; 0 where it is not sure.
+
+    The error of the effect's own joint must fall, and that of all joints together. It must fall in most blocks of time
+    longer than the error's memory: the mean logarithm of its ratio, which no single large error decides.
+    """
+    old, new = (np.concatenate([part.error for part in parts]) ** 2 for parts in (before, after))
+    if new[:, joint].sum() > (1 - WORTH) * old[:, joint].sum():
+        return 0.0
+    memory = max(correlation_rows(part.error[:, joint]) for part in before)
+    count = int(np.clip(len(old) // (MEMORIES * max(memory, 1)), FEWEST_BLOCKS, MOST_BLOCKS))
+    floor = FLOOR**2 * len(old) / count
+    sums = [
+        np.array([block.sum() + floor for block in np.array_split(squares[:, joint], count)]) for squares in (old, new)
+    ]
+    ratios = np.log(sums[0] / sums[1])
+    if ratios.mean() < SURE * ratios.std(ddof=1) / np.sqrt(count):
+        return 0.0
+    return float(((old - new) @ weights).sum())
+
+
+def _finding(
+    freedom: Freedom,
+    promise: _Promise,
+    trial: Fit,
+    before: Sequence[Errors],
+    after: Sequence[Errors],
+    rivals: Sequence[tuple[int, str, float]],
+) -> LoopFinding:
+    fleet, joint, effect = freedom.fleet, promise.joint, promise.effect
+    known = {name: fleet.of(trial.values, joint, name) for name in (*effect.free, *promise.start)}
+    others = tuple(
+        (name, error) for other, name, error in rivals if other == joint and name != effect.name
+    )
+    return LoopFinding(
+        effect=effect.name,
+        title=effect.title,
+        joint=joint + 1,
+        name=fleet.names[joint],
+        states=effect.states(known),
+        before=float(rms(before)[joint]),
+        after=float(rms(after)[joint]),
+        rivals=others,
+    )
