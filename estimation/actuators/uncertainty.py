@@ -29,7 +29,7 @@ class Uncertainty:
     """Errors of the free parameters, scaled by their sizes.
 
     Attributes:
-        covariance: of the scaled parameters (K, K); that of the prior for those at a bound.
+        covariance: of the scaled parameters (K, K).
         determined: which are known better than their size or value (K,).
         partners: per parameter the indices of those that it is known together with.
     """
@@ -51,27 +51,23 @@ def uncertainty_of(fit: Fit, seed: int = 0) -> Uncertainty:
         fit: with derivatives at its values.
         seed: of the bootstrap.
     """
-    inner = np.flatnonzero(~fit.at_bound)
     size = len(fit.theta)
-    total = np.eye(size) * PRIOR**2
-    if len(inner):
-        gram, _ = normal_equations(fit.errors, fit.weights)
-        gram[np.diag_indices(size)] += PRIOR**-2
-        inverse = np.linalg.inv(gram[np.ix_(inner, inner)])
-        inverse = (inverse + inverse.T) / 2
-        found = covariance([_part(part, inner) for part in fit.errors], fit.weights, inverse, seed)
-        found = at_least(found, _bootstrap(fit, inner, inverse, seed))
-        # A direction that no data show has the prior's width, which noise does not know of.
-        floor = np.diag(inverse @ inverse) / PRIOR**2
-        total[np.ix_(inner, inner)] = at_least(found, floor)
+    gram, _ = normal_equations(fit.errors, fit.weights)
+    gram[np.diag_indices(size)] += PRIOR**-2
+    inverse = np.linalg.inv(gram)
+    inverse = (inverse + inverse.T) / 2
+    found = covariance([_part(part) for part in fit.errors], fit.weights, inverse, seed)
+    found = at_least(found, _bootstrap(fit, inverse, seed))
+    # A direction that no data show has the prior's width, which noise does not know of.
+    total = at_least(found, np.diag(inverse @ inverse) / PRIOR**2)
     errors = np.sqrt(np.diag(total))
-    determined = (NORMAL_95 * errors < np.maximum(np.abs(fit.theta), 1.0)) & ~fit.at_bound
-    return Uncertainty(covariance=total, determined=determined, partners=_partners(total, inner, determined))
+    determined = NORMAL_95 * errors < np.maximum(np.abs(fit.theta), 1.0)
+    return Uncertainty(covariance=total, determined=determined, partners=_partners(total, determined))
 
 
-def _part(part: Errors, inner: NDArray[np.intp]) -> Part:
+def _part(part: Errors) -> Part:
     assert part.jacobian is not None
-    jacobian = part.jacobian[:, :, inner]
+    jacobian = part.jacobian
     used = [np.flatnonzero(jacobian[:, j].any(axis=0)) for j in range(jacobian.shape[1])]
     mask = np.broadcast_to(part.run.counted[:, None], part.run.q.shape).astype(float)
     return Part(
@@ -83,13 +79,13 @@ def _part(part: Errors, inner: NDArray[np.intp]) -> Part:
     )
 
 
-def _bootstrap(fit: Fit, inner: NDArray[np.intp], inverse: Array, seed: int) -> Array:
+def _bootstrap(fit: Fit, inverse: Array, seed: int) -> Array:
     """Variances (k,) of the linearised estimate over resampled blocks of time."""
     scores, memory = [], 1
     for part in fit.errors:
         assert part.jacobian is not None
         weighted = part.error * fit.weights
-        scores.append(np.einsum("tjk,tj->tk", part.jacobian[:, :, inner], weighted))
+        scores.append(np.einsum("tjk,tj->tk", part.jacobian, weighted))
         memory = max([memory, *(correlation_rows(column) for column in part.error.T if column.any())])
     rows = np.concatenate(scores)
     block = int(np.clip(MEMORIES * memory, 2, max(2, LONGEST * len(rows))))
@@ -97,15 +93,13 @@ def _bootstrap(fit: Fit, inner: NDArray[np.intp], inverse: Array, seed: int) -> 
     return np.asarray(np.var(sums @ inverse, axis=0))
 
 
-def _partners(
-    total: Array, inner: NDArray[np.intp], determined: NDArray[np.bool_]
-) -> tuple[tuple[int, ...], ...]:
+def _partners(total: Array, determined: NDArray[np.bool_]) -> tuple[tuple[int, ...], ...]:
     deviation = np.sqrt(np.diag(total))
     correlation = total / deviation[:, None] / deviation
     found: list[tuple[int, ...]] = []
     for k in range(len(total)):
-        near = [int(m) for m in inner if m != k and abs(correlation[k, m]) > TOGETHER]
-        found.append(tuple(near) if not determined[k] and k in inner else ())
+        near = [m for m in range(len(total)) if m != k and abs(correlation[k, m]) > TOGETHER]
+        found.append(tuple(near) if not determined[k] else ())
     return tuple(found)
 
 

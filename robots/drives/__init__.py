@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from robots.drives.base import DriveParameter, Instant, Member
 from robots.drives.delay import Delay, HeldCommand
+from robots.drives.described import DescribedDrives, described_drives
 from robots.drives.drive import Drive
 from robots.drives.dynamics import DriveDynamics
 from robots.drives.gear import Armature, EndStop, Friction, LoadFriction, Offset, PositionFriction, StribeckFriction
@@ -15,6 +16,7 @@ __all__ = [
     "Armature",
     "CascadeLaw",
     "Delay",
+    "DescribedDrives",
     "Drive",
     "DriveDynamics",
     "DriveParameter",
@@ -34,5 +36,6 @@ __all__ = [
     "Start",
     "StribeckFriction",
     "VelocityLaw",
+    "described_drives",
     "simulate_drives",
 ]
