@@ -54,7 +54,7 @@ class DriveDynamics:
         InputError: another number of drives, or a robot without masses.
     """
 
-    def __init__(self, robot: Robot, drives: Sequence[Drive], width: float = 2e-3) -> None:
+    def __init__(self, robot: Robot, drives: Sequence[Drive], width: float = 1e-4) -> None:
         if len(drives) != robot.n:
             raise InputError(f"{len(drives)} drives of {robot.name}", allowed=f"{robot.n}, one per joint")
         if not robot.has_masses:

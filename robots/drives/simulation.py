@@ -17,6 +17,9 @@ Array = NDArray[np.float64]
 UNSTABLE = 1e3
 """Positions [rad or m] beyond which a loop counts as unstable."""
 
+LONGEST = 2.5e-3
+"""Longest step [s] by default: at a time constant of 10 ms its error is below a per cent of the motion's lag."""
+
 
 class Start(NamedTuple):
     """State of the n joints at the beginning: positions by the encoders [rad or m] and velocities [rad/s or m/s]."""
@@ -52,6 +55,11 @@ class Steps(NamedTuple):
     substeps: int
 
 
+def usual_step(t: Array) -> float:
+    """Gives the step [s] for samples at these times (N,): a log of a high rate is to show fast parts of the motion."""
+    return min(LONGEST, 0.5 * float(np.median(np.diff(t))))
+
+
 def step_times(t: Array, longest: float) -> Steps:
     """Divides the time between samples (N,) [s] into equal steps of at most `longest` [s]."""
     substeps = max(1, int(np.ceil(float(np.median(np.diff(t))) / longest - 1e-6)))
@@ -68,7 +76,7 @@ def simulate_drives(
     values: Array,
     *,
     directions: Array | None = None,
-    longest: float = 2.5e-3,
+    longest: float | None = None,
 ) -> Simulated:
     """Simulates a chain that follows commands.
 
@@ -79,14 +87,14 @@ def simulate_drives(
         start: state at the first one.
         values: parameters (P,).
         directions: combinations of parameters (P, k) by which derivatives are wanted; None for none.
-        longest: longest step [s].
+        longest: longest step [s]; by default half the log's period, and at most `LONGEST`.
 
     Raises:
         SolverError: the loop is not stable.
     """
     n, s = dynamics.n, len(dynamics.owners)
     layout = dynamics.layout
-    edges, substeps = step_times(t, longest)
+    edges, substeps = step_times(t, usual_step(t) if longest is None else longest)
     zero, delay = layout.of("encoder_zero"), layout.of("delay")
     delays = np.zeros(n)
     delays[layout.joints[delay]] = values[delay]
