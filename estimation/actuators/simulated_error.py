@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from estimation.actuators.freedom import Fleet, Freedom
 from estimation.actuators.runs import Run
 from robots.drives import Start, simulate_drives
+from robots.drives.simulation import usual_step
 
 Array = NDArray[np.float64]
 
@@ -36,13 +37,21 @@ class Errors:
         return (self.run.q - self.simulated) * self.run.counted[:, None]
 
 
-def simulate_runs(fleet: Fleet, values: Sequence[Array], runs: Sequence[Run]) -> list[Errors]:
+def simulate_runs(
+    fleet: Fleet, values: Sequence[Array], runs: Sequence[Run], *, refinement: int = 1
+) -> list[Errors]:
     """Simulates all runs with given values, chain by chain.
+
+    Args:
+        fleet: the chains.
+        values: their parameters, chain by chain.
+        runs: what was commanded and measured.
+        refinement: so many times shorter than usual are the steps.
 
     Raises:
         SolverError: the loop is not stable.
     """
-    return [Errors(run=run, simulated=_chains(fleet, values, run)) for run in runs]
+    return [Errors(run=run, simulated=_chains(fleet, values, run, refinement)) for run in runs]
 
 
 def linearised_runs(freedom: Freedom, values: Sequence[Array], runs: Sequence[Run]) -> list[Errors]:
@@ -72,11 +81,12 @@ def linearised_runs(freedom: Freedom, values: Sequence[Array], runs: Sequence[Ru
     return found
 
 
-def _chains(fleet: Fleet, values: Sequence[Array], run: Run) -> Array:
+def _chains(fleet: Fleet, values: Sequence[Array], run: Run, refinement: int) -> Array:
     simulated = np.empty_like(run.q)
     for chain, columns in enumerate(fleet.columns):
         start = Start(run.q[0, columns], run.start_velocity[columns])
-        result = simulate_drives(fleet.dynamics[chain], run.of(columns), run.t, start, values[chain])
+        longest = usual_step(run.t) / refinement
+        result = simulate_drives(fleet.dynamics[chain], run.of(columns), run.t, start, values[chain], longest=longest)
         simulated[:, columns] = result.measured
     return simulated
 

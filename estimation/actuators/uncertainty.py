@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from estimation.actuators.fitting import PRIOR, Fit, normal_equations
-from estimation.actuators.simulated_error import Errors
+from estimation.actuators.simulated_error import Errors, simulate_runs
 from estimation.uncertainty.blocks import moving_block_sums
 from estimation.uncertainty.correlations import correlation_rows
 from estimation.uncertainty.quantiles import NORMAL_95
@@ -59,7 +59,7 @@ def uncertainty_of(fit: Fit, seed: int = 0) -> Uncertainty:
     found = covariance([_part(part) for part in fit.errors], fit.weights, inverse, seed)
     found = at_least(found, _bootstrap(fit, inverse, seed))
     # A direction that no data show has the prior's width, which noise does not know of.
-    total = at_least(found, np.diag(inverse @ inverse) / PRIOR**2)
+    total = at_least(found, np.diag(inverse @ inverse) / PRIOR**2) + np.diag(_step_error(fit, inverse) ** 2)
     errors = np.sqrt(np.diag(total))
     determined = NORMAL_95 * errors < np.maximum(np.abs(fit.theta), 1.0)
     return Uncertainty(covariance=total, determined=determined, partners=_partners(total, determined))
@@ -77,6 +77,16 @@ def _part(part: Errors) -> Part:
         residual=part.error,
         used=used,
     )
+
+
+def _step_error(fit: Fit, inverse: Array) -> Array:
+    """Error of the parameters (K,) by the length of the simulation's steps, which is of second order in it."""
+    fine = simulate_runs(fit.freedom.fleet, fit.values, [part.run for part in fit.errors], refinement=2)
+    total = np.zeros(len(inverse))
+    for part, other in zip(fit.errors, fine, strict=True):
+        assert part.jacobian is not None
+        total += np.einsum("tjk,tj->k", part.jacobian, (other.simulated - part.simulated) * fit.weights)
+    return np.asarray(4 / 3 * inverse @ total)
 
 
 def _bootstrap(fit: Fit, inverse: Array, seed: int) -> Array:
