@@ -4,7 +4,17 @@ from __future__ import annotations
 
 from estimation.actuators.exports.configurations import isaac_lab_text, newton_text
 from estimation.actuators.exports.expressible import Expressible, expressible
+from estimation.actuators.exports.files import SimulatorFiles, simulator_files
 from estimation.actuators.exports.mjcf import drives_mjcf
 from estimation.actuators.exports.urdf import drives_urdf
 
-__all__ = ["Expressible", "drives_mjcf", "drives_urdf", "expressible", "isaac_lab_text", "newton_text"]
+__all__ = [
+    "Expressible",
+    "SimulatorFiles",
+    "drives_mjcf",
+    "drives_urdf",
+    "expressible",
+    "isaac_lab_text",
+    "newton_text",
+    "simulator_files",
+]
