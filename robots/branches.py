@@ -55,9 +55,7 @@ def load_branches(
     return tuple(chains)
 
 
-def _branches(
-    tree: UrdfTree, locked: Mapping[str, float], joints: Sequence[str] | None
-) -> tuple[tuple[str, ...], ...]:
+def _branches(tree: UrdfTree, locked: Mapping[str, float], joints: Sequence[str] | None) -> tuple[tuple[str, ...], ...]:
     """Moving joints of each branch, from the root outwards."""
     paths: list[tuple[str, ...]] = []
     for leaf in tree.leaves:

@@ -70,7 +70,9 @@ EFFECTS: tuple[LoopEffect, ...] = (
         title="Stribeck friction",
         free=("stribeck", "stribeck_velocity"),
         starts=lambda seen: [{"stribeck": 0.0, "stribeck_velocity": v} for v in (0.05, 0.15, 0.5)],
-        states=lambda v: f"{v['stribeck']:.3g} N m more friction at rest, gone above {v['stribeck_velocity']:.2g} rad/s",
+        states=lambda v: (
+            f"{v['stribeck']:.3g} N m more friction at rest, gone above {v['stribeck_velocity']:.2g} rad/s"
+        ),
     ),
     LoopEffect(
         name="load_dependent_friction",
@@ -84,8 +86,10 @@ EFFECTS: tuple[LoopEffect, ...] = (
         title="position-dependent friction",
         free=("friction_cosine", "friction_sine"),
         starts=lambda seen: [{"friction_cosine": 0.0, "friction_sine": 0.0, "friction_order": o} for o in (1, 2, 4)],
-        states=lambda v: f"friction varies by {np.hypot(v['friction_cosine'], v['friction_sine']):.3g} N m "
-        f"{v['friction_order']:.2g} times a turn",
+        states=lambda v: (
+            f"friction varies by {np.hypot(v['friction_cosine'], v['friction_sine']):.3g} N m "
+            f"{v['friction_order']:.2g} times a turn"
+        ),
     ),
     LoopEffect(
         name="current_clipping",
@@ -128,8 +132,10 @@ EFFECTS: tuple[LoopEffect, ...] = (
         title="a stop of the joint",
         free=("stop_upper", "stop_lower"),
         starts=_stops,
-        states=lambda v: "the joint touches its stop at "
-        + " and ".join(f"{v[k]:.4g} rad" for k in ("stop_lower", "stop_upper") if k in v and abs(v[k]) < 100),
+        states=lambda v: (
+            "the joint touches its stop at "
+            + " and ".join(f"{v[k]:.4g} rad" for k in ("stop_lower", "stop_upper") if k in v and abs(v[k]) < 100)
+        ),
         bends=True,
     ),
 )

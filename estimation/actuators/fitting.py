@@ -103,7 +103,9 @@ def fit_drives(
     weights = np.full(freedom.fleet.n, float(np.mean(np.maximum(rms(errors), FLOOR) ** 2)) ** -1)
     settled = False
     for round_ in range(chosen.rounds):
-        theta, errors, settled = _descend(freedom, start, theta, prior, errors, weights, runs, chosen.iterations, progress)
+        theta, errors, settled = _descend(
+            freedom, start, theta, prior, errors, weights, runs, chosen.iterations, progress
+        )
         if round_ + 1 < chosen.rounds:
             weights = np.maximum(rms(errors), FLOOR) ** -2
     return Fit(
@@ -155,7 +157,9 @@ def _descend(
         while damping < MOST:
             trial = theta + _step(gram, right, damping, lower - theta, upper - theta)
             try:
-                reached = _cost(simulate_runs(freedom.fleet, freedom.values(trial, fixed), runs), weights, trial - prior)
+                reached = _cost(
+                    simulate_runs(freedom.fleet, freedom.values(trial, fixed), runs), weights, trial - prior
+                )
             except SolverError:
                 reached = np.inf
             if reached < cost:

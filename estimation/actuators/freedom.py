@@ -81,7 +81,7 @@ class Fleet:
     def index(self, joint: int, name: str) -> tuple[int, int]:
         """Chain and index of a joint's parameter."""
         chain, own = self.place[joint]
-        return chain, self.dynamics[chain].layout.index(own, name)
+        return chain, self.dynamics[chain].layout.place(own, name)
 
     def of(self, values: Sequence[Array], joint: int, name: str) -> float:
         """One value."""
@@ -199,7 +199,9 @@ def classes_of(names: Sequence[str], share: Sequence[str]) -> dict[str, tuple[in
             raise InputError(f"no joint's name contains {part!r}", allowed=f"parts of {', '.join(names)}")
         for joint in joints:
             if joint in taken:
-                raise InputError(f"{names[joint]} belongs to {taken[joint]!r} and to {part!r}", allowed="one class each")
+                raise InputError(
+                    f"{names[joint]} belongs to {taken[joint]!r} and to {part!r}", allowed="one class each"
+                )
             taken[joint] = part
         classes[part] = joints
     alone = {name: (j,) for j, name in enumerate(names) if j not in taken}

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from estimation.actuators.equation_error import started
+from estimation.actuators.exports.expressible import expressible
 from estimation.actuators.fitting import Fit, FitOptions, fit_drives
 from estimation.actuators.freedom import (
     Fleet,
@@ -38,6 +39,18 @@ BASIC = ("armature", "viscous", "coulomb", "torque_offset")
 """Parameters of every joint that are always identified, beside the delay of all."""
 TRAINED = 0.7
 """Share of each run that is fitted where effects are chosen by the rest."""
+NEUTRAL = {
+    "stribeck": 0.0,
+    "load_coulomb": 0.0,
+    "friction_cosine": 0.0,
+    "friction_sine": 0.0,
+    "dead_band": 0.0,
+    "encoder_zero": 0.0,
+    "ki": 0.0,
+    "stop_lower": -1e3,
+    "stop_upper": 1e3,
+}
+"""Values of what simulators do not express, see `expressible`."""
 TRACED = 4000
 """Samples of a trace at most."""
 
@@ -57,7 +70,7 @@ class ActuatorOptions:
     share: tuple[str, ...] = ()
     free: tuple[str, ...] = ()
     effects: bool = True
-    fit: FitOptions = FitOptions()
+    fit: FitOptions = field(default_factory=FitOptions)
     seed: int = 0
 
 
@@ -183,7 +196,7 @@ def _result(
         )
     )
     drives = fleet.with_values(fit.values)
-    return Actuators(
+    result = Actuators(
         robot=fleet.robots[0].name,
         joints=fleet.names,
         law=tuple(_law(drive) for drive in drives),
@@ -204,6 +217,18 @@ def _result(
         robots=fleet.robots,
         drives=tuple(drives),
     )
+    return replace(result, written_error=_written_error(fleet, fit, result, seen))
+
+
+def _written_error(fleet: Fleet, fit: Fit, result: Actuators, seen: Sequence[Run]) -> float:
+    """Error of the drives as simulators express them."""
+    values: tuple[Array, ...] = fit.values
+    for joint, friction in enumerate(expressible(result).friction):
+        values = fleet.changed(values, "coulomb", [joint], float(friction))
+    for name, neutral in NEUTRAL.items():
+        having = [joint for joint in range(fleet.n) if name in fleet.drives[joint].names]
+        values = fleet.changed(values, name, having, neutral)
+    return float(np.mean(rms(simulate_runs(fleet, values, seen))))
 
 
 def _described_errors(fleet: Fleet, runs: Sequence[Run]) -> list[Errors]:

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from estimation.actuators.search import LoopFinding
 from robots.common.errors import InputError
 from robots.common.files import existing_file, write_atomic
-from robots.common.plain import finite
+from robots.common.plain import finite, number
 from robots.drives import Drive
 from robots.robot import Robot
 
@@ -119,6 +119,7 @@ class Actuators:
         findings: effects that were found in the loop, strongest first.
         notes: what a reader should know.
         held_out: what the held-out data are.
+        written_error: mean of the joints' held-out errors with what simulators express of the drives [rad or m].
         traces: the first held-out run; empty if the result was loaded without it.
         success: whether the fit settled.
         provenance: logs, gains, tool version.
@@ -135,6 +136,7 @@ class Actuators:
     findings: tuple[LoopFinding, ...]
     notes: tuple[str, ...]
     held_out: str
+    written_error: float = float("nan")
     traces: tuple[Trace, ...] = ()
     success: bool = True
     provenance: Mapping[str, Any] = field(default_factory=dict)
@@ -142,7 +144,9 @@ class Actuators:
     drives: tuple[Drive, ...] = ()
 
     def __repr__(self) -> str:
-        return f"Actuators({self.robot!r}, {len(self.joints)} joints, held-out error {1e3 * self.held_out_error:.3g} mrad)"
+        return (
+            f"Actuators({self.robot!r}, {len(self.joints)} joints, held-out error {1e3 * self.held_out_error:.3g} mrad)"
+        )
 
     @property
     def held_out_error(self) -> float:
@@ -181,6 +185,10 @@ class Actuators:
             lines.append(
                 f"  found: {item.title}, {item.name}: {item.states}; held-out error {1e3 * item.before:.3g} -> "
                 f"{1e3 * item.after:.3g} mrad"
+            )
+        if self.written_error > 1.05 * self.held_out_error:
+            lines.append(
+                f"  with what simulators express of these drives: {1e3 * self.written_error:.3g} mrad on the same data"
             )
         lines.append("  joint                  described   identified   (held-out RMS error, mrad or mm)")
         for error in self.errors:
@@ -245,6 +253,7 @@ class Actuators:
             "findings": [asdict(finding) | {"rivals": [list(r) for r in finding.rivals]} for finding in self.findings],
             "notes": list(self.notes),
             "held_out": self.held_out,
+            "written_error": finite(self.written_error),
             "success": self.success,
             "provenance": dict(self.provenance),
         }
@@ -308,6 +317,7 @@ def load_actuators(path: str | Path) -> Actuators:
             ),
             notes=tuple(data["notes"]),
             held_out=data["held_out"],
+            written_error=number(data["written_error"]),
             success=data["success"],
             provenance=data["provenance"],
             traces=_traces(file.parent / MOTION, len(joints), data["held_out"]),

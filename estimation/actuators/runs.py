@@ -185,7 +185,9 @@ def _check(log: Log, fleet: Fleet) -> list[str]:
             allowed="what was sent to the drives, which the joint follows with an error",
             remedy="log the target, not the state; a leader arm's positions are a target, too",
         )
-    notes += [f"{log.name}: {fleet.names[moving[k]]} follows its command without an error" for k in np.flatnonzero(same)]
+    notes += [
+        f"{log.name}: {fleet.names[moving[k]]} follows its command without an error" for k in np.flatnonzero(same)
+    ]
     _check_base(log, file)
     return notes
 

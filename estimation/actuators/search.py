@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from estimation.actuators.effects import EFFECTS, LoopEffect, Seen
+from estimation.actuators.effects import BY_NAME, EFFECTS, LoopEffect, Seen
 from estimation.actuators.fitting import FLOOR, Fit, FitOptions, fit_drives, normal_equations
-from estimation.actuators.freedom import Freedom, free_parameters
+from estimation.actuators.freedom import Fleet, Freedom, FreeParameter, free_parameters
 from estimation.actuators.runs import Run
 from estimation.actuators.simulated_error import Errors, linearised_runs, rms, simulate_runs
 from estimation.uncertainty.correlations import correlation_rows
@@ -113,7 +113,7 @@ def _search_chain(
     outside = simulate_runs(freedom.fleet, values, held_out)
     for _ in range(ROUNDS):
         taken = {(finding.joint - 1, effect.name) for finding, effect in accepted}
-        promises = [p for p in _promises(freedom, values, runs, now, weights) if (p.joint, p.effect.name) not in taken]
+        promises = _promises(freedom, values, runs, now, weights, taken)
         best: tuple[float, _Promise, Fit, list[Errors]] | None = None
         rivals: list[tuple[int, str, float]] = []
         for promise in promises[:TRIED]:
@@ -140,7 +140,12 @@ def _search_chain(
 
 
 def _promises(
-    freedom: Freedom, values: tuple[Array, ...], runs: Sequence[Run], now: Sequence[Errors], weights: Array
+    freedom: Freedom,
+    values: tuple[Array, ...],
+    runs: Sequence[Run],
+    now: Sequence[Errors],
+    weights: Array,
+    taken: set[tuple[int, str]],
 ) -> list[_Promise]:
     """What each effect would take off a joint's squared error, by derivatives or at its first values; most first."""
     fleet = freedom.fleet
@@ -152,25 +157,19 @@ def _promises(
         command = np.concatenate([np.interp(run.t, run.log_t, run.command[:, joint]) for run in runs])
         known = {name: fleet.of(values, joint, name) for name in fleet.drives[joint].names}
         for effect in EFFECTS:
-            if all(name in known for name in effect.free) or effect.name == "joint_limit":
+            if (joint, effect.name) not in taken and all(name in known for name in effect.free):
                 starts[joint, effect.name] = effect.starts(Seen(q, command, known))
-    for effect in EFFECTS:
-        alternatives = max((len(starts.get((j, effect.name), ())) for j in range(fleet.n)), default=0)
-        for index in range(alternatives):
-            changed, having = values, []
-            for joint in range(fleet.n):
-                options = starts.get((joint, effect.name), ())
-                if index < len(options):
-                    having.append(joint)
-                    for name, value in options[index].items():
-                        changed = fleet.changed(changed, name, [joint], value)
-            shares = (
-                _shares_there(freedom, changed, runs, having, costs, weights)
-                if effect.bends
-                else _shares_by_slopes(freedom, changed, runs, now, having, effect, costs, weights)
-            )
-            for joint, share in zip(having, shares, strict=True):
-                found.append(_Promise(joint=joint, effect=effect, start=starts[joint, effect.name][index], share=share))
+    for index in range(max((len(options) for options in starts.values()), default=0)):
+        there = [key for key, options in starts.items() if index < len(options)]
+        neutral = [key for key in there if not BY_NAME[key[1]].bends]
+        changed = _with_starts(fleet, values, {key: starts[key][index] for key in neutral})
+        shares = _shares_by_slopes(freedom, changed, runs, now, neutral, costs, weights)
+        for name in dict.fromkeys(effect for _, effect in there if BY_NAME[effect].bends):
+            joints = [joint for joint, effect in there if effect == name]
+            bent = _with_starts(fleet, values, {(j, name): starts[j, name][index] for j in joints})
+            shares |= _shares_there(freedom, bent, runs, joints, name, costs, weights)
+        for (joint, name), share in shares.items():
+            found.append(_Promise(joint=joint, effect=BY_NAME[name], start=starts[joint, name][index], share=share))
     best: dict[tuple[int, str], _Promise] = {}
     for promise in found:
         key = (promise.joint, promise.effect.name)
@@ -180,17 +179,33 @@ def _promises(
     return sorted(best.values(), key=lambda p: -p.share * costs[p.joint])
 
 
+def _with_starts(
+    fleet: Fleet, values: tuple[Array, ...], starts: Mapping[tuple[int, str], dict[str, float]]
+) -> tuple[Array, ...]:
+    """Gives the values with which effects of some joints begin."""
+    for (joint, _), start in starts.items():
+        for name, value in start.items():
+            values = fleet.changed(values, name, [joint], value)
+    return values
+
+
 def _shares_there(
-    freedom: Freedom, values: tuple[Array, ...], runs: Sequence[Run], joints: Sequence[int], costs: Array, weights: Array
-) -> list[float]:
-    """Decrease of each joint's squared error with these values."""
+    freedom: Freedom,
+    values: tuple[Array, ...],
+    runs: Sequence[Run],
+    joints: Sequence[int],
+    name: str,
+    costs: Array,
+    weights: Array,
+) -> dict[tuple[int, str], float]:
+    """Decrease of each joint's squared error with these values, as a share."""
     try:
         errors = simulate_runs(freedom.fleet, values, runs)
     except SolverError:
-        return [0.0] * len(joints)
-    new = np.array([sum(float((part.error[:, j] ** 2).sum()) for part in errors) for j in joints]) * weights[list(joints)]
+        return {}
+    new = sum((part.error**2).sum(axis=0) for part in errors) * weights
     # Without a new fit of the rest even the right effect brings a part only, so little is asked of it.
-    return [float(max(0.0, 1 - a / b) + WORTH) if a < b else 0.0 for a, b in zip(new, costs[list(joints)], strict=True)]
+    return {(j, name): float(1 - new[j] / costs[j] + WORTH) for j in joints if new[j] < costs[j]}
 
 
 def _shares_by_slopes(
@@ -198,49 +213,48 @@ def _shares_by_slopes(
     values: tuple[Array, ...],
     runs: Sequence[Run],
     now: Sequence[Errors],
-    joints: Sequence[int],
-    effect: LoopEffect,
+    wanted: Sequence[tuple[int, str]],
     costs: Array,
     weights: Array,
-) -> list[float]:
-    """Decrease that a linear fit of the effect beside the free parameters promises, as a share of the joint's cost."""
-    fleet = freedom.fleet
-    alone = {fleet.names[j]: (j,) for j in range(fleet.n)}
-    more = free_parameters(fleet, effect.free, alone, joints)
+) -> dict[tuple[int, str], float]:
+    """Decrease that a linear fit of each effect beside the free parameters promises, as a share of its joint's cost.
+
+    All effects begin with values that are neutral, so that one simulation gives the derivatives of all.
+    """
+    fleet, size = freedom.fleet, len(freedom.free)
     known = {(p.name, j) for p in freedom.free for j in p.joints if len(p.joints) == 1}
-    more = tuple(p for p in more if (p.name, p.joints[0]) not in known)
+    more: dict[tuple[int, str], FreeParameter] = {}
+    for joint, name in wanted:
+        for parameter in free_parameters(fleet, BY_NAME[name].free, {fleet.names[joint]: (joint,)}, [joint]):
+            if (parameter.name, joint) not in known:
+                more[joint, parameter.name] = parameter
     if not more:
-        return [0.0] * len(joints)
-    both = Freedom(fleet=fleet, free=(*freedom.free, *more))
-    errors = [
-        replace(part, simulated=old.simulated)
-        for part, old in zip(linearised_runs(Freedom(fleet=fleet, free=more), values, runs), now, strict=True)
-    ]
+        return {}
+    added = Freedom(fleet=fleet, free=tuple(more.values()))
     joined = [
-        replace(part, jacobian=np.concatenate([_of(old), _of(part)], axis=2))
-        for part, old in zip(errors, now, strict=True)
+        replace(old, jacobian=np.concatenate([_of(old), _of(part)], axis=2))
+        for part, old in zip(linearised_runs(added, values, runs), now, strict=True)
     ]
     gram, right = normal_equations(joined, weights)
-    gram[np.diag_indices(len(gram))] *= 1 + 1e-9
-    size = len(freedom.free)
-    inner = gram[:size, :size] + 1e-9 * np.eye(size)
+    inner = gram[:size, :size] + 1e-9 * np.diag(np.diag(gram)[:size] + 1.0)
     solved = np.linalg.solve(inner, gram[:size, size:])
     left, effort = gram[size:, size:] - gram[size:, :size] @ solved, right[size:] - solved.T @ right[:size]
-    shares = []
-    for joint in joints:
-        mine = [k for k, p in enumerate(more) if p.joints == (joint,)]
+    place = {key: k for k, key in enumerate(more)}
+    shares = {}
+    for joint, name in wanted:
+        mine = [place[joint, own] for own in BY_NAME[name].free if (joint, own) in place]
         # Parameters without an effect at these values, such as a speed of no friction, have no slope.
-        mine = [k for k in mine if left[k, k] > 1e-12 * max(gram[size + k, size + k], 1e-300) and left[k, k] > 0]
+        mine = [k for k in mine if left[k, k] > 1e-9 * gram[size + k, size + k] and gram[size + k, size + k] > 0]
         if not mine:
-            shares.append(0.0)
             continue
-        C, b = left[np.ix_(mine, mine)], effort[mine]
-        step = np.linalg.solve(C + 1e-9 * np.diag(np.diag(C)), b)
-        bounds = [(more[k].lower / more[k].size, more[k].upper / more[k].size) for k in mine]
-        at = [fleet.of(values, joint, more[k].name) / more[k].size for k in mine]
-        inside = all(low <= x + d <= high for (low, high), x, d in zip(bounds, at, step, strict=True))
-        shares.append(float(b @ step / costs[joint]) if inside or len(mine) > 1 else 0.0)
-    del both
+        block, force = left[np.ix_(mine, mine)], effort[mine]
+        step = np.linalg.solve(block + 1e-9 * np.diag(np.diag(block)), force)
+        if len(mine) == 1:
+            own = added.free[mine[0]]
+            at = fleet.of(values, joint, own.name) / own.size + step[0]
+            if not own.lower / own.size <= at <= own.upper / own.size:
+                continue
+        shares[joint, name] = float(force @ step / costs[joint])
     return shares
 
 
@@ -258,7 +272,9 @@ def _fitted(freedom: Freedom, values: tuple[Array, ...], runs: Sequence[Run], pr
     names = [name for name in promise.effect.free if name in promise.start or not promise.effect.bends]
     alone = {fleet.names[promise.joint]: (promise.joint,)}
     try:
-        return fit_drives(freedom.with_free(free_parameters(fleet, names, alone, [promise.joint])), changed, runs, QUICK)
+        return fit_drives(
+            freedom.with_free(free_parameters(fleet, names, alone, [promise.joint])), changed, runs, QUICK
+        )
     except SolverError:
         return None
 
@@ -294,9 +310,7 @@ def _finding(
 ) -> LoopFinding:
     fleet, joint, effect = freedom.fleet, promise.joint, promise.effect
     known = {name: fleet.of(trial.values, joint, name) for name in (*effect.free, *promise.start)}
-    others = tuple(
-        (name, error) for other, name, error in rivals if other == joint and name != effect.name
-    )
+    others = tuple((name, error) for other, name, error in rivals if other == joint and name != effect.name)
     return LoopFinding(
         effect=effect.name,
         title=effect.title,

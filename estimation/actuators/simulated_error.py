@@ -37,9 +37,7 @@ class Errors:
         return (self.run.q - self.simulated) * self.run.counted[:, None]
 
 
-def simulate_runs(
-    fleet: Fleet, values: Sequence[Array], runs: Sequence[Run], *, refinement: int = 1
-) -> list[Errors]:
+def simulate_runs(fleet: Fleet, values: Sequence[Array], runs: Sequence[Run], *, refinement: int = 1) -> list[Errors]:
     """Simulates all runs with given values, chain by chain.
 
     Args:
@@ -101,5 +99,7 @@ def rms(errors: Sequence[Errors]) -> Array:
 def prepare(fleet: Fleet) -> None:
     """Compiles the functions of all chains, several at a time: the compiler runs outside of Python."""
     with ThreadPoolExecutor(2) as pool:
-        for result in [pool.submit(getattr, dynamics, name) for dynamics in fleet.dynamics for name in ("step", "slopes")]:
+        for result in [
+            pool.submit(getattr, dynamics, name) for dynamics in fleet.dynamics for name in ("step", "slopes")
+        ]:
             result.result()

@@ -91,10 +91,10 @@ class BatchFunction(ABC):
         if series.shape != (steps, samples, self.input_sizes[1]):
             raise InputError(f"inputs of shape {series.shape}", allowed=f"({steps}, {samples}, {self.input_sizes[1]})")
         states = np.empty((steps, samples, size))
-        self._run(samples, arrays, series, states)
+        self._advance(samples, arrays, series, states)
         return states
 
-    def _run(self, samples: int, arguments: list[Array], inputs: Array, states: Array) -> None:
+    def _advance(self, samples: int, arguments: list[Array], inputs: Array, states: Array) -> None:
         """Fills the states step by step; `arguments` are those of the first step."""
         now = list(arguments)
         for k in range(len(inputs)):

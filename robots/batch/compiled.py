@@ -66,7 +66,7 @@ class CompiledFunction(BatchFunction):
 
         return run
 
-    def _run(self, samples: int, arguments: list[Array], inputs: Array, states: Array) -> None:
+    def _advance(self, samples: int, arguments: list[Array], inputs: Array, states: Array) -> None:
         counts = ctypes.c_longlong(samples), ctypes.c_longlong(len(inputs))
         assert self._steps is not None
         self._steps(*counts, _pointers([arguments[0], inputs, *arguments[2:]]), _pointers([states]))

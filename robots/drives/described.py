@@ -163,9 +163,7 @@ def _spread(
     return [float(value)] * len(names)
 
 
-def _from_mjcf(
-    robots: Sequence[Robot], names: Sequence[str], stated: Sequence[dict[str, float]]
-) -> DescribedDrives:
+def _from_mjcf(robots: Sequence[Robot], names: Sequence[str], stated: Sequence[dict[str, float]]) -> DescribedDrives:
     mjcf = next((robot.mjcf for robot in robots if robot.mjcf), "")
     laws: dict[str, MjcfLaw] = read_actuators(Path(mjcf)) if mjcf else {}
     missing = [name for name in names if name not in laws]

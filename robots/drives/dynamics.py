@@ -35,7 +35,7 @@ class Layout(NamedTuple):
         """Indices of a parameter on all joints that have it."""
         return np.array([k for k, own in enumerate(self.names) if own == name], dtype=np.intp)
 
-    def index(self, joint: int, name: str) -> int:
+    def place(self, joint: int, name: str) -> int:
         """Index of a joint's parameter."""
         return next(int(k) for k in np.flatnonzero(self.joints == joint) if self.names[k] == name)
 
@@ -92,12 +92,12 @@ class DriveDynamics:
         q, dq, ddq, command = (casadi.SX.sym(name, n) for name in ("q", "dq", "ddq", "command"))
         state, p = casadi.SX.sym("state", s), casadi.SX.sym("p", self.size)
         Y = RigidBody().regressor(self.robot, q, dq, ddq)
-        factors = [p[self.layout.index(j, "mass_factor")] for j in range(n)]
+        factors = [p[self.layout.place(j, "mass_factor")] for j in range(n)]
         inertia = casadi.vertcat(*(factors[j] * casadi.DM(self.robot.inertia[j]) for j in range(n)))
         rigid = Y @ inertia
         torques, sizes, rates = [], [], []
         for j, drive in enumerate(self.drives):
-            own = {name: p[self.layout.index(j, name)] for name in drive.names}
+            own = {name: p[self.layout.place(j, name)] for name in drive.names}
             states = dict(zip(drive.states, (state[int(k)] for k in np.flatnonzero(self.owners == j)), strict=True))
             measured = q[j] + own["encoder_zero"]
             now = Instant(self.robot, j, measured, dq[j], ddq[j], rigid[j], states)

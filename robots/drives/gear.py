@@ -86,7 +86,7 @@ class LoadFriction(Member):
 
     def dry(self, now: Instant, values: Values) -> casadi.SX:
         """Builds the dry friction of the load."""
-        at = _at(now, casadi.vertcat(ALIKE, NO_ROTOR))
+        at = _at(now, casadi.SX([ALIKE, NO_ROTOR]))
         return values["load_coulomb"] * LoadDependentFriction().row(now.robot, now.joint, at)[0]
 
 

@@ -186,4 +186,3 @@ def _recursion(A: Array, B: Array, first: Array) -> Array:
         np.dot(A[k], S[k], out=S[k + 1])
         S[k + 1] += B[k]
     return S
-

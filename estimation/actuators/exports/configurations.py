@@ -22,7 +22,7 @@ def isaac_lab_text(result: Actuators) -> str:
         result: identified drives.
     """
     told = expressible(result)
-    late = int(round(float(np.max(told.delay)) / STEP))
+    late = round(float(np.max(told.delay)) / STEP)
     entries = {
         "stiffness": told.kp,
         "damping": told.kd,
@@ -65,8 +65,15 @@ def newton_text(result: Actuators) -> str:
         {
             "joint": name,
             "delay": {"seconds": float(told.delay[j])},
-            "drive": {"type": "pd", "kp": float(told.kp[j]), "kd": float(told.kd[j]), "const_effort": -float(told.offset[j])},
-            "clamping": [{"type": "max_effort", "max_effort": float(told.limit[j])}] if np.isfinite(told.limit[j]) else [],
+            "drive": {
+                "type": "pd",
+                "kp": float(told.kp[j]),
+                "kd": float(told.kd[j]),
+                "const_effort": -float(told.offset[j]),
+            },
+            "clamping": [{"type": "max_effort", "max_effort": float(told.limit[j])}]
+            if np.isfinite(told.limit[j])
+            else [],
             "joint_properties": {
                 "armature": float(told.armature[j]),
                 "friction": float(told.friction[j]),

@@ -36,8 +36,8 @@ class DrivesMjcf(NamedTuple):
 def drives_mjcf(result: Actuators, folder: Path) -> DrivesMjcf:
     """Writes armature, damping, frictionloss and position actuators with limits, offsets and delays.
 
-    If the robot came from an MJCF, its file is kept; only moving joints and their actuators change, and links whose mass
-    was identified. Any other serial robot gets a plain chain.
+    If the robot came from an MJCF, its file is kept; only moving joints and their actuators change, and links whose
+    mass was identified. Any other serial robot gets a plain chain.
 
     Args:
         result: identified drives, as `identify_actuators` returned them.

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
@@ -68,7 +68,9 @@ def actuators(
     joints: Annotated[
         str | None,
         typer.Option(
-            "--joints", help="The joints of the log in its order, comma-separated; others are locked.", show_default=False
+            "--joints",
+            help="The joints of the log in its order, comma-separated; others are locked.",
+            show_default=False,
         ),
     ] = None,
     lock: LockOption = None,
@@ -101,7 +103,7 @@ def actuators(
             known = described_drives(chains, gains)
             order = joint_order(chains, named(joints))
             kinds = tuple(kind for chain in chains for kind in chain.chain.kinds)
-            read = {
+            read: dict[str, Any] = {
                 "n": len(order.names),
                 "torque": False,
                 "mapping": with_rate(mapping, rate),

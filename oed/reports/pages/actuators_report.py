@@ -7,6 +7,7 @@ import numpy as np
 from estimation.actuators import Actuators, DriveValue
 from oed.reports.pictures.drive_pictures import drive_error_picture, drive_motion_picture, drive_parameter_picture
 from oed.reports.rendering.page import Cell, Fact, Finding, Page, Section, Table, findings_of
+from oed.reports.rendering.picture import Picture
 from oed.reports.rendering.provenance import footer, recordings_of
 from oed.reports.rendering.saving import save_page
 from oed.reports.rendering.significant import significant
@@ -41,7 +42,9 @@ def actuators_page(result: Actuators) -> Page:
         sections=(
             Section(
                 title="Motion",
-                paragraphs=("Measured and simulated positions of held-out data. The simulation sees the commands alone.",)
+                paragraphs=(
+                    "Measured and simulated positions of held-out data. The simulation sees the commands alone.",
+                )
                 if motion
                 else (),
                 pictures=(*motion, drive_error_picture(result.errors)),
@@ -111,7 +114,7 @@ def _next(result: Actuators) -> str:
     return f"Log a motion with {'; '.join(parts)}."
 
 
-def _parameter_pictures(result: Actuators) -> tuple:  # type: ignore[type-arg]
+def _parameter_pictures(result: Actuators) -> tuple[Picture, ...]:
     pictures = []
     for name in dict.fromkeys(value.parameter for value in result.parameters):
         rows = [value for value in result.parameters if value.parameter == name]

@@ -82,7 +82,7 @@ def drive_error_picture(errors: Sequence[MotionError], *, name: str = "drive_err
         y_label="held-out error [mrad]",
         categories=tuple(error.name for error in errors),
         series=tuple(
-            Series(x=place, y=[1e3 * getattr(e, key) for e in errors], name=label, kind="bars", role=role)
+            Series(x=place, y=np.array([1e3 * getattr(e, key) for e in errors]), name=label, kind="bars", role=role)
             for key, label, role in bars
         ),
     )
@@ -104,8 +104,20 @@ def drive_parameter_picture(parameter: str, values: Sequence[DriveValue]) -> Pic
         categories=tuple(value.group for value in values),
         series=(
             Series(x=place, y=middle, error=half, name="95 % interval", kind="markers", role="main", opacity=0.5),
-            Series(x=place, y=[value.value for value in values], name="identified", kind="markers", role="measured"),
-            Series(x=place, y=[value.described for value in values], name="described", kind="markers", role="neutral"),
+            Series(
+                x=place,
+                y=np.array([value.value for value in values]),
+                name="identified",
+                kind="markers",
+                role="measured",
+            ),
+            Series(
+                x=place,
+                y=np.array([value.described for value in values]),
+                name="described",
+                kind="markers",
+                role="neutral",
+            ),
         ),
     )
     return Picture(title=parameter.replace("_", " "), name=f"drive_{parameter}", panels=(panel,), panel_height=200)
