@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, TypeVar
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
 
 from robots.common.errors import InputError
 
@@ -50,6 +54,37 @@ def joint_order(chains: Sequence[Robot], stated: Sequence[str] | None) -> JointO
     if stated is None:
         return JointOrder(names, tuple(range(len(names))))
     return JointOrder(tuple(stated), tuple(list(stated).index(name) for name in names))
+
+
+def limits_of(chains: Sequence[Robot], order: JointOrder) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Gives lower and upper positions of a log's joints in its order [rad or m]."""
+    lower = [float(value) for chain in chains for value in chain.limits.lower]
+    upper = [float(value) for chain in chains for value in chain.limits.upper]
+    return np.array(order.put(lower)), np.array(order.put(upper))
+
+
+def logs_from(
+    paths: Sequence[Path], limits: tuple[NDArray[np.float64], NDArray[np.float64]], options: Mapping[str, Any]
+) -> list[Log]:
+    """Reads logs with commands: files of any known format, and LeRobot data sets.
+
+    Args:
+        paths: files and folders.
+        limits: of the joints, by which normalised positions of a data set are read.
+        options: of `read_logs`.
+
+    Raises:
+        InputError: see `read_logs` and `read_lerobot`.
+    """
+    from estimation.logs import read_logs
+    from estimation.logs.readers.lerobot import is_lerobot, read_lerobot
+
+    sets = [path for path in paths if is_lerobot(path)]
+    files = [path for path in paths if path not in sets]
+    found = list(read_logs(files, **options)) if files else []
+    for path in sets:
+        found += read_lerobot(path, options["joints"], limits)
+    return found
 
 
 def named(text: str | None) -> tuple[str, ...] | None:

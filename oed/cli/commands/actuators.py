@@ -90,8 +90,7 @@ def actuators(
     with console.working() as progress:
         from estimation.actuators import ActuatorOptions, identify_actuators
         from estimation.actuators.exports import simulator_files
-        from estimation.logs import read_logs
-        from oed.cli.drives import joint_order, named, positions
+        from oed.cli.drives import joint_order, limits_of, logs_from, named, positions
         from oed.reports import save_actuators_report
         from robots.branches import load_branches
         from robots.common.files import ResultFolder
@@ -110,8 +109,9 @@ def actuators(
                 "joints": order.names,
                 "kinds": order.put(kinds),
             }
-            logs = [order.sorted(one) for one in read_logs(log, **read)]
-            outside = [order.sorted(one) for one in read_logs(held_out, **read)] if held_out else []
+            limits = limits_of(chains, order)
+            logs = [order.sorted(one) for one in logs_from(log, limits, read)]
+            outside = [order.sorted(one) for one in logs_from(held_out or [], limits, read)]
             options = ActuatorOptions(
                 share=named(share) or (), free=(*(named(free) or ()), *known.unknown), effects=effects, seed=seed
             )
