@@ -30,7 +30,7 @@ class Played(NamedTuple):
     held_out: Log
 
 
-def played(folder: Path, truth: Truth, seconds: float = 4.0) -> Played:
+def played(folder: Path, truth: Truth, seconds: float = 3.0) -> Played:
     """Plays two motions on a plant."""
     path = folder / "leg.xml"
     path.write_text(mjcf(LEG))

@@ -89,7 +89,8 @@ def test_the_written_mjcf_moves_as_the_report_says(leg: Played, identified: Actu
         q[k] = data.qpos
         data.ctrl[:] = command
         mujoco.mj_step(model, data, substeps)
-    late = log.t > 0.3
+    # MuJoCo's history of commands begins with zeros, and friction keeps the kick for a while.
+    late = log.t > 1.0
     error = float(np.mean(np.sqrt(np.mean((q - log.q)[late] ** 2, axis=0))))
     assert error == pytest.approx(identified.written_error, rel=0.1)
 
@@ -103,8 +104,8 @@ def test_a_result_survives_its_file(identified: Actuators, tmp_path: Path) -> No
     assert np.array_equal(again.traces[0].identified, identified.traces[0].identified)
     with pytest.raises(InputError):
         identified.save(tmp_path)
+    (tmp_path / "other.json").write_text("{}")
     with pytest.raises(InputError, match="holds no drives"):
-        (tmp_path / "other.json").write_text("{}")
         load_actuators(tmp_path / "other.json")
 
 
