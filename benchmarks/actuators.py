@@ -27,8 +27,8 @@ from benchmarks.actuators_parts.plants import MACHINES, Machine, Truth, mjcf, mu
 from benchmarks.actuators_parts.rollouts import NOMINAL, SIZES, Rollouts, by_cma, by_differences  # noqa: E402
 from estimation.actuators import ActuatorOptions, Actuators, identify_actuators  # noqa: E402
 from estimation.logs import read_log  # noqa: E402
-from robots.branches import load_branches  # noqa: E402
 from robots.drives import described_drives  # noqa: E402
+from robots.drives.branches import load_branches  # noqa: E402
 from robots.signals import Log  # noqa: E402
 
 TRAINED = 9.0
@@ -84,9 +84,8 @@ def go2(options: argparse.Namespace) -> None:
 
         began = time.perf_counter()
         theta = NOMINAL + by_cma(cost, 22, options.cma, 0) * SIZES
-        print(
-            f"CMA-ES                      {1e3 * held_out(theta):6.2f} mrad held out, {time.perf_counter() - began:.1f} s"
-        )
+        took = time.perf_counter() - began
+        print(f"CMA-ES                      {1e3 * held_out(theta):6.2f} mrad held out, {took:.1f} s")
 
 
 def identified(machine: Machine, log: Log, effects: bool, held_out: Log | None = None) -> Actuators:

@@ -91,7 +91,7 @@ def identify_actuators(
     coloured noise (sandwich), and at least those of a block bootstrap.
 
     Args:
-        robots: the robot, or its chains from a base that is held, see `robots.branches.load_branches`.
+        robots: the robot, or its chains from a base that is held, see `robots.drives.branches.load_branches`.
         logs: with commands, of all joints in the order of the chains.
         drives: what is known of the joints' drives, see `robots.drives.described_drives`.
         held_out: logs that nothing is fitted to. Without them the last part of each run is held out.

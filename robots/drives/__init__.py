@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from robots.drives.base import DriveParameter, Instant, Member
+from robots.drives.branches import load_branches
 from robots.drives.delay import Delay, HeldCommand
 from robots.drives.described import DescribedDrives, described_drives
 from robots.drives.drive import Drive
@@ -37,5 +38,6 @@ __all__ = [
     "StribeckFriction",
     "VelocityLaw",
     "described_drives",
+    "load_branches",
     "simulate_drives",
 ]

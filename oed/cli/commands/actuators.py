@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, TypeVar
 
 import typer
 
@@ -22,6 +24,16 @@ from oed.cli.options import (
     SeedOption,
     with_rate,
 )
+from robots.common.errors import InputError
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
+    from robots.robot import Robot
+    from robots.signals import Log
+
+T = TypeVar("T")
 
 
 def actuators(
@@ -58,7 +70,7 @@ def actuators(
         str | None,
         typer.Option(
             "--free",
-            help="Parameters to identify besides delay, armature, friction and offset, comma-separated: kp,kd.",
+            help="Parameters to identify beside delay, armature, friction and offset, comma-separated: kp,kd.",
             show_default=False,
         ),
     ] = None,
@@ -90,17 +102,16 @@ def actuators(
     with console.working() as progress:
         from estimation.actuators import ActuatorOptions, identify_actuators
         from estimation.actuators.exports import simulator_files
-        from oed.cli.drives import joint_order, limits_of, logs_from, named, positions
         from oed.reports import save_actuators_report
-        from robots.branches import load_branches
         from robots.common.files import ResultFolder
         from robots.drives import described_drives
+        from robots.drives.branches import load_branches
 
         names = ("actuators.json", "motion.parquet", "parameters.csv", "report.html")
         with ResultFolder(out, force, names=names) as folder:
-            chains = load_branches(robot, joints=named(joints), locked=positions(lock))
+            chains = load_branches(robot, joints=_named(joints), locked=_positions(lock))
             known = described_drives(chains, gains)
-            order = joint_order(chains, named(joints))
+            order = _joint_order(chains, _named(joints))
             kinds = tuple(kind for chain in chains for kind in chain.chain.kinds)
             read: dict[str, Any] = {
                 "n": len(order.names),
@@ -109,11 +120,11 @@ def actuators(
                 "joints": order.names,
                 "kinds": order.put(kinds),
             }
-            limits = limits_of(chains, order)
-            logs = [order.sorted(one) for one in logs_from(log, limits, read)]
-            outside = [order.sorted(one) for one in logs_from(held_out or [], limits, read)]
+            limits = _limits_of(chains, order)
+            logs = [order.sorted(one) for one in _logs_from(log, limits, read)]
+            outside = [order.sorted(one) for one in _logs_from(held_out or [], limits, read)]
             options = ActuatorOptions(
-                share=named(share) or (), free=(*(named(free) or ()), *known.unknown), effects=effects, seed=seed
+                share=_named(share) or (), free=(*(_named(free) or ()), *known.unknown), effects=effects, seed=seed
             )
             result = identify_actuators(
                 chains, logs, known.drives, held_out=outside, options=options, progress=progress
@@ -126,3 +137,94 @@ def actuators(
             save_actuators_report(result, folder, png=png)
     lines = [result.summary(), *(f"  {remark}" for remark in written.remarks), f"written to {out.resolve()}"]
     console.result("\n".join(lines), result.to_dict())
+
+
+@dataclass(frozen=True)
+class _JointOrder:
+    """The joints of a log in its order, and where each chain's joints are among them.
+
+    Attributes:
+        names: of the log's joints.
+        places: of the chains' joints among them.
+    """
+
+    names: tuple[str, ...]
+    places: tuple[int, ...]
+
+    def put(self, values: Sequence[T]) -> tuple[T, ...]:
+        """Puts one value per joint of the chains into the order of the log."""
+        return tuple(values[self.places.index(k)] for k in range(len(self.places)))
+
+    def sorted(self, log: Log) -> Log:
+        """Puts a log's joints into the order of the chains."""
+        order = list(self.places)
+        if order == sorted(order):
+            return log
+        kept = {
+            key: value[:, order]
+            for key in ("q", "command", "tau", "current", "dq", "ddq", "temperature", "qlink")
+            if (value := getattr(log, key)) is not None
+        }
+        return replace(log, **kept)
+
+
+def _joint_order(chains: Sequence[Robot], stated: Sequence[str] | None) -> _JointOrder:
+    """Finds the order of a log's joints: as stated, else that of the chains."""
+    names = tuple(name for chain in chains for name in chain.joint_names)
+    if stated is None:
+        return _JointOrder(names, tuple(range(len(names))))
+    return _JointOrder(tuple(stated), tuple(list(stated).index(name) for name in names))
+
+
+def _limits_of(chains: Sequence[Robot], order: _JointOrder) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Gives lower and upper positions of a log's joints in its order [rad or m]."""
+    import numpy as np
+
+    lower = [float(value) for chain in chains for value in chain.limits.lower]
+    upper = [float(value) for chain in chains for value in chain.limits.upper]
+    return np.array(order.put(lower)), np.array(order.put(upper))
+
+
+def _logs_from(
+    paths: Sequence[Path], limits: tuple[NDArray[np.float64], NDArray[np.float64]], options: Mapping[str, Any]
+) -> list[Log]:
+    """Reads logs with commands: files of any known format, and LeRobot data sets.
+
+    Args:
+        paths: files and folders.
+        limits: of the joints, by which normalised positions of a data set are read.
+        options: of `read_logs`.
+
+    Raises:
+        InputError: see `read_logs` and `read_lerobot`.
+    """
+    from estimation.logs import read_logs
+    from estimation.logs.readers.lerobot import is_lerobot, read_lerobot
+
+    sets = [path for path in paths if is_lerobot(path)]
+    files = [path for path in paths if path not in sets]
+    found = list(read_logs(files, **options)) if files else []
+    for path in sets:
+        found += read_lerobot(path, options["joints"], limits)
+    return found
+
+
+def _named(text: str | None) -> tuple[str, ...] | None:
+    """Reads names, separated by commas."""
+    return tuple(part.strip() for part in text.split(",") if part.strip()) if text else None
+
+
+def _positions(lock: Sequence[str] | None) -> dict[str, float] | None:
+    """Reads positions of locked joints, each name=value [rad or m].
+
+    Raises:
+        InputError: something else.
+    """
+    found = {}
+    for item in lock or ():
+        name, _, value = item.partition("=")
+        try:
+            found[name.strip()] = float(value)
+        except ValueError:
+            raise InputError(f"--lock {item}", allowed="name=value with the value in rad or m") from None
+    return found or None

@@ -10,8 +10,8 @@ import pytest
 
 from benchmarks.actuators_parts.plants import MACHINES, Machine, Truth, mjcf, multisine, play, random_truth
 from estimation.actuators import ActuatorOptions, Actuators, identify_actuators
-from robots.branches import load_branches
 from robots.drives import Drive, described_drives
+from robots.drives.branches import load_branches
 from robots.robot import Robot
 from robots.signals import Log
 

@@ -13,9 +13,9 @@ from benchmarks.actuators_parts.plants import MACHINES, mjcf
 from estimation.actuators.freedom import Fleet
 from estimation.actuators.runs import runs_of
 from estimation.logs import read_log
-from robots.branches import load_branches
 from robots.common.errors import InputError
 from robots.drives import described_drives
+from robots.drives.branches import load_branches
 from robots.signals import Log
 
 LEG = MACHINES["leg"]()

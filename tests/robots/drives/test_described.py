@@ -8,9 +8,9 @@ from pathlib import Path
 import pytest
 
 from benchmarks.actuators_parts.plants import MACHINES, mjcf
-from robots.branches import load_branches
 from robots.common.errors import InputError
 from robots.drives import described_drives
+from robots.drives.branches import load_branches
 
 LEG = MACHINES["leg"]()
 

@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 
 from benchmarks.actuators_parts.plants import MACHINES, Truth, mjcf, multisine, play, random_truth
-from robots.branches import load_branches
 from robots.common.errors import InputError, SolverError
 from robots.drives import (
     LAWS,
@@ -22,6 +21,7 @@ from robots.drives import (
     VelocityLaw,
     simulate_drives,
 )
+from robots.drives.branches import load_branches
 from robots.robot import Robot
 
 LEG = replace(MACHINES["leg"](), encoder=1e-12)
