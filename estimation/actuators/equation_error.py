@@ -86,7 +86,7 @@ def _balance(
     rows = slice(len(q) // 50, len(q) - len(q) // 50, share)
     for chain, columns in enumerate(freedom.fleet.columns):
         dynamics, p = freedom.fleet.dynamics[chain], values[chain]
-        layout, directions = dynamics.layout, freedom.directions(chain)
+        layout, directions = dynamics.layout, freedom.directions[chain]
         edges = np.append(run.t, run.t[-1] + period) - period / 2
         delays = p[layout.of("delay")]
         means = low_pass(run.of(columns).means(edges, delays)[0], period, cutoff)
@@ -98,7 +98,7 @@ def _balance(
         )
         mass = layout.of("mass_factor")
         for joint in range(len(columns)):
-            mine = np.setdiff1d(np.flatnonzero(layout.joints == joint), mass)
+            mine = layout.of_joints[joint]
             matrix = by_own[:, 0, mine] @ directions[mine] + by_mass[:, joint] @ directions[mass]
             found.append((matrix, residual[:, joint, 0]))
     return found

@@ -21,8 +21,6 @@ PRIOR = 100.0
 """Standard deviation of a free parameter about its start, in its sizes: what the motion does not show stays there."""
 FIRST, GROWTH, SHRINKAGE, MOST = 1e-3, 6.0, 0.2, 1e6
 """Damping of the first step, its factors after a step that fails or succeeds, and the largest."""
-SETTLED = 1e-5
-"""Relative decrease of the cost below which the fit has settled."""
 FLOOR = 1e-5
 """Least error of a joint [rad or m] in its weight: encoders are no better."""
 
@@ -34,10 +32,12 @@ class FitOptions:
     Attributes:
         iterations: the most Gauss-Newton steps of a round.
         rounds: how often the joints' weights are taken from their errors.
+        settled: relative decrease of the cost below which the fit has settled.
     """
 
     iterations: int = 25
     rounds: int = 2
+    settled: float = 1e-5
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -103,9 +103,7 @@ def fit_drives(
     weights = np.full(freedom.fleet.n, float(np.mean(np.maximum(rms(errors), FLOOR) ** 2)) ** -1)
     settled = False
     for round_ in range(chosen.rounds):
-        theta, errors, settled = _descend(
-            freedom, start, theta, prior, errors, weights, runs, chosen.iterations, progress
-        )
+        theta, errors, settled = _descend(freedom, start, theta, prior, errors, weights, runs, chosen, progress)
         if round_ + 1 < chosen.rounds:
             weights = np.maximum(rms(errors), FLOOR) ** -2
     return Fit(
@@ -144,12 +142,12 @@ def _descend(
     errors: list[Errors],
     weights: Array,
     runs: Sequence[Run],
-    iterations: int,
+    options: FitOptions,
     progress: Progress,
 ) -> tuple[Array, list[Errors], bool]:
     lower, upper = freedom.bounds
     damping, cost = FIRST, _cost(errors, weights, theta - prior)
-    for _ in range(iterations):
+    for _ in range(options.iterations):
         gram, right = normal_equations(errors, weights)
         gram[np.diag_indices(len(theta))] += PRIOR**-2
         right = right - (theta - prior) / PRIOR**2
@@ -170,7 +168,7 @@ def _descend(
             return theta, errors, True
         errors = linearised_runs(freedom, freedom.values(theta, fixed), runs)
         progress.update(0.0, f"simulated error {1e3 * float(np.mean(rms(errors))):.3g} mrad")
-        if before - cost < SETTLED * before:
+        if before - cost < options.settled * before:
             return theta, errors, True
     return theta, errors, False
 

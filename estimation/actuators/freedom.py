@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -134,15 +135,15 @@ class Freedom:
         lower, upper = (np.array([getattr(p, key) for p in self.free]) for key in ("lower", "upper"))
         return lower / self.sizes, upper / self.sizes
 
-    def directions(self, chain: int) -> Array:
-        """Change of a chain's parameters per scaled free parameter (P, K)."""
-        matrix = np.zeros((self.fleet.dynamics[chain].size, len(self.free)))
+    @cached_property
+    def directions(self) -> tuple[Array, ...]:
+        """Change of each chain's parameters per scaled free parameter (P, K)."""
+        matrices = tuple(np.zeros((dynamics.size, len(self.free))) for dynamics in self.fleet.dynamics)
         for k, parameter in enumerate(self.free):
             for joint in parameter.joints:
-                own, index = self.fleet.index(joint, parameter.name)
-                if own == chain:
-                    matrix[index, k] = parameter.size
-        return matrix
+                chain, index = self.fleet.index(joint, parameter.name)
+                matrices[chain][index, k] = parameter.size
+        return matrices
 
     def theta(self, values: Sequence[Array]) -> Array:
         """Scaled free parameters (K,) of given values; the mean of joints that share one."""

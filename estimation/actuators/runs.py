@@ -14,6 +14,7 @@ from estimation.actuators.freedom import Fleet
 from estimation.logs.formats import read_foreign
 from robots.common.errors import InputError, NotIdentifiableError
 from robots.drives import HeldCommand
+from robots.drives.simulation import usual_step
 from robots.signals import Log
 
 Array = NDArray[np.float64]
@@ -53,9 +54,21 @@ class Run:
     command: Array
     steps: Array
 
+    @cached_property
+    def _held(self) -> dict[bytes, HeldCommand]:
+        return {}
+
     def of(self, columns: NDArray[np.intp]) -> HeldCommand:
         """The commands of some joints as the controller holds them."""
-        return HeldCommand(self.log_t, self.command[:, columns], self.steps[columns])
+        key = columns.tobytes()
+        if key not in self._held:
+            self._held[key] = HeldCommand(self.log_t, self.command[:, columns], self.steps[columns])
+        return self._held[key]
+
+    @cached_property
+    def step(self) -> float:
+        """Usual step of its simulation [s]."""
+        return usual_step(self.t)
 
     @cached_property
     def start_velocity(self) -> Array:

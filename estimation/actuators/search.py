@@ -29,7 +29,8 @@ SURE = 3.0
 """Standard errors by which the logarithm of the held-out squared error must fall."""
 MEMORIES, FEWEST_BLOCKS, MOST_BLOCKS = 2, 6, 40
 """Length of a block in times of the error's memory, and the least and most blocks."""
-QUICK = FitOptions(iterations=8, rounds=1)
+QUICK = FitOptions(iterations=6, rounds=1, settled=0.01)
+"""Settings of the fits that compare effects."""
 
 
 @dataclass(frozen=True, kw_only=True)

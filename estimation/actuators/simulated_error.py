@@ -12,7 +12,6 @@ from numpy.typing import NDArray
 from estimation.actuators.freedom import Fleet, Freedom
 from estimation.actuators.runs import Run
 from robots.drives import Start, simulate_drives
-from robots.drives.simulation import usual_step
 
 Array = NDArray[np.float64]
 
@@ -60,7 +59,7 @@ def linearised_runs(freedom: Freedom, values: Sequence[Array], runs: Sequence[Ru
     """
     fleet = freedom.fleet
     found = []
-    directions = [freedom.directions(chain) for chain in range(len(fleet.robots))]
+    directions = freedom.directions
     for run in runs:
         simulated = np.empty_like(run.q)
         jacobian = np.zeros((*run.q.shape, len(freedom.free)))
@@ -69,7 +68,13 @@ def linearised_runs(freedom: Freedom, values: Sequence[Array], runs: Sequence[Ru
             start = Start(run.q[0, columns], run.start_velocity[columns])
             own = run.of(columns)
             result = simulate_drives(
-                fleet.dynamics[chain], own, run.t, start, values[chain], directions=directions[chain][:, used]
+                fleet.dynamics[chain],
+                own,
+                run.t,
+                start,
+                values[chain],
+                directions=directions[chain][:, used],
+                longest=run.step,
             )
             simulated[:, columns] = result.measured
             assert result.sensitivity is not None
@@ -83,7 +88,7 @@ def _chains(fleet: Fleet, values: Sequence[Array], run: Run, refinement: int) ->
     simulated = np.empty_like(run.q)
     for chain, columns in enumerate(fleet.columns):
         start = Start(run.q[0, columns], run.start_velocity[columns])
-        longest = usual_step(run.t) / refinement
+        longest = run.step / refinement
         result = simulate_drives(fleet.dynamics[chain], run.of(columns), run.t, start, values[chain], longest=longest)
         simulated[:, columns] = result.measured
     return simulated

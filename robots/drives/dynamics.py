@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from functools import cached_property
-from typing import NamedTuple
+from dataclasses import dataclass
+from functools import cache, cached_property
 
 import casadi
 import numpy as np
@@ -25,19 +25,31 @@ PASSES = 2
 constant of the fastest loop."""
 
 
-class Layout(NamedTuple):
+@dataclass(frozen=True, eq=False)
+class Layout:
     """Which parameter is where: for each of the P parameters of a robot its joint, counted from 0, and its name."""
 
     joints: NDArray[np.intp]
     names: tuple[str, ...]
 
+    @cached_property
+    def _places(self) -> dict[tuple[int, str], int]:
+        return {(int(j), name): k for k, (j, name) in enumerate(zip(self.joints, self.names, strict=True))}
+
+    @cached_property
+    def of_joints(self) -> tuple[NDArray[np.intp], ...]:
+        """Per joint the indices of its own parameters: those that act on no other joint."""
+        own = np.array([name != "mass_factor" for name in self.names])
+        return tuple(np.flatnonzero((self.joints == j) & own) for j in range(int(self.joints.max()) + 1))
+
+    @cache  # noqa: B019 - a layout lives as long as its dynamics.
     def of(self, name: str) -> NDArray[np.intp]:
         """Indices of a parameter on all joints that have it."""
         return np.array([k for k, own in enumerate(self.names) if own == name], dtype=np.intp)
 
     def place(self, joint: int, name: str) -> int:
         """Index of a joint's parameter."""
-        return next(int(k) for k in np.flatnonzero(self.joints == joint) if self.names[k] == name)
+        return self._places[joint, name]
 
 
 class DriveDynamics:

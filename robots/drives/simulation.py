@@ -134,7 +134,7 @@ def _sensitivity(
     by_p = np.zeros((len(h), n, directions.shape[1]))
     mass, delay = layout.of("mass_factor"), layout.of("delay")
     for joint in range(n):
-        mine = np.setdiff1d(np.flatnonzero(layout.joints == joint), mass)
+        mine = layout.of_joints[joint]
         by_p[:, joint] = by_own[:, 0, mine] @ directions[mine]
     if directions[mass].any():
         by_p += by_mass @ directions[mass]
