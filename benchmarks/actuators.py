@@ -156,8 +156,9 @@ def sized(machine: Machine, truth: Truth, effect: str, joint: int, rng: np.rando
     """Adds an effect of a size that moves the joint by some milliradians."""
     if effect == "current_clipping":
         t, command = multisine(machine, seconds, np.random.default_rng(99), 2e-3)
-        error = np.abs(command - play(machine, truth, t, command))[:, joint]
-        size = machine.kp[joint] * float(np.quantile(error, 0.999)) * rng.uniform(0.45, 0.7)
+        q = play(machine, truth, t, command)
+        asked = machine.kp[joint] * (command - q) - machine.kd[joint] * np.gradient(q, t, axis=0)
+        size = float(np.quantile(np.abs(asked[:, joint]), 0.99)) * rng.uniform(0.5, 0.7)
         return replace(truth, effect=effect, joint=joint, size=min(size, 0.7 * machine.limit[joint]))
     lag = truth.coulomb[joint] + 0.01 * machine.kp[joint]
     sizes = {

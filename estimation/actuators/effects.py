@@ -53,6 +53,14 @@ def _saturations(seen: Seen) -> list[dict[str, float]]:
     return [{"torque_limit": share * peak} for share in (0.9, 0.7, 0.5) if share * peak > 0]
 
 
+def _dead_bands(seen: Seen) -> list[dict[str, float]]:
+    """A fit without a dead band takes it for dry friction, of which a part is given back."""
+    if "kp" not in seen.values:
+        return []
+    gain, friction = seen.values["kp"], seen.values["coulomb"]
+    return [{"dead_band": s * friction / gain, "coulomb": (1 - s) * friction} for s in (0.3, 0.6, 0.9)]
+
+
 def _stops(seen: Seen) -> list[dict[str, float]]:
     """A joint that rests at a stop while its command goes on shows it at the end of its range."""
     low, high = (float(np.quantile(seen.q, share)) for share in (0.002, 0.998))
@@ -103,8 +111,9 @@ EFFECTS: tuple[LoopEffect, ...] = (
         name="dead_band",
         title="dead band of the servo",
         free=("dead_band",),
-        starts=lambda seen: [{"dead_band": 0.0}],
+        starts=_dead_bands,
         states=lambda v: f"errors within {1e3 * v['dead_band']:.3g} mrad make no torque",
+        bends=True,
     ),
     LoopEffect(
         name="time_delay",

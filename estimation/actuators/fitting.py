@@ -83,6 +83,7 @@ def fit_drives(
     runs: Sequence[Run],
     options: FitOptions | None = None,
     progress: Progress = SILENT,
+    weights: Array | None = None,
 ) -> Fit:
     """Fits the free parameters to the measured motion.
 
@@ -92,6 +93,7 @@ def fit_drives(
         runs: what was recorded.
         options: settings.
         progress: is told of each step.
+        weights: of the joints (n,) [1/rad2 or 1/m2] in the first round; by default alike.
 
     Raises:
         SolverError: the loop is not stable at the start.
@@ -100,7 +102,8 @@ def fit_drives(
     theta = freedom.theta(start)
     prior = theta.copy()
     errors = linearised_runs(freedom, freedom.values(theta, start), runs)
-    weights = np.full(freedom.fleet.n, float(np.mean(np.maximum(rms(errors), FLOOR) ** 2)) ** -1)
+    if weights is None:
+        weights = np.full(freedom.fleet.n, float(np.mean(np.maximum(rms(errors), FLOOR) ** 2)) ** -1)
     settled = False
     for round_ in range(chosen.rounds):
         theta, errors, settled = _descend(freedom, start, theta, prior, errors, weights, runs, chosen, progress)

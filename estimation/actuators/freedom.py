@@ -173,10 +173,16 @@ class Freedom:
         return Freedom(fleet=self.fleet.part(chain), free=tuple(mine))
 
     def with_free(self, more: Iterable[FreeParameter]) -> Freedom:
-        """Adds parameters; those that are free already stay as they are."""
-        known = {(p.name, joint) for p in self.free for joint in p.joints}
-        added = tuple(p for p in more if not any((p.name, joint) in known for joint in p.joints))
-        return replace(self, free=(*self.free, *added))
+        """Adds parameters of single joints; a joint that shared one has its own from then on."""
+        free = list(self.free)
+        for new in more:
+            if any(p.name == new.name and p.joints == new.joints for p in free):
+                continue
+            for k, old in enumerate(free):
+                if old.name == new.name and set(old.joints) & set(new.joints):
+                    free[k] = replace(old, joints=tuple(j for j in old.joints if j not in new.joints))
+            free = [parameter for parameter in free if parameter.joints] + [new]
+        return replace(self, free=tuple(free))
 
 
 def classes_of(names: Sequence[str], share: Sequence[str]) -> dict[str, tuple[int, ...]]:

@@ -114,11 +114,12 @@ def _search_chain(
     outside = simulate_runs(freedom.fleet, values, held_out)
     for _ in range(ROUNDS):
         taken = {(finding.joint - 1, effect.name) for finding, effect in accepted}
+        weights = np.maximum(rms(now), FLOOR) ** -2
         promises = _promises(freedom, values, runs, now, weights, taken)
         best: tuple[float, _Promise, Fit, list[Errors]] | None = None
         rivals: list[tuple[int, str, float]] = []
-        for promise in promises[:TRIED]:
-            trial = _fitted(freedom, values, runs, promise)
+        for promise in promises:
+            trial = _fitted(freedom, values, runs, promise, weights)
             if trial is None:
                 continue
             try:
@@ -165,10 +166,6 @@ def _promises(
         neutral = [key for key in there if not BY_NAME[key[1]].bends]
         changed = _with_starts(fleet, values, {key: starts[key][index] for key in neutral})
         shares = _shares_by_slopes(freedom, changed, runs, now, neutral, costs, weights)
-        for name in dict.fromkeys(effect for _, effect in there if BY_NAME[effect].bends):
-            joints = [joint for joint, effect in there if effect == name]
-            bent = _with_starts(fleet, values, {(j, name): starts[j, name][index] for j in joints})
-            shares |= _shares_there(freedom, bent, runs, joints, name, costs, weights)
         for (joint, name), share in shares.items():
             found.append(_Promise(joint=joint, effect=BY_NAME[name], start=starts[joint, name][index], share=share))
     best: dict[tuple[int, str], _Promise] = {}
@@ -177,7 +174,33 @@ def _promises(
         if promise.share > WORTH and (key not in best or promise.share > best[key].share):
             best[key] = promise
     # A promise counts by what it takes off the whole chain's error.
-    return sorted(best.values(), key=lambda p: -p.share * costs[p.joint])
+    smooth = sorted(best.values(), key=lambda p: -p.share * costs[p.joint])[:TRIED]
+    return [*smooth, *_bent(freedom, values, runs, starts, int(np.argmax(rms(now))))]
+
+
+def _bent(
+    freedom: Freedom,
+    values: tuple[Array, ...],
+    runs: Sequence[Run],
+    starts: Mapping[tuple[int, str], Sequence[dict[str, float]]],
+    worst: int,
+) -> list[_Promise]:
+    """Effects that no derivative promises, of the joint with the largest error: each from its best first values."""
+    found = []
+    for (joint, name), options in starts.items():
+        if joint != worst or not BY_NAME[name].bends:
+            continue
+        costs = []
+        for start in options:
+            try:
+                errors = simulate_runs(freedom.fleet, _with_starts(freedom.fleet, values, {(joint, name): start}), runs)
+                costs.append(float(rms(errors)[joint]))
+            except SolverError:
+                costs.append(np.inf)
+        if costs and np.isfinite(min(costs)):
+            start = options[int(np.argmin(costs))]
+            found.append(_Promise(joint=joint, effect=BY_NAME[name], start=start, share=WORTH))
+    return found
 
 
 def _with_starts(
@@ -188,25 +211,6 @@ def _with_starts(
         for name, value in start.items():
             values = fleet.changed(values, name, [joint], value)
     return values
-
-
-def _shares_there(
-    freedom: Freedom,
-    values: tuple[Array, ...],
-    runs: Sequence[Run],
-    joints: Sequence[int],
-    name: str,
-    costs: Array,
-    weights: Array,
-) -> dict[tuple[int, str], float]:
-    """Decrease of each joint's squared error with these values, as a share."""
-    try:
-        errors = simulate_runs(freedom.fleet, values, runs)
-    except SolverError:
-        return {}
-    new = sum((part.error**2).sum(axis=0) for part in errors) * weights
-    # Without a new fit of the rest even the right effect brings a part only, so little is asked of it.
-    return {(j, name): float(1 - new[j] / costs[j] + WORTH) for j in joints if new[j] < costs[j]}
 
 
 def _shares_by_slopes(
@@ -264,7 +268,9 @@ def _of(part: Errors) -> Array:
     return part.jacobian
 
 
-def _fitted(freedom: Freedom, values: tuple[Array, ...], runs: Sequence[Run], promise: _Promise) -> Fit | None:
+def _fitted(
+    freedom: Freedom, values: tuple[Array, ...], runs: Sequence[Run], promise: _Promise, weights: Array
+) -> Fit | None:
     """Fits an effect with everything that was free; None where the loop is not stable."""
     fleet = freedom.fleet
     changed = values
@@ -274,7 +280,11 @@ def _fitted(freedom: Freedom, values: tuple[Array, ...], runs: Sequence[Run], pr
     alone = {fleet.names[promise.joint]: (promise.joint,)}
     try:
         return fit_drives(
-            freedom.with_free(free_parameters(fleet, names, alone, [promise.joint])), changed, runs, QUICK
+            freedom.with_free(free_parameters(fleet, names, alone, [promise.joint])),
+            changed,
+            runs,
+            QUICK,
+            weights=weights,
         )
     except SolverError:
         return None

@@ -238,6 +238,17 @@ def _drives(data: Data) -> Reading:
     )
 
 
+def _drive_design(data: Data) -> Reading:
+    ratios = sorted(i["standard_error"] / i["of_chirp"] for i in data["expected"] if i["of_chirp"])
+    middle = ratios[len(ratios) // 2] if ratios else math.nan
+    return Reading(
+        kind="motion for drives",
+        verdict=f"Standard errors {middle:.2g} times those of a chirp.",
+        figures={"parameters": len(data["expected"])},
+        robot=_robot(data),
+    )
+
+
 def _forces(data: Data) -> Reading:
     count = len(data["contacts"])
     return Reading(
@@ -301,6 +312,7 @@ BY_FORMAT: dict[str, Callable[[Data], Reading]] = {
     "robot-oed fleet": _fleet,
     "robot-oed comparison": _comparison,
     "robot-oed actuators": _drives,
+    "robot-oed drive design": _drive_design,
     "robot-oed payload": _payload,
     "robot-oed forces": _forces,
     "robot-oed campaign": _campaign,

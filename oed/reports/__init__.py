@@ -47,6 +47,7 @@ _EXPORTS = {
     "save_comparison_report": "oed.reports.pages.comparisons.comparison_report",
     "save_design_report": "oed.reports.pages.design_report",
     "save_diagnosis_report": "oed.reports.pages.diagnosis_report",
+    "save_drive_design_report": "oed.reports.pages.drives.design_report",
     "save_estimate_report": "oed.reports.pages.estimate_report",
     "save_force_report": "oed.reports.pages.forces.force_report",
     "save_limits_report": "oed.reports.pages.diagnosis_limits",

@@ -109,9 +109,9 @@ def actuators(
 
         names = ("actuators.json", "motion.parquet", "parameters.csv", "report.html")
         with ResultFolder(out, force, names=names) as folder:
-            chains = load_branches(robot, joints=_named(joints), locked=_positions(lock))
+            chains = load_branches(robot, joints=named(joints), locked=positions(lock))
             known = described_drives(chains, gains)
-            order = _joint_order(chains, _named(joints))
+            order = _joint_order(chains, named(joints))
             kinds = tuple(kind for chain in chains for kind in chain.chain.kinds)
             read: dict[str, Any] = {
                 "n": len(order.names),
@@ -124,7 +124,7 @@ def actuators(
             logs = [order.sorted(one) for one in _logs_from(log, limits, read)]
             outside = [order.sorted(one) for one in _logs_from(held_out or [], limits, read)]
             options = ActuatorOptions(
-                share=_named(share) or (), free=(*(_named(free) or ()), *known.unknown), effects=effects, seed=seed
+                share=named(share) or (), free=(*(named(free) or ()), *known.unknown), effects=effects, seed=seed
             )
             result = identify_actuators(
                 chains, logs, known.drives, held_out=outside, options=options, progress=progress
@@ -209,12 +209,12 @@ def _logs_from(
     return found
 
 
-def _named(text: str | None) -> tuple[str, ...] | None:
+def named(text: str | None) -> tuple[str, ...] | None:
     """Reads names, separated by commas."""
     return tuple(part.strip() for part in text.split(",") if part.strip()) if text else None
 
 
-def _positions(lock: Sequence[str] | None) -> dict[str, float] | None:
+def positions(lock: Sequence[str] | None) -> dict[str, float] | None:
     """Reads positions of locked joints, each name=value [rad or m].
 
     Raises:
