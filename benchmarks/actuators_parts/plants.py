@@ -279,7 +279,7 @@ def play(machine: Machine, truth: Truth, t: Array, command: Array) -> Array:
     period, late = t[1] - t[0], np.full(machine.n, truth.delay)
     if effect == "time_delay":
         late[j] += truth.size
-    columns = np.arange(machine.n)
+    columns, load = np.arange(machine.n), np.zeros(machine.n)
     for k in range(len(t)):
         q[k] = data.qpos
         for s in range(substeps):
@@ -293,8 +293,9 @@ def play(machine: Machine, truth: Truth, t: Array, command: Array) -> Array:
             elif effect == "position_dependent_friction":
                 model.dof_frictionloss[j] = max(0.0, truth.coulomb[j] + truth.size * np.cos(2 * position))
             elif effect == "load_dependent_friction":
-                load = data.qfrc_bias[j] + model.dof_M0[j] * data.qacc[j]
-                model.dof_frictionloss[j] = truth.coulomb[j] + truth.size * abs(load)
+                # What the links ask of the gears: the rotor is not among them.
+                mujoco.mj_rne(model, data, 1, load)
+                model.dof_frictionloss[j] = truth.coulomb[j] + truth.size * abs(load[j])
             elif effect == "dead_band":
                 error = control[j] - position
                 control[j] = position + error - np.clip(error, -truth.size, truth.size)

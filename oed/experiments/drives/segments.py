@@ -1,4 +1,4 @@
-"""Pieces of a motion for drives: sines, chirps, steps, ramps and holds, from home back to home."""
+"""Pieces of a motion for drives: sines, chirps, squares, steps, ramps and holds, from home back to home."""
 
 from __future__ import annotations
 
@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 
-KINDS = ("multisine", "chirp", "steps", "ramps", "holds")
-BLEND = 0.15
+KINDS = ("sine", "chirp", "square", "steps", "multisine", "ramps", "holds")
+BLEND = 0.08
 """Share of a segment at each end in which it leaves home and comes back."""
 
 
@@ -41,7 +41,8 @@ def candidates(t: Array, n: int, fastest: float, count: int, rng: np.random.Gene
     length = t[-1] - t[0]
     for k in range(count):
         kind = KINDS[k % len(KINDS)]
-        size = rng.uniform(0.3, 1.0)
+        size = rng.choice([1.0, 1.0, 0.5])
+        shared = np.exp(rng.uniform(np.log(1 / length), np.log(fastest)))
         wave = np.empty((len(t), n))
         for j in range(n):
             if kind == "multisine":
@@ -51,6 +52,9 @@ def candidates(t: Array, n: int, fastest: float, count: int, rng: np.random.Gene
             elif kind == "chirp":
                 low, high = np.sort(np.exp(rng.uniform(np.log(1 / length), np.log(fastest), 2)))
                 own = np.sin(2 * np.pi * (low * t + (high - low) * t**2 / (2 * length)) + rng.uniform(0, 2 * np.pi))
+            elif kind in ("sine", "square"):
+                own = np.sin(2 * np.pi * shared * rng.uniform(0.9, 1.1) * t + rng.uniform(0, 2 * np.pi))
+                own = own if kind == "sine" else np.clip(20 * own, -1, 1)
             elif kind == "steps":
                 levels = rng.uniform(-1, 1, max(2, round(length / rng.uniform(0.2, 0.5))))
                 own = levels[np.minimum((np.arange(len(t)) * len(levels)) // len(t), len(levels) - 1)]
