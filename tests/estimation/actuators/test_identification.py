@@ -63,7 +63,8 @@ def test_a_hidden_effect_is_named(tmp_path: Path) -> None:
     result = identify_actuators(case.chains, case.log, case.drives, held_out=case.held_out)
     assert [(finding.effect, finding.name) for finding in result.findings] == [("stribeck", "thigh_joint")]
     assert result.value("stribeck", "thigh_joint").value == pytest.approx(0.4, rel=0.2)
-    assert result.held_out_error < 2 * LEG.encoder / np.sqrt(12)
+    # Three times the error of the encoder's steps: without the effect it is fifty times as large.
+    assert result.held_out_error < 3 * LEG.encoder / np.sqrt(12)
 
 
 def test_shared_parameters_are_one(leg: Played) -> None:
