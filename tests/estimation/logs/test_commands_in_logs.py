@@ -76,9 +76,7 @@ def test_normalised_values_are_recognised(tmp_path: Path) -> None:
     assert logs[0].q[0] == pytest.approx(lower)
     assert logs[1].q[-1] == pytest.approx(upper)
     folder = data_set(tmp_path / "ticks", 10 * state, state, "v3.0")
-    with pytest.raises(
-        InputError, match=r"joint 1: values from -1000 to .* within -28\.65 to 85\.94"
-    ):
+    with pytest.raises(InputError, match=r"joint 1: values from -1000 to .* within -28\.65 to 85\.94"):
         read_lerobot(folder, NAMES, (lower, upper))
 
 
