@@ -13,9 +13,10 @@ Array = NDArray[np.float64]
 
 
 class Seen(NamedTuple):
-    """What a log shows of one joint: positions and commands (N,), and the drive's values by name."""
+    """What a log shows of one joint: positions, speeds and delayed commands (N,), and the drive's values by name."""
 
     q: Array
+    dq: Array
     command: Array
     values: dict[str, float]
 
@@ -42,15 +43,13 @@ class LoopEffect:
     bends: bool = False
 
 
-def _law_torque(seen: Seen) -> Array:
-    """Torque that the law asks for at rest [N m or N]."""
-    gain = seen.values.get("kp", seen.values.get("kv", 1.0) * seen.values.get("kr", 1.0))
-    return np.abs(gain * (seen.command - seen.q))
-
-
 def _saturations(seen: Seen) -> list[dict[str, float]]:
-    peak = float(np.quantile(_law_torque(seen), 0.999))
-    return [{"torque_limit": share * peak} for share in (0.9, 0.7, 0.5) if share * peak > 0]
+    """Limits below the torque that the law asks for along the measured motion."""
+    damping = seen.values.get("kd", seen.values.get("kv", 0.0))
+    gain = seen.values.get("kp", damping * seen.values.get("kr", 0.0))
+    asked = np.abs(gain * (seen.command - seen.q) - damping * seen.dq)
+    peak = float(np.quantile(asked, 0.99))
+    return [{"torque_limit": share * peak} for share in (1.0, 0.8, 0.6, 0.45, 0.3) if peak > 0]
 
 
 def _dead_bands(seen: Seen) -> list[dict[str, float]]:

@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.ndimage import uniform_filter1d
 
 from estimation.actuators.effects import BY_NAME, EFFECTS, LoopEffect, Seen
 from estimation.actuators.fitting import FLOOR, Fit, FitOptions, fit_drives, normal_equations
@@ -29,6 +30,8 @@ SURE = 3.0
 """Standard errors by which the logarithm of the held-out squared error must fall."""
 MEMORIES, FEWEST_BLOCKS, MOST_BLOCKS = 2, 6, 40
 """Length of a block in times of the error's memory, and the least and most blocks."""
+SMOOTHED = 5
+"""Samples over which speeds are averaged that only start a search."""
 QUICK = FitOptions(iterations=6, rounds=1, settled=0.01)
 """Settings of the fits that compare effects."""
 
@@ -155,12 +158,13 @@ def _promises(
     found: list[_Promise] = []
     starts: dict[tuple[int, str], Sequence[dict[str, float]]] = {}
     for joint in range(fleet.n):
-        q = np.concatenate([run.q[:, joint] for run in runs])
-        command = np.concatenate([np.interp(run.t, run.log_t, run.command[:, joint]) for run in runs])
         known = {name: fleet.of(values, joint, name) for name in fleet.drives[joint].names}
+        q = np.concatenate([run.q[:, joint] for run in runs])
+        dq = np.concatenate([uniform_filter1d(np.gradient(run.q[:, joint], run.t), SMOOTHED) for run in runs])
+        command = np.concatenate([np.interp(run.t - known["delay"], run.log_t, run.command[:, joint]) for run in runs])
         for effect in EFFECTS:
             if (joint, effect.name) not in taken and all(name in known for name in effect.free):
-                starts[joint, effect.name] = effect.starts(Seen(q, command, known))
+                starts[joint, effect.name] = effect.starts(Seen(q, dq, command, known))
     for index in range(max((len(options) for options in starts.values()), default=0)):
         there = [key for key, options in starts.items() if index < len(options)]
         neutral = [key for key in there if not BY_NAME[key[1]].bends]
