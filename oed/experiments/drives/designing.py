@@ -98,7 +98,7 @@ def design_drive_motion(
     loop = Loop(chains, drives, SOUGHT)
     home, reach = _home_and_reach(chains, chosen)
     noise = np.full(loop.n, chosen.noise)
-    t = np.arange(round(chosen.segment / chosen.period)) * chosen.period
+    t = np.arange(round(chosen.segment / chosen.period), dtype=np.float64) * chosen.period
     rng = np.random.default_rng(chosen.seed)
     pool: list[tuple[str, Array, Array]] = []
     bar.start("simulating segments", chosen.candidates)
@@ -113,7 +113,7 @@ def design_drive_motion(
     count = int(chosen.duration // chosen.segment)
     best = _exchange([item[2] for item in pool], count)
     command = np.concatenate([pool[k][1] for k in best])
-    times = np.arange(len(command)) * chosen.period
+    times = np.arange(len(command), dtype=np.float64) * chosen.period
     _, _, information = loop.played(times, command, noise)
     sizes = np.array([item.size for item in loop.sought])
     plain = _chirp(loop, chains, times, home, reach, noise, chosen)
