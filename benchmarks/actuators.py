@@ -187,9 +187,11 @@ def effects(options: argparse.Namespace) -> None:
             joint = int(rng.integers(1, 3)) if loaded else int(rng.integers(0, machine.n))
             if effect:
                 truth = sized(machine, truth, effect, joint, rng, options.seconds)
-            t, command = multisine(machine, options.seconds, rng, 2e-3)
-            log = Log(t=t, q=play(machine, truth, t, command), command=command, name="run")
-            result = identified(machine, log, effects=True)
+            logs = []
+            for name in ("run", "held out"):
+                t, command = multisine(machine, options.seconds, rng, 2e-3)
+                logs.append(Log(t=t, q=play(machine, truth, t, command), command=command, name=name))
+            result = identified(machine, logs[0], True, logs[1])
             first = result.findings[0] if result.findings else None
             right = (
                 first is None

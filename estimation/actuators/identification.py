@@ -38,7 +38,7 @@ Array = NDArray[np.float64]
 BASIC = ("armature", "viscous", "coulomb", "torque_offset")
 """Parameters of every joint that are always identified, beside the delay of all."""
 TRAINED = 0.7
-"""Share of each run that is fitted where effects are chosen by the rest."""
+"""Share of each run that is fitted where no log is held out."""
 NEUTRAL = {
     "stribeck": 0.0,
     "load_coulomb": 0.0,
@@ -118,12 +118,13 @@ def identify_actuators(
     freedom = _freedom(fleet, chosen)
     bar.start("fitting the drives", None)
     prepare(fleet)
-    trained, validated = zip(*(run.cut(TRAINED) for run in runs), strict=True)
-    fitted_runs, text = (runs, "held-out logs") if outside else (trained, f"the last {1 - TRAINED:.0%} of each run")
-    seen: Sequence[Run] = other if outside else validated
-    start = _start(freedom, fitted_runs if not chosen.effects else trained, bar)
+    begun, ended = zip(*(run.cut(TRAINED) for run in runs), strict=True)
+    fitted_runs, text = (runs, "held-out logs") if outside else (begun, f"the last {1 - TRAINED:.0%} of each run")
+    seen: Sequence[Run] = other if outside else ended
+    start = _start(freedom, fitted_runs, bar)
     findings: tuple[LoopFinding, ...] = ()
     if chosen.effects:
+        trained, validated = zip(*(run.blocks() for run in fitted_runs), strict=True)
         first = fit_drives(freedom, start, trained, chosen.fit, bar)
         freedom, start, findings = search_effects(first, trained, validated, bar)
     fit = fit_drives(freedom, start, fitted_runs, chosen.fit, bar)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -27,6 +27,8 @@ SLOWEST, SLOW = 25.0, 90.0
 """Rates [Hz]: below the first nothing of a drive is seen; below the second only what is slow."""
 SETTLING = 0.2
 """Time [s] at the start of a run that does not count: the state before it is not known exactly."""
+BLOCKS, EVERY = 15, 3
+"""Blocks of time into which a run is divided to compare effects; one of so many is held out."""
 SAME = 1e-3
 """RMS difference of command and measurement, as a fraction of the motion, below which they are the same signal."""
 BASE = re.compile(r"(base|root|pelvis|torso|trunk|imu)", re.IGNORECASE)
@@ -45,6 +47,7 @@ class Run:
         log_t: times of the whole log (M,) [s], which the command covers.
         command: commanded positions of the whole log (M, n) [rad or m].
         steps: resolution of each joint's command (n,) [rad or m].
+        mask: samples that count (N,); None for all.
     """
 
     name: str
@@ -53,6 +56,7 @@ class Run:
     log_t: Array
     command: Array
     steps: Array
+    mask: NDArray[np.bool_] | None = None
 
     @cached_property
     def _held(self) -> dict[bytes, HeldCommand]:
@@ -80,34 +84,27 @@ class Run:
     @cached_property
     def counted(self) -> NDArray[np.bool_]:
         """Samples that count (N,)."""
-        return self.t - self.t[0] >= min(SETTLING, 0.1 * (self.t[-1] - self.t[0]))
+        settled = self.t - self.t[0] >= min(SETTLING, 0.1 * (self.t[-1] - self.t[0]))
+        return settled if self.mask is None else settled & self.mask
 
     def joints(self, columns: NDArray[np.intp]) -> Run:
         """Gives some of the joints."""
-        return Run(
-            name=self.name,
-            t=self.t,
-            q=self.q[:, columns],
-            log_t=self.log_t,
-            command=self.command[:, columns],
-            steps=self.steps[columns],
-        )
+        return replace(self, q=self.q[:, columns], command=self.command[:, columns], steps=self.steps[columns])
 
     def cut(self, share: float) -> tuple[Run, Run]:
         """Cuts the run at a share of its time."""
         at = int(np.searchsorted(self.t, self.t[0] + share * (self.t[-1] - self.t[0])))
-        return self.part(0, at), self.part(at, len(self.t))
+        return replace(self, t=self.t[:at], q=self.q[:at]), replace(self, t=self.t[at:], q=self.q[at:])
 
-    def part(self, start: int, stop: int) -> Run:
-        """Gives some of the samples, with the whole command."""
-        return Run(
-            name=self.name,
-            t=self.t[start:stop],
-            q=self.q[start:stop],
-            log_t=self.log_t,
-            command=self.command,
-            steps=self.steps,
-        )
+    def blocks(self) -> tuple[Run, Run]:
+        """Gives the run twice: with the samples of most blocks of time, and with those of the others.
+
+        The simulation runs through all of them, so that both parts have what seldom happens, such as a stop that is
+        touched.
+        """
+        block = np.minimum((self.t - self.t[0]) / (self.t[-1] - self.t[0]) * BLOCKS, BLOCKS - 1).astype(int)
+        other = block % EVERY == EVERY - 1
+        return replace(self, mask=~other), replace(self, mask=other)
 
 
 def runs_of(logs: Sequence[Log], fleet: Fleet) -> tuple[tuple[Run, ...], tuple[str, ...]]:

@@ -22,6 +22,8 @@ Array = NDArray[np.float64]
 
 WORTH = 0.04
 """Share of a joint's squared error that an effect must promise to be fitted, and bring on held-out data."""
+MOST = 0.5
+"""Share that an effect must promise so that others, which derivatives do not show, need not be tried beside it."""
 TRIED = 3
 """Alternatives of a joint that are fitted in a round: those that promise most."""
 ROUNDS = 6
@@ -179,6 +181,8 @@ def _promises(
             best[key] = promise
     # A promise counts by what it takes off the whole chain's error.
     smooth = sorted(best.values(), key=lambda p: -p.share * costs[p.joint])[:TRIED]
+    if smooth and smooth[0].share > MOST:
+        return smooth
     return [*smooth, *_bent(freedom, values, runs, starts, int(np.argmax(rms(now))))]
 
 
