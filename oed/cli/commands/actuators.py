@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any, TypeVar
 import typer
 
 from oed.cli.console import Console
+from oed.cli.links import is_given
 from oed.cli.options import (
     ROBOT,
     ForceOption,
@@ -30,6 +31,7 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
+    from robots.common.progress import Progress
     from robots.robot import Robot
     from robots.signals import Log
 
@@ -228,3 +230,58 @@ def positions(lock: Sequence[str] | None) -> dict[str, float] | None:
         except ValueError:
             raise InputError(f"--lock {item}", allowed="name=value with the value in rad or m") from None
     return found or None
+
+
+MEANINGLESS = (
+    *("criterion", "friction", "offset", "family", "harmonics", "base_frequency", "periods", "strokes"),
+    *("payload", "tool_box", "singularity", "essential", "scaling", "noise", "after", "task", "payload_only"),
+    *("discriminate", "effort", "time_limit", "workers", "cluster", "tip", "torque_margin", "velocity_fraction"),
+    *("floor", "no_floor", "keep_out", "clearance", "torque", "assume_masses"),
+)
+"""Options of other designs."""
+
+
+def refuse_beside_drives(context: typer.Context) -> None:
+    """Refuses options that do not apply with ``--for actuators``.
+
+    Raises:
+        InputError: naming them.
+    """
+    given = [f"--{name.replace('_', '-')}" for name in MEANINGLESS if is_given(context, name)]
+    if given:
+        verb = "does" if len(given) == 1 else "do"
+        raise InputError(f"{', '.join(given)} {verb} not apply with --for actuators", remedy="remove these options")
+
+
+def design_for_drives(
+    robot: str,
+    gains: Path | None,
+    *,
+    lock: Sequence[str] | None,
+    joints: str | None,
+    home: Sequence[float] | None,
+    duration: float,
+    seed: int,
+    out: Path,
+    force: bool,
+    progress: Progress,
+) -> tuple[str, dict[str, Any]]:
+    """Designs the commands and writes commands.csv, design.json and report.html.
+
+    Raises:
+        InputError: see `load_branches`, `described_drives` and `design_drive_motion`.
+        InfeasibleError: no motion stays within the limits.
+    """
+    from oed.experiments.drives import DriveDesignOptions, design_drive_motion
+    from oed.reports import save_drive_design_report
+    from robots.common.files import ResultFolder
+    from robots.drives import described_drives, load_branches
+
+    with ResultFolder(out, force, names=["commands.csv", "design.json", "report.html"]) as folder:
+        chains = load_branches(robot, joints=named(joints), locked=positions(lock))
+        known = described_drives(chains, gains)
+        options = DriveDesignOptions(duration=duration, seed=seed, home=None if home is None else tuple(home))
+        result = design_drive_motion(chains, known.drives, options=options, progress=progress)
+        result.save(folder.path("commands.csv").parent)
+        save_drive_design_report(result, folder)
+    return result.summary(), result.to_dict()

@@ -189,7 +189,7 @@ def design(
         if purpose not in ("dynamics", "actuators"):
             raise InputError(f"--for {purpose}", allowed="dynamics or actuators")
         if purpose == "actuators":
-            from oed.cli.drive_designs import design_for_drives, refuse_beside_drives
+            from oed.cli.commands.actuators import design_for_drives, refuse_beside_drives
 
             refuse_beside_drives(context)
             summary, data = design_for_drives(
