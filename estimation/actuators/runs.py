@@ -152,8 +152,9 @@ def _check(log: Log, fleet: Fleet) -> list[str]:
     if log.n != fleet.n:
         raise InputError(f"{log.n} joints", file=file, allowed=f"{fleet.n}: {', '.join(fleet.names)}")
     if log.command is None:
+        left_out = [note for note in log.metadata.get("repairs", ()) if str(note["name"]).startswith("command_")]
         raise InputError(
-            "no command",
+            f"no command: {left_out[0]['text']}" if left_out else "no command",
             file=file,
             column="qref1",
             allowed="columns qref1..qn of commanded positions, beside q1..qn",

@@ -67,6 +67,19 @@ def test_faults_are_named(fleet: Fleet, change: object, message: str) -> None:
         runs_of([change(log_of())], fleet)  # type: ignore[operator]
 
 
+def test_commands_with_gaps_say_so(fleet: Fleet, tmp_path: Path) -> None:
+    """A command column with an empty cell is named with its row, not called missing."""
+    log = log_of()
+    assert log.command is not None
+    columns = {"t": log.t} | {f"q{j + 1}": log.q[:, j] for j in range(3)}
+    columns |= {f"qref{j + 1}": log.command[:, j] for j in range(3)}
+    table = pd.DataFrame(columns)
+    table.loc[30, "qref2"] = np.nan
+    table.to_csv(tmp_path / "run.csv", index=False)
+    with pytest.raises(InputError, match=r"no command: qref2 has no number in 1 row of 600, the first of them row 32"):
+        runs_of([read_log(tmp_path / "run.csv", 3, torque=False)], fleet)
+
+
 def test_what_a_slow_log_shows_is_said(fleet: Fleet) -> None:
     """A log of 30 Hz is read, and its limits are said."""
     _, notes = runs_of([log_of(30.0)], fleet)
