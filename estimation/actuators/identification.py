@@ -39,6 +39,8 @@ BASIC = ("armature", "viscous", "coulomb", "torque_offset")
 """Parameters of every joint that are always identified, beside the delay of all."""
 TRAINED = 0.7
 """Share of each run that is fitted where no log is held out."""
+ROUGH = 1e-3
+"""Relative decrease of the cost at which the fit ends that effects are compared with."""
 NEUTRAL = {
     "stribeck": 0.0,
     "load_coulomb": 0.0,
@@ -125,7 +127,7 @@ def identify_actuators(
     findings: tuple[LoopFinding, ...] = ()
     if chosen.effects:
         trained, validated = zip(*(run.blocks() for run in fitted_runs), strict=True)
-        first = fit_drives(freedom, start, trained, chosen.fit, bar)
+        first = fit_drives(freedom, start, trained, replace(chosen.fit, settled=ROUGH), bar)
         freedom, start, findings = search_effects(first, trained, validated, bar)
     fit = fit_drives(freedom, start, fitted_runs, chosen.fit, bar)
     bar.finish()

@@ -48,6 +48,7 @@ class Run:
         command: commanded positions of the whole log (M, n) [rad or m].
         steps: resolution of each joint's command (n,) [rad or m].
         mask: samples that count (N,); None for all.
+        coarseness: of the simulation's steps, in usual ones.
     """
 
     name: str
@@ -57,6 +58,7 @@ class Run:
     command: Array
     steps: Array
     mask: NDArray[np.bool_] | None = None
+    coarseness: float = 1.0
 
     @cached_property
     def _held(self) -> dict[bytes, HeldCommand]:
@@ -71,8 +73,8 @@ class Run:
 
     @cached_property
     def step(self) -> float:
-        """Usual step of its simulation [s]."""
-        return usual_step(self.t)
+        """Step of its simulation [s]."""
+        return self.coarseness * usual_step(self.t)
 
     @cached_property
     def start_velocity(self) -> Array:
@@ -100,11 +102,11 @@ class Run:
         """Gives the run twice: with the samples of most blocks of time, and with those of the others.
 
         The simulation runs through all of them, so that both parts have what seldom happens, such as a stop that is
-        touched.
+        touched. Its steps are twice as long as usual: effects are compared, not measured.
         """
         block = np.minimum((self.t - self.t[0]) / (self.t[-1] - self.t[0]) * BLOCKS, BLOCKS - 1).astype(int)
         other = block % EVERY == EVERY - 1
-        return replace(self, mask=~other), replace(self, mask=other)
+        return replace(self, mask=~other, coarseness=2.0), replace(self, mask=other, coarseness=2.0)
 
 
 def runs_of(logs: Sequence[Log], fleet: Fleet) -> tuple[tuple[Run, ...], tuple[str, ...]]:

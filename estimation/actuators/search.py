@@ -79,7 +79,7 @@ def search_effects(
     Args:
         fit: of the drives without them.
         runs: that were fitted.
-        held_out: of which nothing was fitted.
+        held_out: the same runs with the samples that were not fitted, see `Run.blocks`.
         progress: is told of each finding.
 
     Returns:
@@ -116,7 +116,7 @@ def _search_chain(
 ) -> tuple[tuple[Array, ...], list[tuple[LoopFinding, LoopEffect]]]:
     accepted: list[tuple[LoopFinding, LoopEffect]] = []
     now = linearised_runs(freedom, values, runs)
-    outside = simulate_runs(freedom.fleet, values, held_out)
+    outside: list[Errors] = [replace(part, run=run) for part, run in zip(now, held_out, strict=True)]
     for _ in range(ROUNDS):
         taken = {(finding.joint - 1, effect.name) for finding, effect in accepted}
         weights = np.maximum(rms(now), FLOOR) ** -2
@@ -127,10 +127,7 @@ def _search_chain(
             trial = _fitted(freedom, values, runs, promise, weights)
             if trial is None:
                 continue
-            try:
-                seen = simulate_runs(freedom.fleet, trial.values, held_out)
-            except SolverError:
-                continue
+            seen = [replace(part, run=run, jacobian=None) for part, run in zip(trial.errors, held_out, strict=True)]
             gain = _gain(outside, seen, promise.joint, weights)
             rivals.append((promise.joint, promise.effect.name, float(rms(seen)[promise.joint])))
             if gain > 0 and (best is None or gain > best[0]):
