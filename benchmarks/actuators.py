@@ -2,13 +2,16 @@
 
 python benchmarks/actuators.py go2 --data LOGS          the measured Go2 beside fits over MuJoCo rollouts
 python benchmarks/actuators.py virtual [--cases 60]     virtual plants: errors and coverage of intervals
-python benchmarks/actuators.py effects [--cases 8]      one hidden effect of ten kinds, and none
+python benchmarks/actuators.py effects [--cases 8]      one hidden effect of nine kinds, and none
+python benchmarks/actuators.py sysid --python PYTHON    beside mujoco[sysid], in an environment of its own
 """
 
 from __future__ import annotations
 
 import argparse
+import json
 import os
+import subprocess
 import sys
 import tempfile
 import time
@@ -209,6 +212,40 @@ def effects(options: argparse.Namespace) -> None:
     print(f"named right {np.mean(with_effect):.1%} of {len(with_effect)}; false {1 - np.mean(named['none']):.1%}")
 
 
+def sysid(options: argparse.Namespace) -> None:
+    """Fits legs without delay by us and by `mujoco[sysid]`, which another environment has, from the same logs."""
+    script = Path(__file__).parent / "actuators_parts" / "sysid_rival.py"
+    rows: list[tuple[float, float, bool, bool]] = []
+    for seed in range(options.cases):
+        rng, machine = np.random.default_rng(seed), MACHINES["leg"]()
+        truth = replace(random_truth(machine, rng), delay=0.0)
+        t, command = multisine(machine, 4.0, rng)
+        q = play(machine, truth, t, command)
+        with tempfile.TemporaryDirectory() as place:
+            folder = Path(place)
+            # A user's model: the step of the log, and dry friction as stiff as it allows.
+            text = mjcf(machine, step=1e-3).replace("RK4", "implicitfast")
+            (folder / "leg.xml").write_text(text.replace('solreffriction="0.0002 1"', 'solreffriction="0.002 1"'))
+            np.savez(folder / "log.npz", t=t, q=q, command=command)
+            files = [str(folder / name) for name in ("leg.xml", "log.npz", "result.json")]
+            subprocess.run([options.python, str(script), *files], check=True, capture_output=True)
+            other = json.loads((folder / "result.json").read_text())
+        began = time.process_time()
+        result = identified(machine, Log(t=t, q=q, command=command, name="run"), effects=False)
+        print(f"case {seed}: CPU {time.process_time() - began:.2f} s, mujoco.sysid {other['cpu']:.2f} s", flush=True)
+        for key in ("armature", "viscous", "coulomb"):
+            for j, name in enumerate(result.joints):
+                true, own = true_value(truth, key, j), result.value(key, name)
+                theirs, half = other["values"][f"{key} {name}"], other["half_widths"][f"{key} {name}"]
+                within = own.lower <= true <= own.upper, abs(theirs - true) <= half
+                rows.append((abs(own.value / true - 1), abs(theirs / true - 1), *within))
+    errors, others, held, held_by_other = (np.array(column, dtype=float) for column in zip(*rows, strict=True))
+    for who, error, hits in (("ours", errors, held), ("mujoco.sysid", others, held_by_other)):
+        print(
+            f"{who:13} error median {np.median(error):.2g}, largest {error.max():.2g}; intervals hold {hits.mean():.0%}"
+        )
+
+
 def main() -> None:
     """Runs a part."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
@@ -225,6 +262,10 @@ def main() -> None:
     part.add_argument("--cases", type=int, default=8)
     part.add_argument("--seconds", type=float, default=8.0)
     part.set_defaults(run=effects)
+    part = parts.add_parser("sysid")
+    part.add_argument("--python", required=True, help="of an environment with mujoco[sysid]")
+    part.add_argument("--cases", type=int, default=4)
+    part.set_defaults(run=sysid)
     options = parser.parse_args()
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
