@@ -51,7 +51,7 @@ class _Samples:
     def __repr__(self) -> str:
         own = getattr(self, "name", "")
         name = f"{own!r}, " if own else ""
-        signals = ("q", "dq", "ddq", "tau", "current", "temperature")
+        signals = ("q", "command", "dq", "ddq", "tau", "current", "temperature")
         held = [key for key in signals if getattr(self, key, None) is not None]
         span = f"{self.t[0]:.6g} to {self.t[-1]:.6g} s"
         return f"{type(self).__name__}({name}{len(self)} samples, {self.n} joints, {span}, {', '.join(held)})"
@@ -156,6 +156,7 @@ class Log(_Samples):
         temperature: joint temperatures [degC], (N, n); NaN where a sensor was silent.
         ambient: ambient temperature [degC], (N,); NaN where the sensor was silent.
         qlink: positions behind the gears [rad], (N, n); NaN throughout for a joint that has no encoder there.
+        command: commanded joint positions [rad], (N, n), as the controller had them at these times.
         segment: whole number of the part of an experiment, (N,).
         cycle: whole number of the repetition of an experiment, (N,).
         payload: a known payload, (10,) in the flange's frame: mass [kg], mass times centre [kg m], inertia about the
@@ -179,6 +180,7 @@ class Log(_Samples):
     temperature: FloatArray | None = None
     ambient: FloatArray | None = None
     qlink: FloatArray | None = None
+    command: FloatArray | None = None
     segment: FloatArray | None = None
     cycle: FloatArray | None = None
     payload: FloatArray | None = None
@@ -226,7 +228,7 @@ class Log(_Samples):
         return Log(**{key: value[part] if key in cut and value is not None else value for key, value in values.items()})
 
 
-_PER_JOINT = ("tau", "current", "dq", "ddq", "temperature", "qlink")
+_PER_JOINT = ("tau", "current", "dq", "ddq", "temperature", "qlink", "command")
 _COMMON = ("ambient", "segment", "cycle")
 
 

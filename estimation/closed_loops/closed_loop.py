@@ -13,6 +13,7 @@ from scipy.interpolate import CubicHermiteSpline
 
 from robots.base_parameters import BaseParameters
 from robots.common.errors import InputError, SolverError
+from robots.drives.dry_friction import dry_velocity
 from robots.signals import Motion
 from robots.terms import FrictionTerm
 
@@ -181,25 +182,10 @@ class ClosedLoop:
                 if j in self._dry:
                     # A friction that drives would make the step ambiguous; on the way to a fit it may occur.
                     limit = casadi.fmax(values[self._dry[j]], 0)
-                    current[j] = _dry_velocity(rest, matrix[j, j], limit, float(self._width[j]), newton)
+                    current[j] = dry_velocity(rest, matrix[j, j], limit, float(self._width[j]), newton)
                 else:
                     current[j] = rest / matrix[j, j]
         return casadi.vertcat(*current)
-
-
-def _dry_velocity(rest: casadi.SX, inertia: casadi.SX, limit: casadi.SX, width: float, newton: int) -> casadi.SX:
-    """Solves inertia z + limit tanh(z / width) = rest for z.
-
-    With tanh straight-lined to a saturation the solution is exact and below the true one in size; from there Newton's
-    steps grow towards it without overshooting, the left-hand side being concave beyond zero.
-    """
-    stuck = rest / (inertia + limit / width)
-    slipping = (rest - limit * casadi.sign(rest)) / inertia
-    z = casadi.if_else(casadi.fabs(stuck) <= width, stuck, slipping)
-    for _ in range(newton):
-        share = casadi.tanh(z / width)
-        z = z + (rest - inertia * z - limit * share) / (inertia + limit / width * (1 - share**2))
-    return z
 
 
 class _Targets(NamedTuple):

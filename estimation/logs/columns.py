@@ -59,6 +59,7 @@ QUANTITIES = (
     Quantity(prefix="temp", field="temperature", unit="degC", units={"degC": 1.0, "deg_C": 1.0}, complete=False),
     Quantity(prefix="temp_env", field="ambient", unit="degC", units={"degC": 1.0, "deg_C": 1.0}, per_joint=False),
     Quantity(prefix="qlink", field="qlink", unit="rad", units=_POSITION, complete=False, linear_unit="m"),
+    Quantity(prefix="qref", field="command", unit="rad", units=_POSITION, linear_unit="m"),
     Quantity(prefix="segment", field="segment", unit="", units={"": 1.0}, per_joint=False),
     Quantity(prefix="cycle", field="cycle", unit="", units={"": 1.0}, per_joint=False),
 )
@@ -68,7 +69,7 @@ BY_FIELD = {quantity.field: quantity for quantity in QUANTITIES}
 
 _BY_PREFIX = {quantity.prefix: quantity for quantity in QUANTITIES}
 _NAME = re.compile(r"([a-z]+)(\d+)")
-_ANGLES = {"q": "", "qlink": "", "dq": "/s", "ddq": "/s2"}
+_ANGLES = {"q": "", "qlink": "", "qref": "", "dq": "/s", "ddq": "/s2"}
 
 
 def parse_name(name: str) -> tuple[Quantity, int | None] | None:

@@ -12,6 +12,7 @@ from estimation.logs.readers.json_tables import read_json
 from estimation.logs.readers.matlab_files import read_matlab
 from estimation.logs.readers.numpy_files import read_npz
 from estimation.logs.readers.ros_bags import read_bag
+from estimation.logs.readers.torch_files import read_torch
 from robots.common.errors import InputError
 from robots.common.files import existing_file
 from robots.common.tables.csv_tables import csv_names, read_csv
@@ -21,7 +22,7 @@ from robots.common.tables.table_files import parquet_names, read_parquet
 CSV = (".csv", ".txt", ".tsv", ".dat")
 BAGS = (".bag", ".mcap", ".db3")
 JSON_LINES = (".jsonl", ".ndjson")
-SUFFIXES = (*CSV, ".parquet", ".mat", ".npz", *JSON_LINES, *BAGS)
+SUFFIXES = (*CSV, ".parquet", ".mat", ".npz", ".pt", *JSON_LINES, *BAGS)
 _MAGIC = {
     b"#ROSBAG V2.0": ".bag",
     b"\x89MCAP0\r\n": ".mcap",
@@ -134,6 +135,7 @@ def read_foreign(
     readers: dict[str, Callable[[Path, Callable[[str], bool]], Table]] = {
         ".mat": read_matlab,
         ".npz": read_npz,
+        ".pt": read_torch,
         ".parquet": read_parquet,
         "franka": read_franka_states,
         "json": read_json,

@@ -113,16 +113,8 @@ def _log(
                 allowed="columns of joint torque [N m] or motor current [A]",
                 remedy=remedy,
             )
-        repairs.append(
-            {
-                "name": NO_TORQUE,
-                "text": f"{lacking}: without torque nothing can be identified",
-                "action": remedy,
-                "value": 0,
-                "unit": "columns",
-                "severity": "warning",
-            }
-        )
+        if "command" not in signals:
+            repairs.append(_without_torque(lacking, remedy))
     metadata = _metadata(table) | ({"repairs": repairs} if repairs else {})
     if mapping is not None and mapping.torque_is is not None:
         parse_meaning(mapping.torque_is, count)
@@ -328,6 +320,17 @@ def _metadata(table: Table) -> dict[str, Any]:
     if robot is not None and not isinstance(robot, str):
         raise InputError(f"`robot` is {robot!r}", file=table.path, allowed="a name")
     return {**metadata, "file": os.fspath(table.path), "ignored_columns": list(table.skipped)}
+
+
+def _without_torque(lacking: str, remedy: str) -> dict[str, Any]:
+    return {
+        "name": NO_TORQUE,
+        "text": f"{lacking}: without torque nothing can be identified",
+        "action": remedy,
+        "value": 0,
+        "unit": "columns",
+        "severity": "warning",
+    }
 
 
 def _header_row(table: Table) -> int | None:

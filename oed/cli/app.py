@@ -7,6 +7,7 @@ from typing import Annotated
 import typer
 
 from oed.cli.command import HELP
+from oed.cli.commands.actuators import actuators
 from oed.cli.commands.benchmark import benchmark
 from oed.cli.commands.campaign import campaign
 from oed.cli.commands.check import check
@@ -51,6 +52,7 @@ FUNCTIONS = (
     show,
     check,
     identify,
+    actuators,
     thermal,
     diagnose,
     predict,

@@ -225,6 +225,30 @@ def _payload(data: Data) -> Reading:
     )
 
 
+def _drives(data: Data) -> Reading:
+    errors = [1e3 * joint["held_out"] for joint in data["errors"]]
+    mean = sum(errors) / len(errors)
+    open_ = sum(value["status"] == "not determined" for value in data["parameters"])
+    return Reading(
+        kind="drives",
+        verdict=f"Simulated motion within {mean:.3g} mrad; {open_ or 'no'} parameters not determined.",
+        codes=("drives.effect",) if data["findings"] else ("drives.undetermined",) if open_ else ("done",),
+        figures={"error [mrad]": mean, "effects": len(data["findings"]), "parameters": len(data["parameters"])},
+        robot=_robot(data),
+    )
+
+
+def _drive_design(data: Data) -> Reading:
+    ratios = sorted(i["standard_error"] / i["of_chirp"] for i in data["expected"] if i["of_chirp"])
+    middle = ratios[len(ratios) // 2] if ratios else math.nan
+    return Reading(
+        kind="motion for drives",
+        verdict=f"Standard errors {middle:.2g} times those of a chirp.",
+        figures={"parameters": len(data["expected"])},
+        robot=_robot(data),
+    )
+
+
 def _forces(data: Data) -> Reading:
     count = len(data["contacts"])
     return Reading(
@@ -287,6 +311,8 @@ BY_FORMAT: dict[str, Callable[[Data], Reading]] = {
     "robot-oed monitor": _state,
     "robot-oed fleet": _fleet,
     "robot-oed comparison": _comparison,
+    "robot-oed actuators": _drives,
+    "robot-oed drive design": _drive_design,
     "robot-oed payload": _payload,
     "robot-oed forces": _forces,
     "robot-oed campaign": _campaign,

@@ -67,6 +67,41 @@ class BatchFunction(ABC):
         self._sum(samples // size, size, arrays, outputs)
         return outputs
 
+    def run(self, state: Array, inputs: Array, *constants: Array) -> Array:
+        """Evaluates a step function (state, inputs, constants) -> state again and again.
+
+        Args:
+            state: at the start (N, s), of N simulations at once.
+            inputs: of all K steps (K, N, k).
+            *constants: one array (N, c) per further input, the same in all steps.
+
+        Returns:
+            The states after each step (K, N, s).
+
+        Raises:
+            InputError: arrays of the wrong shape, or a function that is no step.
+        """
+        steps, size = len(inputs), self.input_sizes[0]
+        if len(self.output_shapes) != 1 or self.output_shapes[0] != (size, 1) or len(self.input_sizes) < 2:
+            raise InputError("the function is not a step", allowed="(state, inputs, ...) -> state")
+        if not steps:
+            return np.empty((0, len(state), size))
+        arrays, samples = self._checked((state, inputs[0], *constants))
+        series = np.ascontiguousarray(inputs, dtype=np.float64)
+        if series.shape != (steps, samples, self.input_sizes[1]):
+            raise InputError(f"inputs of shape {series.shape}", allowed=f"({steps}, {samples}, {self.input_sizes[1]})")
+        states = np.empty((steps, samples, size))
+        self._advance(samples, arrays, series, states)
+        return states
+
+    def _advance(self, samples: int, arguments: list[Array], inputs: Array, states: Array) -> None:
+        """Fills the states step by step; `arguments` are those of the first step."""
+        now = list(arguments)
+        for k in range(len(inputs)):
+            now[1] = inputs[k]
+            self._evaluate(samples, now, (states[k][:, :, None],))
+            now[0] = states[k]
+
     def bound(self, arguments: tuple[Array, ...], out: tuple[Array, ...]) -> Callable[[], None]:
         """Checks arrays once, and gives a call that evaluates them where they lie: for one sample many times.
 

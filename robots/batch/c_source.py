@@ -13,7 +13,9 @@ from robots.batch.operations import operation
 # VECTOR_LIBM is defined where the C library has sines of whole vectors (glibc's libmvec, to some 1e-16): one by one
 # they cost as much as the rest of a regressor.
 _HEAD = """#include <math.h>
-#if defined(__AVX512F__)
+#if defined(ONE_LANE)
+#define W 1
+#elif defined(__AVX512F__)
 #define W 8
 #elif defined(__AVX__)
 #define W 4
@@ -30,7 +32,7 @@ typedef double vec __attribute__((vector_size(8 * W)));
 #else
 #define VECTOR(name) _ZGVbN2v_##name
 #endif
-#ifdef VECTOR_LIBM
+#if defined(VECTOR_LIBM) && !defined(ONE_LANE)
 vec VECTOR(sin)(vec), VECTOR(cos)(vec), VECTOR(tanh)(vec);
 #define OF(name, target, argument) target = VECTOR(name)(argument);
 #else
@@ -96,9 +98,33 @@ void batch_sums(long long groups, long long size, const double** in, double** ou
 }
 """
 
+# Only of functions (state, inputs, ...) -> state. One step follows the other, so that most lanes would idle.
+_STEPS = """
+// The first output is the first input of the next step; the second input has its own rows in each step.
+void batch_steps(long long samples, long long steps, const double** in, double** out) {
+  vec x[%(x_size)d], y[%(y_size)d];
+  const long long k = %(state)d, m = %(driven)d;
+  for (long long start = 0; start < samples; start += W) {
+    const int left = samples - start < W ? (int)(samples - start) : W;
+    gather(x, in, start, 1, left);
+    for (long long step = 0; step < steps; ++step) {
+      for (long long j = 0; j < m; ++j)
+        for (int l = 0; l < W; ++l)
+          x[k + j][l] = in[1][(step * samples + start + (l < left ? l : left - 1)) * m + j];
+      evaluate(x, y);
+      for (long long j = 0; j < k; ++j) x[j] = y[j];
+      for (int l = 0; l < left; ++l)
+        for (long long j = 0; j < k; ++j) out[0][(step * samples + start + l) * k + j] = y[j][l];
+    }
+  }
+}
+"""
+
 
 def c_source(function: casadi.Function) -> str:
     """Writes the C of ``batch_all(samples, inputs, outputs)`` and ``batch_sums(groups, size, inputs, outputs)``.
+
+    That of a step, (state, inputs, ...) -> state, also has ``batch_steps(samples, steps, inputs, states)``.
 
     Args:
         function: a function of SX with dense column vectors as inputs and outputs.
@@ -135,6 +161,14 @@ def c_source(function: casadi.Function) -> str:
         "n_in": len(inputs),
         "n_out": len(outputs),
     }
+    if len(outputs) == 1 and len(inputs) > 1 and outputs[0] == inputs[0]:
+        tail += _STEPS % {
+            "x_size": sum(inputs),
+            "y_size": sum(outputs),
+            "state": inputs[0],
+            "driven": inputs[1],
+        }
+        return "#define ONE_LANE\n" + _HEAD + "\n".join(lines) + "\n" + tail
     return _HEAD + "\n".join(lines) + "\n" + tail
 
 

@@ -18,6 +18,7 @@ from pathlib import Path
 import casadi
 
 from robots.batch.base import Array, BatchFunction, row_major
+from robots.batch.building import builds_expressions
 from robots.batch.c_source import c_source
 
 log = logging.getLogger(__name__)
@@ -48,6 +49,7 @@ class CompiledFunction(BatchFunction):
         try:
             loaded = ctypes.CDLL(str(library))
             self._all, self._sums = loaded.batch_all, loaded.batch_sums
+            self._steps = getattr(loaded, "batch_steps", None)
         except (OSError, AttributeError) as error:
             raise CompilerError(f"{library} cannot be loaded: {error}") from error
         self._all.restype = self._sums.restype = None
@@ -64,6 +66,11 @@ class CompiledFunction(BatchFunction):
 
         return run
 
+    def _advance(self, samples: int, arguments: list[Array], inputs: Array, states: Array) -> None:
+        counts = ctypes.c_longlong(samples), ctypes.c_longlong(len(inputs))
+        assert self._steps is not None
+        self._steps(*counts, _pointers([arguments[0], inputs, *arguments[2:]]), _pointers([states]))
+
     def _sum(self, groups: int, size: int, arguments: list[Array], outputs: tuple[Array, ...]) -> None:
         counts = ctypes.c_longlong(groups), ctypes.c_longlong(size)
         self._sums(*counts, _pointers(arguments), _pointers(outputs))
@@ -72,6 +79,7 @@ class CompiledFunction(BatchFunction):
 _SOURCES: OrderedDict[bytes, str] = OrderedDict()
 
 
+@builds_expressions
 def _source(function: casadi.Function) -> str:
     key = hashlib.sha256(function.serialize().encode()).digest()
     source = _SOURCES.pop(key, None) or c_source(row_major(function))

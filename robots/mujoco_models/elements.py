@@ -48,17 +48,25 @@ class MujocoNames:
         self.sites = names(kinds.mjOBJ_SITE, model.nsite, "site")
 
 
-def loose_bodies(model: Any) -> set[int]:
-    """Finds the bodies on free joints, such as objects to grasp, and what they carry."""
+def loose_bodies(model: Any, held: bool = False) -> set[int]:
+    """Finds the bodies on free joints, such as objects to grasp, and what they carry.
+
+    Args:
+        model: the compiled model.
+        held: whether a robot on a free joint is held at its base, and so is not loose.
+    """
+    carriers = {int(model.body_rootid[model.jnt_bodyid[j]]) for j in range(model.njnt) if model.jnt_type[j] != FREE}
     loose: set[int] = set()
     for body in range(1, model.nbody):
-        first = model.body_jntadr[body]
-        if int(model.body_parentid[body]) in loose or (model.body_jntnum[body] and model.jnt_type[first] == FREE):
+        free = model.body_jntnum[body] and model.jnt_type[model.body_jntadr[body]] == FREE
+        if int(model.body_parentid[body]) in loose or (free and not (held and body in carriers)):
             loose.add(body)
     return loose
 
 
-def read_model(library: Any, model: Any, *, file: str, name: str, digest: str, unused: tuple[str, ...]) -> UrdfElements:
+def read_model(
+    library: Any, model: Any, *, file: str, name: str, digest: str, unused: tuple[str, ...], held: bool = False
+) -> UrdfElements:
     """Gives links and joints of a compiled model.
 
     Each joint has a link of its own, with the origin on the joint's anchor and the body's axes. The body's frame and
@@ -71,11 +79,12 @@ def read_model(library: Any, model: Any, *, file: str, name: str, digest: str, u
         name: of the robot.
         digest: of the file.
         unused: what is not read.
+        held: whether a robot on a free joint is held at its base.
 
     Raises:
         InputError: the robot stands on a free joint, or nothing moves.
     """
-    names, loose = MujocoNames(library, model), loose_bodies(model)
+    names, loose = MujocoNames(library, model), loose_bodies(model, held)
     moving = [j for j in range(model.njnt) if model.jnt_type[j] in (SLIDE, HINGE)]
     if all(int(model.jnt_bodyid[j]) in loose for j in moving):
         floating = bool(moving)

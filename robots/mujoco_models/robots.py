@@ -31,6 +31,7 @@ def robot_from_mjcf(
     unlimited: bool = False,
     *,
     alone: bool = True,
+    held: bool = False,
 ) -> Robot:
     """Makes a robot of an MJCF file.
 
@@ -44,6 +45,7 @@ def robot_from_mjcf(
         locked: positions of locked joints [rad or m]; ``ref`` where not stated.
         unlimited: whether slide joints may lack a range.
         alone: whether no other file states what this one does not.
+        held: whether a robot on a free joint is held at its base.
 
     Returns:
         The robot; what the file does not state is unlimited or unknown, and its `notes` name it.
@@ -51,14 +53,8 @@ def robot_from_mjcf(
     Raises:
         InputError: naming the file and the body or joint; MuJoCo is not installed or refuses the file.
     """
-    xml = read_xml(path)
-    library, model = mujoco_library(path), compile_mjcf(path)
-    names = MujocoNames(library, model)
-    unused = unused_parts(library, model, names)
-    name = xml.root.get("model") or path.stem
-    tree = UrdfTree(
-        read_model(library, model, file=str(path), name=name, digest=xml.digest, unused=unused), kind="MJCF"
-    )
+    tree, library, model = _tree(path, held)
+    names, unused, digest = MujocoNames(library, model), tree.unused, tree.digest
     taken = tree.chain(tip, joints, locked)
     if taken.unlimited and not unlimited:
         raise InputError(
@@ -73,7 +69,7 @@ def robot_from_mjcf(
     gravity = np.zeros(3) if disabled else np.array(model.opt.gravity)
     chosen = tip is not None or joints is not None or bool(locked)
     return Robot(
-        name=name,
+        name=tree.name,
         chain=Chain(taken.chain.joints, gravity, taken.chain.tip),
         limits=taken.limits,
         inertia=taken.inertia,
@@ -83,8 +79,31 @@ def robot_from_mjcf(
         origin=str(path),
         mjcf=str(path),
         links=taken.links,
-        digest=digest_of(xml.digest, (tip, joints, locked)) if chosen else xml.digest,
+        digest=digest_of(digest, (tip, joints, locked)) if chosen else digest,
     )
+
+
+def mjcf_tree(path: Path, held: bool = False) -> UrdfTree:
+    """Reads the tree of an MJCF file's bodies.
+
+    Args:
+        path: the file.
+        held: whether a robot on a free joint is held at its base.
+
+    Raises:
+        InputError: see `robot_from_mjcf`.
+    """
+    return _tree(path, held)[0]
+
+
+def _tree(path: Path, held: bool) -> tuple[UrdfTree, Any, Any]:
+    """The tree, the module `mujoco` and the compiled model."""
+    xml = read_xml(path)
+    library, model = mujoco_library(path), compile_mjcf(path)
+    unused = unused_parts(library, model, MujocoNames(library, model))
+    name = xml.root.get("model") or path.stem
+    elements = read_model(library, model, file=str(path), name=name, digest=xml.digest, unused=unused, held=held)
+    return UrdfTree(elements, kind="MJCF"), library, model
 
 
 def _drives(model: Any, numbers: Sequence[int], file: str, names: Sequence[str]) -> tuple[Array, Array]:

@@ -42,6 +42,19 @@ def payload(names: Names) -> None:
     assert np.abs([item.value for item in body[1:4]] - tool.lever).max() < 0.005
 
 
+def drives(names: Names) -> None:
+    """The dead band is found at its joint, and delay, dead band, rotor inertia and friction are the plant's."""
+    result = names["result"]
+    assert [(finding.effect, finding.joint) for finding in result.findings] == [("dead_band", 2)]
+    # A tenth of the sample period; and a tenth of the dead band, which Coulomb friction nearly replaces.
+    assert abs(names["delay"].value - names["DELAY"]) < 5e-4
+    assert abs(names["band"].value / names["DEAD_BAND"] - 1) < 0.1
+    for name, true in names["TRUE"].items():
+        for joint in result.joints:
+            assert abs(result.value(name, joint).value / true - 1) < 0.1
+    assert result.held_out_error < 0.05 * result.described_error
+
+
 def thermal_friction(names: Names) -> None:
     """The unseen motion is predicted cold and warm, and the fitted friction lies between the plant's own two parts."""
     errors = names["errors"]
@@ -111,6 +124,7 @@ CLAIMS: dict[str, Callable[[Names], None]] = {
         real_robot,
         hidden_effect,
         payload,
+        drives,
         thermal_friction,
         mujoco_corrected,
         two_robots,

@@ -30,8 +30,8 @@ STEPS = 2.0  # time constant of dry friction in time steps, the smallest that Mu
 DEFAULT_SOLREF = (0.02, 1.0)
 
 
-class _Source(NamedTuple):
-    """The file, compiled, and where its joints and bodies are in the XML."""
+class Source(NamedTuple):
+    """An MJCF, compiled, and where its joints and bodies are in the XML."""
 
     path: Path
     root: Element
@@ -56,7 +56,7 @@ def edited(contents: Contents, robot: Robot, folder: Path) -> Element:
         InputError: a joint or body that is not found in the text of the file.
         InfeasibleError: what remains of a link beside the bodies on it is no body.
     """
-    source = _read(robot)
+    source = read_source(Path(robot.mjcf))
     numbers = [source.names.joints.index(name) for name in robot.joint_names]
     _write_bodies(source, contents, robot, numbers)
     for i, j in enumerate(numbers):
@@ -70,18 +70,22 @@ def edited(contents: Contents, robot: Robot, folder: Path) -> Element:
             insert(source.root, len(source.root), section)
         for element in added:
             section.append(element)
-    _keep_assets(source, folder)
+    keep_assets(source, folder)
     return source.root
 
 
-def _read(robot: Robot) -> _Source:
-    path = Path(robot.mjcf)
+def read_source(path: Path) -> Source:
+    """Reads an MJCF to edit it.
+
+    Raises:
+        InputError: a file that MuJoCo refuses, or a joint or body without a name that cannot be found in its text.
+    """
     xml = read_xml(path)
     model = compile_mjcf(path, warn=False)
     names = MujocoNames(mujoco_library(path), model)
     elements = [element for world in xml.root.findall("worldbody") for element in _bodies(world)]
     hinges = [joint for body in elements for joint in _own(body, ("joint", "freejoint"))]
-    return _Source(
+    return Source(
         path,
         xml.root,
         model,
@@ -129,7 +133,7 @@ def _element(found: dict[str, Element], name: str, path: Path, word: str) -> Ele
     return found[name]
 
 
-def _write_bodies(source: _Source, contents: Contents, robot: Robot, numbers: list[int]) -> None:
+def _write_bodies(source: Source, contents: Contents, robot: Robot, numbers: list[int]) -> None:
     model, names = source.model, source.names
     if any(compiler.get("inertiafromgeom") == "true" for compiler in source.root.findall("compiler")):
         for body in source.bodies.values():
@@ -149,15 +153,15 @@ def _write_bodies(source: _Source, contents: Contents, robot: Robot, numbers: li
         own, emptied, share = remainder(contents.inertia[i], inertias, fixed, robot.joint_names[i])
         to_body = homogeneous(np.eye(3), np.array(model.jnt_pos[j]))
         element = _element(source.bodies, names.bodies[carrier], source.path, "body")
-        _set_inertial(element, inertial(moved_body(to_body) @ own))
+        set_inertial(element, inertial(moved_body(to_body) @ own))
         for b in {b for b, _ in others if scaled or share < 1.0} - emptied:
             stated = share * body_inertia(model, b, np.eye(4))
-            _set_inertial(_element(source.bodies, names.bodies[b], source.path, "body"), inertial(stated))
+            set_inertial(_element(source.bodies, names.bodies[b], source.path, "body"), inertial(stated))
         if share < 1.0:
             listed = ", ".join(names.bodies[b] for b, _ in others if b not in emptied)
             contents.remarks.append(f"{listed}: mass times {share:g}, because the identified link is too light for it")
         for b in emptied:
-            _set_inertial(_element(source.bodies, names.bodies[b], source.path, "body"), no_inertial())
+            set_inertial(_element(source.bodies, names.bodies[b], source.path, "body"), no_inertial())
         if i == robot.n - 1 and contents.payload is not None:
             insert(element, len(element), payload_body(contents.payload, to_body @ np.asarray(robot.chain.tip)))
 
@@ -174,7 +178,8 @@ def _remove_inertial(body: Element) -> None:
         body.remove(element)
 
 
-def _set_inertial(body: Element, element: Element) -> None:
+def set_inertial(body: Element, element: Element) -> None:
+    """Gives a body another inertia."""
     present = body.find("inertial")
     if present is None:
         insert(body, 0, element)
@@ -183,7 +188,7 @@ def _set_inertial(body: Element, element: Element) -> None:
     present.attrib.update(element.attrib)
 
 
-def _write_joint(source: _Source, contents: Contents, robot: Robot, i: int, j: int) -> None:
+def _write_joint(source: Source, contents: Contents, robot: Robot, i: int, j: int) -> None:
     model, name = source.model, robot.joint_names[i]
     element, dof = _element(source.joints, name, source.path, "joint"), int(model.jnt_dofadr[j])
     element.set("armature", repr(float(contents.armature[i])))
@@ -218,7 +223,7 @@ def _in_degrees(root: Element) -> bool:
     return not stated or stated[-1] == "degree"
 
 
-def _quiet_actuators(source: _Source, numbers: list[int]) -> None:
+def _quiet_actuators(source: Source, numbers: list[int]) -> None:
     """Takes inertia and damping off the actuators: the joints have all of it now."""
     model = source.model
     if not hasattr(model, "actuator_armature") or not hasattr(model, "actuator_damping"):
@@ -233,8 +238,8 @@ def _quiet_actuators(source: _Source, numbers: list[int]) -> None:
                         actuator.set(key, "0")
 
 
-def _keep_assets(source: _Source, folder: Path) -> None:
-    """Folders of meshes and textures, as seen from the new file."""
+def keep_assets(source: Source, folder: Path) -> None:
+    """Rewrites folders of meshes and textures as seen from the folder of the new file."""
     old = source.path.resolve().parent
     files = any(element.get("file") for element in source.root.iter() if isinstance(element.tag, str))
     if not files or folder.resolve() == old:

@@ -16,7 +16,7 @@ UNIT_NOTES = "unit_notes"
 """Key of a mapped table's metadata: notes on units that do not suit all joints."""
 
 # Conversion of motor-side values by the gear: positions are divided, torques multiplied.
-_GEARED = {"q": -1, "dq": -1, "ddq": -1, "qlink": -1, "tau": 1, "current": 0, "temperature": 0}
+_GEARED = {"q": -1, "dq": -1, "ddq": -1, "qlink": -1, "command": -1, "tau": 1, "current": 0, "temperature": 0}
 
 
 def count_joints(mapping: LogMapping, names: Sequence[str], n: int | None) -> int:

@@ -39,6 +39,7 @@ FIELDS = {
     "current": "current",
     "temperature": "temperature",
     "link_position": "qlink",
+    "command": "command",
     "ambient": "ambient",
     "segment": "segment",
     "cycle": "cycle",
@@ -111,6 +112,7 @@ class LogMapping(Config):
         current: motor currents; with ``torque_constant`` they become torques.
         temperature: joint temperatures.
         link_position: positions behind the gears.
+        command: commanded joint positions.
         ambient: ambient temperature.
         segment: part of an experiment.
         cycle: repetition of an experiment.
@@ -135,6 +137,7 @@ class LogMapping(Config):
     current: PerJoint | None = None
     temperature: PerJoint | None = None
     link_position: PerJoint | None = None
+    command: PerJoint | None = None
     ambient: Single | None = None
     segment: Single | None = None
     cycle: Single | None = None

@@ -41,7 +41,7 @@ def unpacked(path: str | PathLike[str], is_log: Callable[[Path], bool]) -> Itera
     place = Path(path)
     head = b"" if place.is_dir() else _head(existing_file(place))
     opener = next((opener for mark, opener in _STREAMS.items() if head.startswith(mark)), None)
-    if opener is None and not (head.startswith(_ZIP) and not _is_npz(place)):
+    if opener is None and not (head.startswith(_ZIP) and not _is_log_itself(place)):
         yield place
         return
     # Arrays may still be views of an unpacked file, which some systems do not delete then.
@@ -72,9 +72,9 @@ def _head(path: Path) -> bytes:
         return stream.read(8)
 
 
-def _is_npz(path: Path) -> bool:
-    """Whether a zip file is an archive of numpy; a damaged one of that name is its reader's business."""
-    if path.suffix.lower() == ".npz":
+def _is_log_itself(path: Path) -> bool:
+    """Whether a zip file is an archive of numpy or PyTorch; a damaged one of that name is its reader's business."""
+    if path.suffix.lower() in (".npz", ".pt"):
         return True
     try:
         with zipfile.ZipFile(path) as archive:

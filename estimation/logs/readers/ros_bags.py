@@ -57,7 +57,7 @@ def read_bag(path: Path, *, topic: str | None = None, joints: Sequence[str] | No
             messages without names by place.
 
     Returns:
-        Columns ``t, q1.., dq1.., tau1..`` as far as the messages carry them.
+        Columns ``t, q1.., dq1.., tau1.., qref1..`` as far as the messages carry them.
 
     Raises:
         InputError: rosbags is not installed, no bag, no joint states, or joints that the messages do not have.
@@ -199,7 +199,7 @@ def _table(
 ) -> Table:
     """Makes a row of each message; what a message lacks is NaN in its row."""
     names = list(joints) if joints is not None else list(topic.called or ())
-    rows: dict[str, list[list[float]]] = {"q": [], "dq": [], "tau": []}
+    rows: dict[str, list[list[float]]] = {"q": [], "dq": [], "tau": [], "qref": []}
     times: list[tuple[float, float]] = []
     for row, (received, values) in enumerate(messages, start=1):
         _check(path, row, values, names)
@@ -211,7 +211,8 @@ def _table(
             continue
         times.append((received, values.stamp or 0.0))
         width = len(values.names) or len(values.position)
-        for prefix, signal in (("q", values.position), ("dq", values.velocity), ("tau", values.effort)):
+        signals = (values.position, values.velocity, values.effort, values.command)
+        for prefix, signal in zip(rows, signals, strict=True):
             if len(signal) not in (0, width):
                 raise InputError(f"{len(signal)} values for {width} joints", file=path, column=prefix, row=row)
             rows[prefix].append([float(signal[k]) if k is not None and len(signal) else np.nan for k in order])
@@ -220,8 +221,8 @@ def _table(
     received, stamps = np.array(times).T
     # Messages of one publisher are stamped, or none is. A single one without a stamp has the time 0.
     columns: dict[str, Column] = {"t": stamps if 2 * np.count_nonzero(stamps) >= len(stamps) else received}
-    for prefix, signals in rows.items():
-        matrix = np.array(signals)
+    for prefix, found in rows.items():
+        matrix = np.array(found)
         if not np.isnan(matrix).all():
             columns.update({f"{prefix}{joint + 1}": matrix[:, joint].copy() for joint in range(matrix.shape[1])})
     source = TorqueSource(

@@ -32,4 +32,5 @@ class ControllerState(JointMessage):
             velocity=point.velocities,
             effort=point.effort,
             stamp=stamp_of(message),
+            command=(getattr(message, "reference", None) or message.desired).positions,
         )

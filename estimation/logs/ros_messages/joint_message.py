@@ -21,6 +21,7 @@ class JointValues:
         velocity: [rad/s or m/s].
         effort: [N m or N], as the sender means it.
         stamp: the message's own time [s]; None or 0 if it has none.
+        command: what was commanded [rad or m].
     """
 
     names: Sequence[str]
@@ -28,6 +29,7 @@ class JointValues:
     velocity: Sequence[float]
     effort: Sequence[float]
     stamp: float | None
+    command: Sequence[float] = ()
 
 
 class JointMessage(ABC):

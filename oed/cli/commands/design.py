@@ -46,6 +46,22 @@ from oed.cli.set_up import CarriedOption
 def design(
     context: typer.Context,
     robot: RobotOption,
+    purpose: Annotated[
+        str,
+        typer.Option(
+            "--for",
+            help="What the motion is to determine: dynamics, or actuators (commands for drives without torque).",
+        ),
+    ] = "dynamics",
+    gains: Annotated[
+        Path | None,
+        typer.Option(
+            "--gains",
+            help="With --for actuators: a YAML file with the control law and its gains. Default: the MJCF's actuators.",
+            show_default=False,
+        ),
+    ] = None,
+    duration: Annotated[float, typer.Option(help="With --for actuators: length of the motion [s].")] = 20.0,
     criterion: Annotated[
         str,
         typer.Option(
@@ -168,7 +184,28 @@ def design(
     console = Console(json=json, quiet=quiet, introduces=True)
     with console.working() as progress:
         from oed.cli.spaces import spaces_from, surroundings_from
+        from robots.common.errors import InputError
 
+        if purpose not in ("dynamics", "actuators"):
+            raise InputError(f"--for {purpose}", allowed="dynamics or actuators")
+        if purpose == "actuators":
+            from oed.cli.commands.actuators import design_for_drives, refuse_beside_drives
+
+            refuse_beside_drives(context)
+            summary, data = design_for_drives(
+                robot,
+                gains,
+                lock=lock,
+                joints=joints,
+                home=numbers("--home", home),
+                duration=duration,
+                seed=seed,
+                out=out,
+                force=force,
+                progress=progress,
+            )
+            console.result(f"{summary}\nwritten to {out.resolve()}", data)
+            return
         if discriminate is not None:
             from oed.cli.discriminating import design_discriminating, refuse_others
 

@@ -8,7 +8,7 @@ COMMANDS: dict[str, tuple[str, ...]] = {
     "First steps": ("example", "robots", "robot", "effects", "doctor"),
     "Experiments": ("design", "pareto", "retime", "campaign", "export", "show"),
     "Robot and virtual robot": ("stream", "record", "loop", "controller", "simulate"),
-    "Models": ("check", "identify", "thermal", "predict", "payload"),
+    "Models": ("check", "identify", "actuators", "thermal", "predict", "payload"),
     "Diagnosis": ("diagnose", "compare", "monitor", "fleet", "force", "view", "benchmark"),
 }
 """Commands by purpose; those that are not listed come last."""
@@ -29,6 +29,7 @@ OPTIONS = {
             "calibration",
             "before",
             "own_clocks",
+            "gains",
             "mapping",
             "rate",
             "config",
@@ -110,6 +111,10 @@ EXAMPLES = {
     "identify": (
         "oed identify --robot er3a --log log.csv --out model",
         "oed identify --robot ur10 --log rtde_recording.csv bag_folder --method all --out model",
+    ),
+    "actuators": (
+        "oed actuators --robot go2.xml --log run.parquet --gains gains.yaml --out drives",
+        "oed actuators --robot arm.xml --log run.csv --held-out other.csv --share all --out drives",
     ),
     "thermal": ("oed thermal --robot er3a --log logs --order auto --out thermal",),
     "diagnose": ("oed diagnose --robot er3a --log log.csv --held-out held_out.csv --out diagnosed",),

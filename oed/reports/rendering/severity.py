@@ -63,6 +63,10 @@ LEVELS: dict[str, Level] = {
     "joint.still": "note",
     "prediction.extrapolates": "note",
     "payload.uncertain": "note",
+    "drives.effect": "note",
+    "drives.note": "note",
+    "drives.undetermined": "note",
+    "drives.unexplained": "note",
     # Diagnoses and comparisons.
     "diagnosis.ambiguous": "act",
     "diagnosis.unexplained": "act",

@@ -1,0 +1,276 @@
+"""Drives without a torque signal: measured and virtual robots, hidden effects, designs, and rivals.
+
+python benchmarks/actuators.py go2 --data LOGS          the measured Go2 beside fits over MuJoCo rollouts
+python benchmarks/actuators.py virtual [--cases 60]     virtual plants: errors and coverage of intervals
+python benchmarks/actuators.py effects [--cases 8]      one hidden effect of nine kinds, and none
+python benchmarks/actuators.py sysid --python PYTHON    beside mujoco[sysid], in an environment of its own
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import subprocess
+import sys
+import tempfile
+import time
+import warnings
+from collections import defaultdict
+from dataclasses import replace
+from pathlib import Path
+
+for _name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"):
+    os.environ.setdefault(_name, "1")
+sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
+
+import numpy as np  # noqa: E402
+
+from benchmarks.actuators_parts.plants import MACHINES, Machine, Truth, mjcf, multisine, play, random_truth  # noqa: E402
+from benchmarks.actuators_parts.rollouts import NOMINAL, SIZES, Rollouts, by_cma, by_differences  # noqa: E402
+from estimation.actuators import ActuatorOptions, Actuators, identify_actuators  # noqa: E402
+from estimation.logs import read_log  # noqa: E402
+from robots.drives import described_drives  # noqa: E402
+from robots.drives.branches import load_branches  # noqa: E402
+from robots.signals import Log  # noqa: E402
+
+TRAINED = 9.0
+"""Seconds of the Go2's log that are fitted."""
+
+
+def go2(options: argparse.Namespace) -> None:
+    """Fits the first 9 s of the measured log, by us and over rollouts, and simulates the rest."""
+    folder = options.data / "go2_dls"
+    file = folder / "go2_no_meshes.xml"
+    log = read_log(folder / "run_first60.parquet", 12, torque=False)
+    cut = int(np.searchsorted(log.t, TRAINED))
+    first, rest = log.rows(slice(0, cut)), log.rows(slice(cut, None))
+    with tempfile.TemporaryDirectory() as place:
+        gains = Path(place) / "gains.yaml"
+        gains.write_text("law: pd\nkp: 20\nkd: 1.5\n")
+        began = time.perf_counter()
+        legs = load_branches(file)
+        result = identify_actuators(legs, first, described_drives(legs, gains).drives, held_out=rest)
+        ours = time.perf_counter() - began
+        shared = identify_actuators(
+            legs,
+            first,
+            described_drives(legs, gains).drives,
+            held_out=rest,
+            options=ActuatorOptions(share=("hip", "thigh", "calf"), effects=False),
+        )
+    print(f"as described                {1e3 * result.described_error:6.2f} mrad held out")
+    print(f"ours, classes, no effects   {1e3 * shared.held_out_error:6.2f} mrad held out")
+    print(f"ours                        {1e3 * result.held_out_error:6.2f} mrad held out, {ours:.1f} s")
+    for finding in result.findings:
+        print(f"  {finding.name}: {finding.title}, {1e3 * finding.before:.2f} -> {1e3 * finding.after:.2f} mrad")
+    assert first.command is not None
+    assert rest.command is not None
+    rollouts = Rollouts(file)
+
+    def held_out(theta: np.ndarray) -> float:
+        error = (rollouts.play(theta, rest.t, rest.command, rest.q) - rest.q)[rest.t > rest.t[0] + 0.2]
+        return float(np.mean(np.sqrt(np.mean(error**2, axis=0))))
+
+    began = time.perf_counter()
+    theta = by_differences(rollouts, first.t, first.command, first.q)
+    print(
+        f"least squares, differences  {1e3 * held_out(theta):6.2f} mrad held out, {time.perf_counter() - began:.1f} s, "
+        f"{rollouts.count} rollouts"
+    )
+    if options.cma:
+
+        def cost(x: np.ndarray) -> float:
+            theta = NOMINAL + x * SIZES
+            penalty = float((np.minimum(theta[:10], 0) ** 2 / SIZES[:10] ** 2).sum())
+            return float(((rollouts.play(theta, first.t, first.command, first.q) - first.q) ** 2).mean()) + penalty
+
+        began = time.perf_counter()
+        theta = NOMINAL + by_cma(cost, 22, options.cma, 0) * SIZES
+        took = time.perf_counter() - began
+        print(f"CMA-ES                      {1e3 * held_out(theta):6.2f} mrad held out, {took:.1f} s")
+
+
+def identified(machine: Machine, log: Log, effects: bool, held_out: Log | None = None) -> Actuators:
+    """Identifies a virtual robot from its described MJCF."""
+    with tempfile.TemporaryDirectory() as place:
+        file = Path(place) / f"{machine.name}.xml"
+        file.write_text(mjcf(machine))
+        chains = load_branches(file)
+        drives = described_drives(chains).drives
+    outside = () if held_out is None else held_out
+    return identify_actuators(chains, log, drives, held_out=outside, options=ActuatorOptions(effects=effects))
+
+
+def virtual(options: argparse.Namespace) -> None:
+    """Identifies random plants of three kinds, and counts what the intervals hold."""
+    for name, make in MACHINES.items():
+        held: dict[str, list[bool]] = defaultdict(list)
+        errors: dict[str, list[float]] = defaultdict(list)
+        times: list[float] = []
+        for seed in range(options.cases // len(MACHINES)):
+            rng, machine = np.random.default_rng(seed), make()
+            truth = random_truth(machine, rng)
+            t, command = multisine(machine, options.seconds, rng)
+            log = Log(t=t, q=play(machine, truth, t, command), command=command, name=f"{name}{seed}")
+            began = time.perf_counter()
+            result = identified(machine, log, effects=False)
+            times.append(time.perf_counter() - began)
+            for value in result.parameters:
+                j = result.joints.index(value.joints[0])
+                true = true_value(truth, value.parameter, j)
+                held[value.parameter].append(value.lower <= true <= value.upper)
+                errors[value.parameter].append(abs(value.value - true) / (true if true else 1.0))
+        every = [hit for hits in held.values() for hit in hits]
+        print(f"{name}: intervals hold {np.mean(every):.1%} of {len(every)}; {np.median(times):.1f} s a case")
+        for parameter, hits in held.items():
+            found = errors[parameter]
+            unit = "absolute" if parameter == "torque_offset" else "relative"
+            print(
+                f"  {parameter:14} held {np.mean(hits):6.1%}   {unit} error: median {np.median(found):.2g}, "
+                f"largest {max(found):.2g}",
+                flush=True,
+            )
+
+
+def true_value(truth: Truth, parameter: str, joint: int) -> float:
+    """The plant's value."""
+    if parameter == "delay":
+        return truth.delay
+    if parameter == "torque_offset":
+        return 0.0
+    return float(getattr(truth, parameter)[joint])
+
+
+EFFECTS = (
+    "stribeck",
+    "position_dependent_friction",
+    "load_dependent_friction",
+    "current_clipping",
+    "dead_band",
+    "time_delay",
+    "encoder_offset",
+    "payload_change",
+    "joint_limit",
+)
+
+
+def sized(machine: Machine, truth: Truth, effect: str, joint: int, rng: np.random.Generator, seconds: float) -> Truth:
+    """Adds an effect of a size that moves the joint by some milliradians."""
+    if effect == "current_clipping":
+        t, command = multisine(machine, seconds, np.random.default_rng(99), 2e-3)
+        q = play(machine, truth, t, command)
+        asked = machine.kp[joint] * (command - q) - machine.kd[joint] * np.gradient(q, t, axis=0)
+        size = float(np.quantile(np.abs(asked[:, joint]), 0.99)) * rng.uniform(0.5, 0.7)
+        return replace(truth, effect=effect, joint=joint, size=min(size, 0.7 * machine.limit[joint]))
+    lag = truth.coulomb[joint] + 0.01 * machine.kp[joint]
+    sizes = {
+        "stribeck": rng.uniform(0.5, 1.0) * lag,
+        "position_dependent_friction": rng.uniform(0.5, 0.9) * truth.coulomb[joint],
+        "load_dependent_friction": rng.uniform(0.15, 0.35),
+        "dead_band": rng.uniform(0.01, 0.03),
+        "time_delay": rng.uniform(0.006, 0.015),
+        "encoder_offset": rng.choice([-1.0, 1.0]) * rng.uniform(0.08, 0.15),
+        "payload_change": rng.uniform(1.4, 1.9),
+        "joint_limit": rng.uniform(0.4, 0.7),
+    }
+    return replace(truth, effect=effect, joint=joint, size=float(sizes[effect]))
+
+
+def effects(options: argparse.Namespace) -> None:
+    """Hides one effect in each plant, or none, and counts right names and false ones."""
+    kinds = list(MACHINES)
+    named: dict[str, list[bool]] = defaultdict(list)
+    for effect in (*EFFECTS, ""):
+        for seed in range(options.cases if effect else 4 * options.cases):
+            machine = MACHINES[kinds[seed % len(kinds)]]()
+            rng = np.random.default_rng(1000 + seed)
+            truth = random_truth(machine, rng)
+            loaded = effect in ("load_dependent_friction", "encoder_offset", "payload_change")
+            joint = int(rng.integers(1, 3)) if loaded else int(rng.integers(0, machine.n))
+            if effect:
+                truth = sized(machine, truth, effect, joint, rng, options.seconds)
+            logs = []
+            for name in ("run", "held out"):
+                t, command = multisine(machine, options.seconds, rng, 2e-3)
+                logs.append(Log(t=t, q=play(machine, truth, t, command), command=command, name=name))
+            result = identified(machine, logs[0], True, logs[1])
+            first = result.findings[0] if result.findings else None
+            right = (
+                first is None
+                if not effect
+                else first is not None and (first.effect, first.joint) == (effect, joint + 1)
+            )
+            named[effect or "none"].append(right)
+            if not right:
+                found = "nothing" if first is None else f"{first.effect} of joint {first.joint}"
+                print(f"    {machine.name} {seed}: {effect or 'none'} of joint {joint + 1}, found {found}", flush=True)
+        print(
+            f"{effect or 'none':28} right {sum(named[effect or 'none'])} of {len(named[effect or 'none'])}", flush=True
+        )
+    with_effect = [hit for effect in EFFECTS for hit in named[effect]]
+    print(f"named right {np.mean(with_effect):.1%} of {len(with_effect)}; false {1 - np.mean(named['none']):.1%}")
+
+
+def sysid(options: argparse.Namespace) -> None:
+    """Fits legs without delay by us and by `mujoco[sysid]`, which another environment has, from the same logs."""
+    script = Path(__file__).parent / "actuators_parts" / "sysid_rival.py"
+    rows: list[tuple[float, float, bool, bool]] = []
+    for seed in range(options.cases):
+        rng, machine = np.random.default_rng(seed), MACHINES["leg"]()
+        truth = replace(random_truth(machine, rng), delay=0.0)
+        t, command = multisine(machine, 4.0, rng)
+        q = play(machine, truth, t, command)
+        with tempfile.TemporaryDirectory() as place:
+            folder = Path(place)
+            # A user's model: the step of the log, and dry friction as stiff as it allows.
+            text = mjcf(machine, step=1e-3).replace("RK4", "implicitfast")
+            (folder / "leg.xml").write_text(text.replace('solreffriction="0.0002 1"', 'solreffriction="0.002 1"'))
+            np.savez(folder / "log.npz", t=t, q=q, command=command)
+            files = [str(folder / name) for name in ("leg.xml", "log.npz", "result.json")]
+            subprocess.run([options.python, str(script), *files], check=True, capture_output=True)
+            other = json.loads((folder / "result.json").read_text())
+        began = time.process_time()
+        result = identified(machine, Log(t=t, q=q, command=command, name="run"), effects=False)
+        print(f"case {seed}: CPU {time.process_time() - began:.2f} s, mujoco.sysid {other['cpu']:.2f} s", flush=True)
+        for key in ("armature", "viscous", "coulomb"):
+            for j, name in enumerate(result.joints):
+                true, own = true_value(truth, key, j), result.value(key, name)
+                theirs, half = other["values"][f"{key} {name}"], other["half_widths"][f"{key} {name}"]
+                within = own.lower <= true <= own.upper, abs(theirs - true) <= half
+                rows.append((abs(own.value / true - 1), abs(theirs / true - 1), *within))
+    errors, others, held, held_by_other = (np.array(column, dtype=float) for column in zip(*rows, strict=True))
+    for who, error, hits in (("ours", errors, held), ("mujoco.sysid", others, held_by_other)):
+        print(
+            f"{who:13} error median {np.median(error):.2g}, largest {error.max():.2g}; intervals hold {hits.mean():.0%}"
+        )
+
+
+def main() -> None:
+    """Runs a part."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parts = parser.add_subparsers(required=True)
+    part = parts.add_parser("go2")
+    part.add_argument("--data", type=Path, required=True, help="folder of the measured logs")
+    part.add_argument("--cma", type=int, default=0, help="evaluations of CMA-ES; 0 for none")
+    part.set_defaults(run=go2)
+    part = parts.add_parser("virtual")
+    part.add_argument("--cases", type=int, default=60)
+    part.add_argument("--seconds", type=float, default=10.0)
+    part.set_defaults(run=virtual)
+    part = parts.add_parser("effects")
+    part.add_argument("--cases", type=int, default=8)
+    part.add_argument("--seconds", type=float, default=8.0)
+    part.set_defaults(run=effects)
+    part = parts.add_parser("sysid")
+    part.add_argument("--python", required=True, help="of an environment with mujoco[sysid]")
+    part.add_argument("--cases", type=int, default=4)
+    part.set_defaults(run=sysid)
+    options = parser.parse_args()
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        options.run(options)
+
+
+if __name__ == "__main__":
+    main()

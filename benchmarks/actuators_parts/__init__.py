@@ -1,0 +1,1 @@
+"""Virtual plants in MuJoCo, and rivals, for the benchmark of drives."""

@@ -1,0 +1,353 @@
+"""What a log says of a robot's drives: parameters with intervals, effects, and errors of the simulated motion."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, field
+from html import escape
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from estimation.actuators.search import LoopFinding
+from robots.common.errors import InputError
+from robots.common.files import existing_file, write_atomic
+from robots.common.plain import finite, number
+from robots.drives import Drive
+from robots.robot import Robot
+
+if TYPE_CHECKING:
+    import pandas as pd
+    from matplotlib.axes import Axes
+
+Array = NDArray[np.float64]
+
+FILE, MOTION = "actuators.json", "motion.parquet"
+FORMAT, FORMAT_VERSION = "robot-oed actuators", 1
+
+
+@dataclass(frozen=True, kw_only=True)
+class DriveValue:
+    """One identified parameter.
+
+    Attributes:
+        parameter: its name, such as ``armature``.
+        group: the joint or class that has it.
+        joints: names of these joints.
+        value: in its unit.
+        standard_error: in its unit.
+        lower: end of the 95 % interval.
+        upper: the other end.
+        unit: such as ``kg m2``.
+        described: what the description said.
+        status: ``identified``, ``at its bound`` or ``not determined``.
+        partners: other parameters, of which the log shows only a combination with this one.
+    """
+
+    parameter: str
+    group: str
+    joints: tuple[str, ...]
+    value: float
+    standard_error: float
+    lower: float
+    upper: float
+    unit: str
+    described: float
+    status: str
+    partners: tuple[str, ...] = ()
+
+    @property
+    def name(self) -> str:
+        """Parameter and group, for people."""
+        return f"{self.parameter} {self.group}"
+
+
+@dataclass(frozen=True, kw_only=True)
+class MotionError:
+    """Root mean square errors of one joint's simulated position [rad or m].
+
+    Attributes:
+        name: the joint.
+        described: with the drives as described, on the fitted runs.
+        fitted: with the identified drives, on the fitted runs.
+        held_out_described: with the drives as described, on held-out runs.
+        held_out: with the identified drives, on held-out runs.
+    """
+
+    name: str
+    described: float
+    fitted: float
+    held_out_described: float
+    held_out: float
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Trace:
+    """A held-out run: measured, commanded and simulated positions.
+
+    Attributes:
+        name: of the log.
+        t: times (N,) [s].
+        measured: (N, n) [rad or m].
+        command: (N, n) [rad or m].
+        described: simulated with the drives as described (N, n).
+        identified: simulated with the identified drives (N, n).
+    """
+
+    name: str
+    t: Array
+    measured: Array
+    command: Array
+    described: Array
+    identified: Array
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Actuators:
+    """Identified drives of a robot.
+
+    Attributes:
+        robot: its name.
+        joints: names of the joints, chain by chain.
+        law: names of the joints' control laws.
+        values: all parameters of each joint by name.
+        parameters: those that were identified.
+        errors: of the simulated motion, joint by joint.
+        findings: effects that were found in the loop, strongest first.
+        notes: what a reader should know.
+        held_out: what the held-out data are.
+        written_error: mean of the joints' held-out errors with what simulators express of the drives [rad or m].
+        traces: the first held-out run; empty if the result was loaded without it.
+        success: whether the fit settled.
+        provenance: logs, gains, tool version.
+        robots: the chains; empty if the result was loaded.
+        drives: the drives with the identified values; empty if the result was loaded.
+    """
+
+    robot: str
+    joints: tuple[str, ...]
+    law: tuple[str, ...]
+    values: tuple[Mapping[str, float], ...]
+    parameters: tuple[DriveValue, ...]
+    errors: tuple[MotionError, ...]
+    findings: tuple[LoopFinding, ...]
+    notes: tuple[str, ...]
+    held_out: str
+    written_error: float = float("nan")
+    traces: tuple[Trace, ...] = ()
+    success: bool = True
+    provenance: Mapping[str, Any] = field(default_factory=dict)
+    robots: tuple[Robot, ...] = ()
+    drives: tuple[Drive, ...] = ()
+
+    def __repr__(self) -> str:
+        return (
+            f"Actuators({self.robot!r}, {len(self.joints)} joints, held-out error {1e3 * self.held_out_error:.3g} mrad)"
+        )
+
+    @property
+    def held_out_error(self) -> float:
+        """Mean over the joints of the held-out RMS error of the simulated position [rad or m]."""
+        return float(np.mean([error.held_out for error in self.errors]))
+
+    @property
+    def described_error(self) -> float:
+        """The same with the drives as described."""
+        return float(np.mean([error.held_out_described for error in self.errors]))
+
+    @property
+    def undetermined(self) -> tuple[DriveValue, ...]:
+        """Parameters that the motion does not determine."""
+        return tuple(value for value in self.parameters if value.status == "not determined")
+
+    def value(self, parameter: str, joint: str) -> DriveValue:
+        """Gives an identified parameter of a joint.
+
+        Raises:
+            InputError: it was not identified.
+        """
+        for item in self.parameters:
+            if item.parameter == parameter and joint in item.joints:
+                return item
+        known = ", ".join(dict.fromkeys(item.parameter for item in self.parameters))
+        raise InputError(f"{parameter} of {joint} was not identified", allowed=f"{known} of {', '.join(self.joints)}")
+
+    def summary(self) -> str:
+        """Lists errors of the simulated motion, findings, parameters, and what is not determined."""
+        lines = [
+            f"{self.robot}: drives of {len(self.joints)} joints; simulated position, mean of the joints' RMS errors on "
+            f"{self.held_out}: {1e3 * self.described_error:.3g} -> {1e3 * self.held_out_error:.3g} mrad"
+        ]
+        for item in self.findings:
+            lines.append(
+                f"  found: {item.title}, {item.name}: {item.states}; held-out error {1e3 * item.before:.3g} -> "
+                f"{1e3 * item.after:.3g} mrad"
+            )
+        if self.written_error > 1.05 * self.held_out_error:
+            lines.append(
+                f"  with what simulators express of these drives: {1e3 * self.written_error:.3g} mrad on the same data"
+            )
+        lines.append("  joint                  described   identified   (held-out RMS error, mrad or mm)")
+        for error in self.errors:
+            lines.append(f"  {error.name[:22]:22} {1e3 * error.held_out_described:9.3g} {1e3 * error.held_out:12.3g}")
+        lines.append("  parameter                               value   95 % interval")
+        for value in self.parameters:
+            interval = f"{value.lower:.3g} to {value.upper:.3g} {value.unit}"
+            known = interval if value.status == "identified" else f"{interval}; {value.status}"
+            lines.append(f"  {value.name[:36]:36} {value.value:9.4g}   {known}")
+        lines += [f"  {note}" for note in self.notes]
+        return "\n".join(lines)
+
+    def to_frame(self) -> pd.DataFrame:
+        """Gives a row per identified parameter."""
+        import pandas as pd
+
+        rows = [asdict(value) | {"joints": ", ".join(value.joints)} for value in self.parameters]
+        return pd.DataFrame(rows).drop(columns="partners") if rows else pd.DataFrame()
+
+    def plot(self, ax: Axes | None = None) -> Axes:
+        """Draws each joint's held-out error as described and identified.
+
+        Args:
+            ax: where to draw; a new figure by default.
+        """
+        from matplotlib.figure import Figure
+
+        axes = ax if ax is not None else Figure(figsize=(7, 4)).subplots()
+        place = np.arange(len(self.errors))
+        for shift, key, label in ((-0.2, "held_out_described", "as described"), (0.2, "held_out", "identified")):
+            axes.bar(place + shift, [1e3 * getattr(error, key) for error in self.errors], width=0.4, label=label)
+        axes.set_xticks(place, [error.name for error in self.errors], rotation=90)
+        axes.set_ylabel("held-out position error, RMS [mrad or mm]")
+        axes.legend()
+        return axes
+
+    def _repr_html_(self) -> str:
+        return f"<pre>{escape(self.summary())}</pre>"
+
+    def to_dict(self) -> dict[str, Any]:
+        """Writes the result as plain data for `actuators.json`."""
+        return {
+            "format": FORMAT,
+            "format_version": FORMAT_VERSION,
+            "robot": self.robot,
+            "joints": [
+                {"name": name, "law": law, "values": dict(values)}
+                for name, law, values in zip(self.joints, self.law, self.values, strict=True)
+            ],
+            "parameters": [
+                {
+                    **asdict(value),
+                    "joints": list(value.joints),
+                    "standard_error": finite(value.standard_error),
+                    "lower": finite(value.lower),
+                    "upper": finite(value.upper),
+                    "partners": list(value.partners),
+                }
+                for value in self.parameters
+            ],
+            "errors": [asdict(error) for error in self.errors],
+            "findings": [asdict(finding) | {"rivals": [list(r) for r in finding.rivals]} for finding in self.findings],
+            "notes": list(self.notes),
+            "held_out": self.held_out,
+            "written_error": finite(self.written_error),
+            "success": self.success,
+            "provenance": dict(self.provenance),
+        }
+
+    def save(self, folder: str | Path, *, force: bool = False) -> None:
+        """Writes `actuators.json` and `motion.parquet` into a folder that is there.
+
+        Args:
+            folder: an existing one.
+            force: replace files that are there.
+
+        Raises:
+            InputError: a file is there, and force is not given.
+        """
+        place = Path(folder)
+        text = json.dumps(self.to_dict(), indent=2, allow_nan=False) + "\n"
+        write_atomic(place / FILE, text, force=force)
+        if self.traces:
+            import pandas as pd
+
+            trace = self.traces[0]
+            columns: dict[str, Array] = {"t": trace.t}
+            names = {"q": "measured", "qref": "command", "described": "described", "identified": "identified"}
+            for prefix, key in names.items():
+                columns |= {f"{prefix}{j + 1}": getattr(trace, key)[:, j] for j in range(len(self.joints))}
+            target = place / MOTION
+            if target.exists() and not force:
+                raise InputError("the file exists", file=target, remedy="use --force")
+            pd.DataFrame(columns).to_parquet(target, index=False)
+
+
+def load_actuators(path: str | Path) -> Actuators:
+    """Reads an `actuators.json`, or the one in a folder, with the motion beside it.
+
+    Args:
+        path: the file, or its folder.
+
+    Raises:
+        InputError: a missing file, or one that holds no drives.
+    """
+    place = Path(path)
+    file = existing_file(place / FILE if place.is_dir() else place)
+    try:
+        data = json.loads(file.read_text(encoding="utf-8"))
+    except (UnicodeDecodeError, json.JSONDecodeError) as error:
+        raise InputError(f"is no JSON ({error})", file=file) from error
+    if not isinstance(data, dict) or data.get("format") != FORMAT:
+        raise InputError("holds no drives", file=file, allowed=f"a file of the format {FORMAT!r}")
+    try:
+        joints = tuple(joint["name"] for joint in data["joints"])
+        return Actuators(
+            robot=data["robot"],
+            joints=joints,
+            law=tuple(joint["law"] for joint in data["joints"]),
+            values=tuple(joint["values"] for joint in data["joints"]),
+            parameters=tuple(_value(value) for value in data["parameters"]),
+            errors=tuple(MotionError(**error) for error in data["errors"]),
+            findings=tuple(
+                LoopFinding(**finding | {"rivals": tuple((r[0], r[1]) for r in finding["rivals"])})
+                for finding in data["findings"]
+            ),
+            notes=tuple(data["notes"]),
+            held_out=data["held_out"],
+            written_error=number(data["written_error"]),
+            success=data["success"],
+            provenance=data["provenance"],
+            traces=_traces(file.parent / MOTION, len(joints), data["held_out"]),
+        )
+    except (KeyError, TypeError, ValueError) as error:
+        raise InputError(f"is damaged ({type(error).__name__}: {error})", file=file) from error
+
+
+def _value(value: dict[str, Any]) -> DriveValue:
+    unknown = {key: np.nan for key in ("standard_error", "lower", "upper") if value[key] is None}
+    return DriveValue(**value | unknown | {key: tuple(value[key]) for key in ("joints", "partners")})
+
+
+def _traces(path: Path, n: int, name: str) -> tuple[Trace, ...]:
+    if not path.is_file():
+        return ()
+    import pandas as pd
+
+    table = pd.read_parquet(path)
+
+    def signal(prefix: str) -> Array:
+        return table[[f"{prefix}{j + 1}" for j in range(n)]].to_numpy(dtype=float)
+
+    return (
+        Trace(
+            name=name,
+            t=table["t"].to_numpy(dtype=float),
+            measured=signal("q"),
+            command=signal("qref"),
+            described=signal("described"),
+            identified=signal("identified"),
+        ),
+    )

@@ -1,0 +1,8 @@
+"""Motions that determine drives without a torque signal."""
+
+from __future__ import annotations
+
+from oed.experiments.drives.designing import DriveDesignOptions, design_drive_motion
+from oed.experiments.drives.result import DriveDesign, ExpectedError
+
+__all__ = ["DriveDesign", "DriveDesignOptions", "ExpectedError", "design_drive_motion"]

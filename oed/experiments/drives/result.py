@@ -1,0 +1,185 @@
+"""A designed motion for drives: commands, and the standard errors that they will bring."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import asdict, dataclass
+from html import escape
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from robots.common.errors import InputError
+from robots.common.files import existing_file, write_atomic
+from robots.common.plain import finite, number
+from robots.common.tables.table_files import write_table
+
+if TYPE_CHECKING:
+    import pandas as pd
+    from matplotlib.axes import Axes
+
+Array = NDArray[np.float64]
+
+COMMANDS, FILE = "commands.csv", "design.json"
+FORMAT, FORMAT_VERSION = "robot-oed drive design", 1
+
+
+@dataclass(frozen=True, kw_only=True)
+class ExpectedError:
+    """Standard error that a motion will bring.
+
+    Attributes:
+        parameter: such as ``armature``.
+        group: the joint, or ``all``.
+        unit: its unit.
+        standard_error: of the designed motion.
+        of_chirp: of a chirp of the same time and limits; NaN without one.
+    """
+
+    parameter: str
+    group: str
+    unit: str
+    standard_error: float
+    of_chirp: float
+
+    @property
+    def ratio(self) -> float:
+        """Standard error over that of a chirp."""
+        return self.standard_error / self.of_chirp
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class DriveDesign:
+    """A motion for drives.
+
+    Attributes:
+        robot: its name.
+        joints: names of the joints.
+        t: times (N,) [s].
+        command: commanded positions (N, n) [rad or m].
+        segments: kinds of the segments, in order.
+        expected: standard errors.
+        noise: of measured positions [rad or m], for which they hold.
+        notes: what a reader should know.
+    """
+
+    robot: str
+    joints: tuple[str, ...]
+    t: Array
+    command: Array
+    segments: tuple[str, ...]
+    expected: tuple[ExpectedError, ...]
+    noise: float
+    notes: tuple[str, ...] = ()
+
+    @property
+    def success(self) -> bool:
+        """Whether the motion is better than a chirp in most parameters."""
+        return bool(self.ratio < 1)
+
+    @property
+    def ratio(self) -> float:
+        """Median over the parameters of the standard error over that of a chirp."""
+        return float(np.nanmedian([item.ratio for item in self.expected]))
+
+    def summary(self) -> str:
+        """Lists segments and expected standard errors, beside those of a chirp."""
+        lines = [
+            f"{self.robot}: {self.t[-1] - self.t[0]:.3g} s of commands for {len(self.joints)} joints: "
+            f"{', '.join(self.segments)}",
+            f"  expected standard errors are {self.ratio:.2g} times those of a chirp of the same time and limits "
+            f"(median; {min(item.ratio for item in self.expected):.2g} to "
+            f"{max(item.ratio for item in self.expected):.2g})",
+            "  parameter                          standard error     chirp's   (measured positions of "
+            f"{1e3 * self.noise:.2g} mrad noise)",
+        ]
+        for item in self.expected:
+            name = f"{item.parameter} {item.group}"
+            lines.append(f"  {name:34} {item.standard_error:12.2g} {item.of_chirp:12.2g} {item.unit}")
+        return "\n".join([*lines, *(f"  {note}" for note in self.notes)])
+
+    def to_frame(self) -> pd.DataFrame:
+        """Gives a row per parameter."""
+        import pandas as pd
+
+        return pd.DataFrame([asdict(item) | {"ratio": item.ratio} for item in self.expected])
+
+    def plot(self, ax: Axes | None = None) -> Axes:
+        """Draws the commands over time.
+
+        Args:
+            ax: where to draw; a new figure by default.
+        """
+        from matplotlib.figure import Figure
+
+        axes = ax if ax is not None else Figure(figsize=(8, 4)).subplots()
+        for j, name in enumerate(self.joints):
+            axes.plot(self.t, self.command[:, j], label=name)
+        axes.set_xlabel("time [s]")
+        axes.set_ylabel("command [rad or m]")
+        axes.legend(fontsize="small")
+        return axes
+
+    def _repr_html_(self) -> str:
+        return f"<pre>{escape(self.summary())}</pre>"
+
+    def to_dict(self) -> dict[str, Any]:
+        """Writes the result as plain data for `design.json`."""
+        return {
+            "format": FORMAT,
+            "format_version": FORMAT_VERSION,
+            "robot": self.robot,
+            "joints": list(self.joints),
+            "segments": list(self.segments),
+            "expected": [asdict(item) | {"of_chirp": finite(item.of_chirp)} for item in self.expected],
+            "noise": self.noise,
+            "notes": list(self.notes),
+        }
+
+    def save(self, folder: str | Path, *, force: bool = False) -> None:
+        """Writes `commands.csv` (``t,qref1..qrefn``) and `design.json` into a folder that is there.
+
+        Args:
+            folder: an existing one.
+            force: replace files that are there.
+
+        Raises:
+            InputError: a file is there, and force is not given.
+        """
+        place = Path(folder)
+        columns = {"t": self.t} | {f"qref{j + 1}": self.command[:, j] for j in range(len(self.joints))}
+        metadata = {"robot": self.robot, "joints": list(self.joints)}
+        write_table(place / COMMANDS, columns, metadata, force=force)
+        write_atomic(place / FILE, json.dumps(self.to_dict(), indent=2, allow_nan=False) + "\n", force=force)
+
+    @classmethod
+    def load(cls, folder: str | Path) -> DriveDesign:
+        """Reads what `save` wrote.
+
+        Args:
+            folder: with both files.
+
+        Raises:
+            InputError: a missing or damaged file.
+        """
+        import pandas as pd
+
+        place = Path(folder)
+        file = existing_file(place / FILE)
+        try:
+            data = json.loads(file.read_text(encoding="utf-8"))
+            table = pd.read_csv(existing_file(place / COMMANDS), comment="#")
+            return cls(
+                robot=data["robot"],
+                joints=tuple(data["joints"]),
+                t=table["t"].to_numpy(dtype=float),
+                command=table[[f"qref{j + 1}" for j in range(len(data["joints"]))]].to_numpy(dtype=float),
+                segments=tuple(data["segments"]),
+                expected=tuple(ExpectedError(**i | {"of_chirp": number(i["of_chirp"])}) for i in data["expected"]),
+                noise=data["noise"],
+                notes=tuple(data["notes"]),
+            )
+        except (KeyError, TypeError, ValueError) as error:
+            raise InputError(f"is damaged ({type(error).__name__}: {error})", file=file) from error

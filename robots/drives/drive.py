@@ -1,0 +1,112 @@
+"""A drive: a chain of members from the command to the joint, with the values of their parameters."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from types import MappingProxyType
+
+import casadi
+import numpy as np
+
+from robots.common.errors import InputError
+from robots.drives.base import DriveParameter, Instant, Member, Values
+from robots.drives.delay import Delay
+from robots.drives.gear import (
+    Armature,
+    EndStop,
+    Friction,
+    LoadFriction,
+    Offset,
+    PositionFriction,
+    StribeckFriction,
+)
+from robots.drives.motor import MotorLimit
+
+ENCODER = (
+    DriveParameter(name="encoder_zero", unit="rad", lower=-0.3, upper=0.3, size=1e-2),
+    DriveParameter(name="mass_factor", unit="1", default=1.0, lower=0.2, upper=5.0, size=0.1),
+)
+"""What every joint has beside its drive: the encoder's reading at zero, and what scales the inertia of its link."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Drive:
+    """The drive of one joint.
+
+    Attributes:
+        members: from the command to the joint; one of them is a control law.
+        values: parameters by name; those that are not stated have their defaults.
+
+    Raises:
+        InputError: a value of no member, or one that is not possible.
+    """
+
+    members: tuple[Member, ...]
+    values: Mapping[str, float] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        known = {parameter.name: parameter for parameter in self.parameters}
+        for name, value in self.values.items():
+            if name not in known:
+                raise InputError(f"drive parameter {name!r}", allowed=", ".join(known))
+            if not known[name].lower <= value <= known[name].upper or not np.isfinite(value):
+                raise InputError(
+                    f"{name} {value:g} {known[name].unit}", allowed=f"{known[name].lower:g} to {known[name].upper:g}"
+                )
+        complete = {name: float(self.values.get(name, parameter.default)) for name, parameter in known.items()}
+        object.__setattr__(self, "values", MappingProxyType(complete))
+
+    @classmethod
+    def usual(cls, law: Member, *, values: Mapping[str, float] | None = None, curve: bool = False) -> Drive:
+        """Makes a drive of a delay, a law, a limited motor, and a gear with all effects; those not stated are zero.
+
+        Args:
+            law: the control law.
+            values: of the parameters.
+            curve: whether the motor's torque falls with its speed.
+        """
+        gear = (Armature(), Friction(), StribeckFriction(), LoadFriction(), PositionFriction(), Offset(), EndStop())
+        return cls(members=(Delay(), law, MotorLimit(curve), *gear), values=values or {})
+
+    @property
+    def parameters(self) -> tuple[DriveParameter, ...]:
+        """The members' parameters, then those of the encoder and the link."""
+        return (*(parameter for member in self.members for parameter in member.parameters()), *ENCODER)
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of the parameters."""
+        return tuple(parameter.name for parameter in self.parameters)
+
+    @property
+    def states(self) -> tuple[str, ...]:
+        """Names of the members' own states."""
+        return tuple(state for member in self.members for state in member.states)
+
+    @property
+    def step(self) -> float:
+        """Resolution of the command [rad or m]; 0 for a continuous one."""
+        return max(member.steps() for member in self.members)
+
+    def with_values(self, values: Mapping[str, float]) -> Drive:
+        """Gives the drive with other values."""
+        return replace(self, values={**self.values, **values})
+
+    def torque(self, command: casadi.SX, now: Instant, values: Values) -> tuple[casadi.SX, casadi.SX, list[casadi.SX]]:
+        """Builds what the drive does.
+
+        Args:
+            command: the delayed command.
+            now: state of the joint.
+            values: parameters by name.
+
+        Returns:
+            The torque on the link without dry friction, the size of dry friction, and the rates of the states.
+        """
+        signal, dry, rates = command, casadi.SX(0), dict[str, casadi.SX]()
+        for member in self.members:
+            rates |= member.rates(signal, now, values)
+            signal = member.transmit(signal, now, values)
+            dry = dry + member.dry(now, values)
+        return signal, dry, [rates[name] for name in self.states]
