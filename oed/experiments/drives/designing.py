@@ -11,11 +11,14 @@ from numpy.typing import NDArray
 from oed.experiments.drives.information import Loop, expected_errors
 from oed.experiments.drives.result import DriveDesign, ExpectedError
 from oed.experiments.drives.segments import candidates, chirp
+from oed.experiments.safety_checks.freedom import UNCHECKED, collides, freedom_of, freedom_text
+from robots.collision import Surroundings
 from robots.common.errors import InfeasibleError, InputError, SolverError
 from robots.common.parallel import one_blas_thread
 from robots.common.progress import SILENT, Progress
 from robots.drives import Drive
 from robots.robot import Robot
+from robots.signals import Motion
 
 Array = NDArray[np.float64]
 
@@ -114,7 +117,7 @@ def design_drive_motion(
     best = _exchange([item[2] for item in pool], count)
     command = np.concatenate([pool[k][1] for k in best])
     times = np.arange(len(command), dtype=np.float64) * chosen.period
-    _, _, information = loop.played(times, command, noise)
+    q, dq, information = loop.played(times, command, noise)
     sizes = np.array([item.size for item in loop.sought])
     plain = _chirp(loop, chains, times, home, reach, noise, chosen)
     errors = expected_errors(information, sizes, PRIOR)
@@ -130,8 +133,23 @@ def design_drive_motion(
             for s, e, c in zip(loop.sought, errors, others, strict=True)
         ),
         noise=chosen.noise,
-        notes=("not checked for collisions: watch the first run at reduced speed",),
+        collisions=_collisions(chains, times, q, dq),
     )
+
+
+def _collisions(chains: Sequence[Robot], t: Array, q: Array, dq: Array) -> str:
+    """Says whether the simulated motion (N, n) collides, and with what it was checked."""
+    ends = np.cumsum([chain.n for chain in chains])[:-1]
+    parts = [np.split(values, ends, axis=1) for values in (q, dq, np.gradient(dq, t, axis=0))]
+    texts = []
+    for chain, *signals in zip(chains, *parts, strict=True):
+        # Nobody knows how far above the floor several chains hang.
+        bodies = Surroundings(floor=len(chains) == 1).model(chain)
+        freedom = freedom_of(bodies, Motion(t, *signals))
+        if len(chains) == 1 or collides(freedom):
+            return freedom_text(freedom)
+        texts.append(f"{chain.name}: {freedom_text(freedom)}")
+    return f"{UNCHECKED} of the {len(chains)} chains with each other and with the floor. {' '.join(texts)}"
 
 
 def _home_and_reach(chains: Sequence[Robot], options: DriveDesignOptions) -> tuple[Array, Array]:

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from oed.exports.trajectory_checks import UNKNOWN_COLLISIONS
 from robots.common.errors import InputError
 from robots.common.files import existing_file, write_atomic
 from robots.common.plain import finite, number
@@ -62,7 +63,7 @@ class DriveDesign:
         segments: kinds of the segments, in order.
         expected: standard errors.
         noise: of measured positions [rad or m], for which they hold.
-        notes: what a reader should know.
+        collisions: what was checked for collisions, and how near the motion comes.
     """
 
     robot: str
@@ -72,12 +73,12 @@ class DriveDesign:
     segments: tuple[str, ...]
     expected: tuple[ExpectedError, ...]
     noise: float
-    notes: tuple[str, ...] = ()
+    collisions: str = UNKNOWN_COLLISIONS
 
     @property
     def success(self) -> bool:
-        """Whether the motion is better than a chirp in most parameters."""
-        return bool(self.ratio < 1)
+        """Whether the motion is better than a chirp in most parameters, and does not collide."""
+        return bool(self.ratio < 1) and not self.collisions.startswith("COLLIDES")
 
     @property
     def ratio(self) -> float:
@@ -98,7 +99,7 @@ class DriveDesign:
         for item in self.expected:
             name = f"{item.parameter} {item.group}"
             lines.append(f"  {name:34} {item.standard_error:12.2g} {item.of_chirp:12.2g} {item.unit}")
-        return "\n".join([*lines, *(f"  {note}" for note in self.notes)])
+        return "\n".join([*lines, f"  {self.collisions}"])
 
     def to_frame(self) -> pd.DataFrame:
         """Gives a row per parameter."""
@@ -135,7 +136,7 @@ class DriveDesign:
             "segments": list(self.segments),
             "expected": [asdict(item) | {"of_chirp": finite(item.of_chirp)} for item in self.expected],
             "noise": self.noise,
-            "notes": list(self.notes),
+            "collisions": self.collisions,
         }
 
     def save(self, folder: str | Path, *, force: bool = False) -> None:
@@ -150,7 +151,7 @@ class DriveDesign:
         """
         place = Path(folder)
         columns = {"t": self.t} | {f"qref{j + 1}": self.command[:, j] for j in range(len(self.joints))}
-        metadata = {"robot": self.robot, "joints": list(self.joints)}
+        metadata = {"robot": self.robot, "joints": list(self.joints), "collisions": self.collisions}
         write_table(place / COMMANDS, columns, metadata, force=force)
         write_atomic(place / FILE, json.dumps(self.to_dict(), indent=2, allow_nan=False) + "\n", force=force)
 
@@ -179,7 +180,7 @@ class DriveDesign:
                 segments=tuple(data["segments"]),
                 expected=tuple(ExpectedError(**i | {"of_chirp": number(i["of_chirp"])}) for i in data["expected"]),
                 noise=data["noise"],
-                notes=tuple(data["notes"]),
+                collisions=data["collisions"],
             )
         except (KeyError, TypeError, ValueError) as error:
             raise InputError(f"is damaged ({type(error).__name__}: {error})", file=file) from error

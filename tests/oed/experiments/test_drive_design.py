@@ -10,6 +10,7 @@ import pytest
 from benchmarks.actuators_parts.plants import MACHINES, mjcf
 from oed.experiments.drives import DriveDesign, DriveDesignOptions, design_drive_motion
 from oed.reports.pages.drives.design_report import drive_design_page
+from robots.collision import CoalChecker, Surroundings
 from robots.common.errors import InputError
 from robots.drives import Drive, DriveDynamics, HeldCommand, Start, described_drives, load_branches, simulate_drives
 from robots.robot import Robot
@@ -87,3 +88,19 @@ def test_wrong_options_are_named(leg: tuple[tuple[Robot, ...], tuple[Drive, ...]
         design_drive_motion(*leg, options=DriveDesignOptions(home=(0.0, 0.8, 0.0)))
     with pytest.raises(InputError, match="duration -1"):
         DriveDesignOptions(duration=-1.0)
+
+
+def test_the_files_say_what_was_checked_for_collisions(
+    leg: tuple[tuple[Robot, ...], tuple[Drive, ...]], design: DriveDesign, tmp_path: Path
+) -> None:
+    """Summary, design.json and the head of the commands state the check; the capsules are judged by coal besides."""
+    (chain,), drives = leg
+    dynamics = DriveDynamics(chain, drives)
+    held, start = HeldCommand(design.t, design.command), Start(design.command[0], np.zeros(3))
+    q = simulate_drives(dynamics, held, design.t, start, dynamics.values).measured
+    closest = CoalChecker(Surroundings().model(chain)).clearance(q[::20]).min(initial=np.inf)
+    assert design.collisions.startswith("COLLIDES") == (closest < 0.0)
+    assert design.collisions in design.summary()
+    design.save(tmp_path)
+    assert design.collisions in (tmp_path / "commands.csv").read_text().replace("\n# ", "")
+    assert DriveDesign.load(tmp_path).collisions == design.collisions

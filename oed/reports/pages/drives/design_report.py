@@ -39,8 +39,10 @@ def drive_design_page(design: DriveDesign) -> Page:
     return Page(
         title="Motion for drives",
         robot=design.robot,
-        verdict=f"Standard errors will be {design.ratio:.2g} times those of a chirp of the same time and limits.",
-        findings=findings_of("experiment.note", design.notes),
+        verdict=f"Do not play this motion. {design.collisions}"
+        if design.collisions.startswith("COLLIDES")
+        else f"Standard errors will be {design.ratio:.2g} times those of a chirp of the same time and limits.",
+        findings=findings_of("experiment.note", [design.collisions]),
         facts=(
             Fact(label="Duration", value=f"{design.t[-1] - design.t[0]:.3g} s"),
             Fact(label="Ratio to a chirp", value=f"{design.ratio:.2g}", note="median of the standard errors"),
