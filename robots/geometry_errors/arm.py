@@ -21,7 +21,7 @@ Array = NDArray[np.float64]
 class ErroneousArm:
     """A robot with kinds of geometric errors: ``T = prod P_i exp(a_i) exp(b_i) J_i(q_i) tip``.
 
-    ``a_i`` is the sum of the constant errors of joint i, ``b_i`` that of the errors that depend on the pose.
+    ``a_i`` are errors of the link that carries joint i, ``b_i`` is the sum of all others.
 
     Attributes:
         robot: its nominal description.
@@ -33,8 +33,8 @@ class ErroneousArm:
 
     def columns(self, state: ArmState) -> ArmColumns:
         """Prepares the columns of all parameters at some poses."""
-        found = [(column, term.constant) for term in self.terms for column in term.columns(self.robot, state)]
-        return ArmColumns(self.robot, state, [column for column, _ in found], [constant for _, constant in found])
+        found = [(column, term.of_link) for term in self.terms for column in term.columns(self.robot, state)]
+        return ArmColumns(self.robot, state, [column for column, _ in found], [of_link for _, of_link in found])
 
     def corrected_chain(self, values: Mapping[str, float]) -> Chain:
         """Gives the chain with the constant errors in its placements.
@@ -43,13 +43,14 @@ class ErroneousArm:
             values: of parameters by name; those that are not named are zero.
         """
         state = ArmState(q=np.zeros((1, self.robot.n)))
-        twists = np.zeros((self.robot.n, 6))
-        for column in (column for term in self.terms if term.constant for column in term.columns(self.robot, state)):
-            for joint, twist in column.twists:
-                twists[joint] += values.get(column.parameter.name, 0.0) * twist[0]
+        twists = np.zeros((2, self.robot.n, 6))
+        for term in (term for term in self.terms if term.constant):
+            for column in term.columns(self.robot, state):
+                for number, twist in column.twists:
+                    twists[0 if term.of_link else 1, number] += values.get(column.parameter.name, 0.0) * twist[0]
         joints = []
-        for joint, twist in zip(self.robot.chain.joints, twists, strict=True):
-            placement = joint.placement @ exponential(twist)
+        for joint, first, second in zip(self.robot.chain.joints, *twists, strict=True):
+            placement = joint.placement @ exponential(first) @ exponential(second)
             # Rounding of long products must not add up.
             left, _, right = np.linalg.svd(placement[:3, :3])
             joints.append(Joint(joint.name, joint.kind, left @ right, placement[:3, 3], joint.axis))
@@ -63,10 +64,10 @@ class ArmColumns:
         robot: the robot.
         state: the poses.
         columns: of the parameters.
-        constant: whether each is the same at all poses.
+        of_link: whether each is of a link, and the same at all poses.
     """
 
-    def __init__(self, robot: Robot, state: ArmState, columns: Sequence[Column], constant: Sequence[bool]) -> None:
+    def __init__(self, robot: Robot, state: ArmState, columns: Sequence[Column], of_link: Sequence[bool]) -> None:
         self.robot, self.state, self.count = robot, state, len(columns)
         self.parameters = tuple(column.parameter for column in columns)
         n = robot.n
@@ -77,7 +78,7 @@ class ArmColumns:
             for store, wanted in ((self._fixed, True), (self._varying, False)):
                 rows = [
                     (k, twist)
-                    for k, (column, fixed) in enumerate(zip(columns, constant, strict=True))
+                    for k, (column, fixed) in enumerate(zip(columns, of_link, strict=True))
                     for joint, twist in column.twists
                     if joint == i and fixed == wanted
                 ]

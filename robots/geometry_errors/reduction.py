@@ -14,6 +14,9 @@ RANK_TOLERANCE = 1e-6
 """Share of a scaled column that has to be new: rounding leaves 1e-12, a motion of a hundredth of a degree 1e-4."""
 
 
+HALF = 0.5  # of the longest new part: above it the order decides which column is kept
+
+
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Reduction:
     """A choice of independent columns.
@@ -47,45 +50,54 @@ class Reduction:
 
 
 def reduce_columns(
-    matrix: Array, order: Sequence[int] | None = None, *, tolerance: float = RANK_TOLERANCE, shortest: float = 0.0
+    matrix: Array,
+    groups: Sequence[Sequence[int]] | None = None,
+    *,
+    tolerance: float = RANK_TOLERANCE,
+    shortest: float = 0.0,
 ) -> Reduction:
-    """Keeps columns one after the other if they are new (Gram and Schmidt, twice, on columns of equal length).
+    """Keeps columns one after the other if they are new (Gram and Schmidt on columns in usual sizes).
 
-    Columns of zeros are dropped. The choice is that of base parameters (Khalil and Dombre 2002, section 9.4), with a
-    stated order of preference.
+    Groups come in order of preference. Within a group the first column is taken whose new part is at least half as long
+    as the longest one: a set that is well conditioned also where axes are only nearly parallel. Columns of zeros are
+    dropped. The choice is that of base parameters (Khalil and Dombre 2002, section 9.4) with a stated preference.
 
     Args:
         matrix: (R, P), rows and columns scaled to comparable units.
-        order: in which columns are tried; from first to last by default.
+        groups: numbers of the columns by group; one group by default. Columns in no group are not looked at.
         tolerance: share of a column's length that has to be new.
         shortest: length of what has to be new. With rows in standard deviations of the noise and columns in usual sizes
             of the parameters, the inverse is the standard error, in usual sizes, at which nothing is determined.
     """
     rows, count = matrix.shape
     # A triangle with the same inner products is enough.
-    triangle = np.linalg.qr(matrix, mode="r") if rows > count else matrix
+    triangle = np.linalg.qr(matrix, mode="r") if rows > count else np.array(matrix)
     lengths = np.linalg.norm(triangle, axis=0)
-    zero = lengths <= np.finfo(float).eps * rows * lengths.max(initial=0.0)
-    unit = triangle / np.where(zero, 1.0, lengths)
-    basis = np.zeros((triangle.shape[0], count))
+    least = np.maximum(tolerance * lengths, np.finfo(float).eps * rows * lengths.max(initial=0.0))
+    least = np.maximum(least, shortest)
     kept: list[int] = []
     dropped: list[int] = []
     novelty = np.zeros(count)
-    for column in range(count) if order is None else order:
-        if zero[column]:
-            dropped.append(column)
-            continue
-        found = basis[:, : len(kept)]
-        new = unit[:, column]
-        for _ in range(2):
-            new = new - found @ (found.T @ new)
-        novelty[column] = np.linalg.norm(new)
-        if novelty[column] > tolerance and novelty[column] * lengths[column] > shortest:
-            basis[:, len(kept)] = new / novelty[column]
+    new = triangle.copy()
+    basis = np.zeros((triangle.shape[0], 0))
+    for group in groups if groups is not None else [range(count)]:
+        left = list(group)
+        while left:
+            size = np.linalg.norm(new[:, left], axis=0)
+            novelty[left] = size / np.where(lengths[left] > 0.0, lengths[left], 1.0)
+            open_ = np.where(size > least[left], size, 0.0)
+            if not open_.any():
+                break
+            column = left.pop(int(np.argmax(open_ >= HALF * open_.max())))
+            direction = new[:, column] / np.linalg.norm(new[:, column])
+            direction -= basis @ (basis.T @ direction)
+            direction /= np.linalg.norm(direction)
+            basis = np.column_stack([basis, direction])
+            new -= np.outer(direction, direction @ new)
             kept.append(column)
-        else:
-            dropped.append(column)
+        dropped += left
+    scale = np.where(lengths > 0.0, lengths, 1.0)
+    unit = triangle / scale
     solved = np.linalg.lstsq(unit[:, kept], unit[:, dropped], rcond=None)[0] if kept else np.zeros((0, len(dropped)))
-    scale = np.where(zero, 0.0, lengths)
-    combination = solved * scale[dropped] / scale[kept][:, None] if kept else solved
+    combination = solved * scale[dropped] / scale[kept][:, None]
     return Reduction(kept=tuple(kept), dropped=tuple(dropped), combination=combination, novelty=novelty)

@@ -116,6 +116,7 @@ class CameraBoard(Measurement):
         }
         residual = observed - pixels.reshape(rows, size)
         behind = np.isnan(depth).any(axis=1)
+        residual[behind] = np.nan
         by_flange[behind] = 0.0
         for part in parts.values():
             part[behind] = 0.0

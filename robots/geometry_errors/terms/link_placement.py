@@ -22,6 +22,7 @@ class LinkPlacement(ErrorTerm):
     kind = "link_placement"
     title = "link placements"
     constant = True
+    of_link = True
 
     def parameters(self, robot: Robot, state: ArmState) -> tuple[ErrorParameter, ...]:
         """Lists ``link_i_x`` to ``link_i_rz`` of each joint i."""
