@@ -57,13 +57,14 @@ class ErrorTerm(ABC):
         kind: its name in files.
         title: its name for people.
         constant: whether the twists are the same at all poses, so that a URDF can state it.
-        of_link: whether it moves the frame before all other kinds do, which then act in the axes of the moved frame.
+        of_link: whether it moves the frame before all other kinds do, which then act in the axes of the moved frame.        includes: kinds that this one contains, and that are fitted with it.
     """
 
     kind: ClassVar[str]
     title: ClassVar[str]
     constant: ClassVar[bool] = False
     of_link: ClassVar[bool] = False
+    includes: ClassVar[tuple[str, ...]] = ()
 
     @abstractmethod
     def parameters(self, robot: Robot, state: ArmState) -> tuple[ErrorParameter, ...]:

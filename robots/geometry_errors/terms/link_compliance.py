@@ -21,7 +21,7 @@ class LinkCompliance(ErrorTerm):
 
     def parameters(self, robot: Robot, state: ArmState) -> tuple[ErrorParameter, ...]:
         """Lists ``link_compliance_1`` to ``link_compliance_n``."""
-        return tuple(parameter(f"link_compliance_{i + 1}", self.kind, i, "rad/(N m)", 1e-5) for i in range(robot.n))
+        return tuple(parameter(f"link_compliance_{i + 1}", self.kind, i, "rad/(N m)", 1e-4) for i in range(robot.n))
 
     def missing(self, robot: Robot, state: ArmState) -> str:
         """Says that masses are not known."""

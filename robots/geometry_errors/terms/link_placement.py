@@ -23,6 +23,7 @@ class LinkPlacement(ErrorTerm):
     title = "link placements"
     constant = True
     of_link = True
+    includes = ("joint_zero",)
 
     def parameters(self, robot: Robot, state: ArmState) -> tuple[ErrorParameter, ...]:
         """Lists ``link_i_x`` to ``link_i_rz`` of each joint i."""
