@@ -142,10 +142,13 @@ def select_kinds(
             tried.append((term, _trial(fit, term, before, after)))
         if not tried:
             return _ordered(terms, chosen), tuple(trials)
-        term, best = max(tried, key=lambda pair: pair[1].clear if pair[1].added else -np.inf)
-        if not best.added:
+        better = [pair for pair in tried if pair[1].added]
+        if not better:
             rest = [trial for _, trial in tried]
             return _ordered(terms, chosen), (*trials, *rest)
+        # Of kinds that explain the same, the first in order counts.
+        lowest = min(trial.with_it for _, trial in better)
+        term, best = next(pair for pair in better if pair[1].with_it <= (1.0 + RELEVANT) * lowest)
         chosen += [other for other in terms if other.kind in {term.kind, *term.includes} and other not in chosen]
         trials.append(best)
 

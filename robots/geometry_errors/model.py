@@ -9,9 +9,10 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from robots.common.errors import InputError
 from robots.geometry_errors.arm import ArmColumns, ErroneousArm
 from robots.geometry_errors.measurements import Setup
-from robots.geometry_errors.measurements.setup import setup_parameters
+from robots.geometry_errors.measurements.setup import known_setup, setup_parameters
 from robots.geometry_errors.poses import MeasuredPoses
 from robots.geometry_errors.terms import ErrorParameter, ErrorTerm
 from robots.robot import Robot
@@ -82,8 +83,16 @@ class GeometryModel:
         return [arm.flange(part) for arm, part in zip(self._arms, self._split(values), strict=True)]
 
     def start(self) -> Setup:
-        """Finds a first setup with nominal arms."""
-        return self.poses.measurement.start(self.flanges(np.zeros(len(self.errors))), self.poses.observed)
+        """Finds a first setup with nominal arms.
+
+        Raises:
+            InputError: a known part that the measurement has not.
+        """
+        found = self.poses.measurement.start(self.flanges(np.zeros(len(self.errors))), self.poses.observed)
+        unknown = next((name for name in self.poses.known if name not in found), None)
+        if unknown is not None:
+            raise InputError(f"{self.poses.measurement.title} have no {unknown!r}", allowed=", ".join(found))
+        return known_setup(found, self.poses.known)
 
     def evaluate(self, values: Array, setup: Setup) -> Prediction:
         """Computes residuals and derivatives.

@@ -35,6 +35,7 @@ class MeasuredPoses:
         velocity: of the joints (N, n) [rad/s or m/s]; None if they stood still.
         approach: direction in which each joint came to the pose (N, n); None where it is not known.
         torque: of gravity at the joints, of an identified model (N, n) [N m or N]; None for that of the description.
+        known: parts of the setup that are known and not estimated, by name: a pose (4, 4), a point (3,) [m].
         line: line of the file of each pose, from 1.
         source: the file, and what is known of it.
 
@@ -52,6 +53,7 @@ class MeasuredPoses:
     velocity: Array | None = None
     approach: Array | None = None
     torque: Array | None = None
+    known: Mapping[str, Array] = field(default_factory=dict)
     line: NDArray[np.int64] | None = None
     source: Mapping[str, Any] = field(default_factory=dict)
 
