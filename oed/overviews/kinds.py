@@ -225,6 +225,19 @@ def _payload(data: Data) -> Reading:
     )
 
 
+def _calibration(data: Data) -> Reading:
+    levels, factor = data["levels"], 1e3 if data["unit"] != "px" else 1.0
+    unit = {"m": "mm", "rad": "mrad", "px": "px"}[data["unit"]]
+    before, after = factor * levels["before"], factor * levels["held_out"]
+    return Reading(
+        kind="calibration",
+        verdict=f"Error of held-out poses {before:.3g} -> {after:.3g} {unit}.",
+        codes=("calibration.doubtful",) if data["warnings"] else ("done",),
+        figures={f"before [{unit}]": before, f"held out [{unit}]": after, "outliers": len(data["outliers"])},
+        robot=_robot(data),
+    )
+
+
 def _forces(data: Data) -> Reading:
     count = len(data["contacts"])
     return Reading(
@@ -288,6 +301,7 @@ BY_FORMAT: dict[str, Callable[[Data], Reading]] = {
     "robot-oed fleet": _fleet,
     "robot-oed comparison": _comparison,
     "robot-oed payload": _payload,
+    "robot-oed calibration": _calibration,
     "robot-oed forces": _forces,
     "robot-oed campaign": _campaign,
     "robot-oed pareto front": _pareto,

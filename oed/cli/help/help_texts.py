@@ -8,7 +8,7 @@ COMMANDS: dict[str, tuple[str, ...]] = {
     "First steps": ("example", "robots", "robot", "effects", "doctor"),
     "Experiments": ("design", "pareto", "retime", "campaign", "export", "show"),
     "Robot and virtual robot": ("stream", "record", "loop", "controller", "simulate"),
-    "Models": ("check", "identify", "thermal", "predict", "payload"),
+    "Models": ("check", "identify", "thermal", "predict", "payload", "calibrate"),
     "Diagnosis": ("diagnose", "compare", "monitor", "fleet", "force", "view", "benchmark"),
 }
 """Commands by purpose; those that are not listed come last."""
@@ -16,12 +16,13 @@ COMMANDS: dict[str, tuple[str, ...]] = {
 OTHER = "Other commands"
 
 OPTIONS = {
-    "Robot": ("robot", "tip", "joints", "lock", "unlimited", "assume_masses", "home"),
+    "Robot": ("robot", "second", "tip", "joints", "lock", "unlimited", "assume_masses", "home"),
     "Input": (
         *(
             "trajectory",
             "log",
             "log_dir",
+            "poses",
             "state",
             "without",
             "held_out",
@@ -129,6 +130,10 @@ EXAMPLES = {
     "payload": (
         "oed payload --robot ur10 --log with.csv --without without.csv --to urscript --out payload",
         "oed payload --model model --log with.csv --to franka kuka --out payload",
+    ),
+    "calibrate": (
+        "oed calibrate --robot arm.urdf --poses poses.csv --out calibrated",
+        "oed calibrate --robot ur10 --poses poses.csv --lengths mm --angles deg --held-out other.csv --out calibrated",
     ),
     "force": (
         "oed force --model model --log log.csv --healthy healthy.csv --out forces",

@@ -63,6 +63,10 @@ LEVELS: dict[str, Level] = {
     "joint.still": "note",
     "prediction.extrapolates": "note",
     "payload.uncertain": "note",
+    "calibration.doubtful": "act",
+    "calibration.cause": "note",
+    "calibration.outlier": "note",
+    "calibration.open": "note",
     # Diagnoses and comparisons.
     "diagnosis.ambiguous": "act",
     "diagnosis.unexplained": "act",
