@@ -110,7 +110,7 @@ def calibrate(
             from estimation.calibrations.causes.diagnosing import diagnose_geometry
 
             bar.update(0, "looking for causes")
-            causes = diagnose_geometry(robots, poses, fit, terms, used=fit.used).to_dict()
+            causes = diagnose_geometry(robots, poses, fit, used=fit.used).to_dict()
         check = None if held_out is None else _check(robots, terms, fit, nominal, held_out)
     finally:
         bar.finish()
