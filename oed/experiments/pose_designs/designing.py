@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -17,7 +18,7 @@ from oed.experiments.pose_designs.ordering import Moves, Paths, ordered
 from oed.experiments.pose_designs.refinement import refined
 from oed.experiments.pose_designs.result import PoseDesign
 from oed.experiments.pose_designs.visibility import View
-from oed.experiments.safety_checks.freedom import freedom_of
+from oed.experiments.safety_checks.freedom import collides, freedom_of
 from robots.collision import CollisionModel, Surroundings
 from robots.common.errors import InfeasibleError, InputError
 from robots.common.parallel import one_blas_thread
@@ -26,12 +27,13 @@ from robots.geometry_errors.measurements import Markers, Measurement
 from robots.geometry_errors.virtual import random_positions
 from robots.limits import Limits
 from robots.robot import Robot
+from robots.signals import Motion
 
 Array = NDArray[np.float64]
 
 CANDIDATES = 1000
 DRAWS = 60  # times so many poses are drawn before the limits in space are called too tight
-WAYPOINTS = 60
+REPAIRS = 4  # times an order is sought anew without a move that was found to collide
 NOISE = {"m": 1e-4, "rad": 1e-4, "px": 0.2}
 """Usual noise of trackers, turn measurements and cameras."""
 
@@ -126,7 +128,7 @@ def design_poses(
         )
     model = how.surroundings.model(robot) if how.collision else None
     usable = usable_limits(robot.limits, velocity_share(robot, how.velocity_fraction))
-    bounds = _bounds(usable, how.range_share)
+    bounds = _bounds(usable, how.range_share, robot.chain.kinds)
     allowed = _Allowed(information, how, model)
     bar.start("designing poses", 1.0)
     try:
@@ -140,12 +142,18 @@ def design_poses(
             q = refined(information, q, judge, bounds, allowed, lambda share: bar.update(0.4 + 0.3 * share))
         bar.update(0.7, "ordering moves")
         home = _home(usable, how, allowed, candidates)
-        moves = Moves(usable, robot.period)
-        tour = ordered(q, home, usable, Paths(moves, model, how.clearance / 2.0), candidates[:WAYPOINTS])
-        sequence = moves.whole(tour, how.dwell)
-        motion = sequence.motion()
-        bar.update(0.95, "proving the moves")
-        freedom = None if model is None else freedom_of(model, motion)
+        moves, paths = Moves(usable, robot.period), Paths(model, how.clearance / 2.0, bounds, how.seed)
+        for _ in range(REPAIRS):
+            tour = ordered(q, home, usable, paths)
+            if tour.left_out:
+                q = _replaced(q, tour.left_out, home, candidates, rows, paths)
+                tour = ordered(q, home, usable, paths)
+            sequence = moves.whole(tour, how.dwell)
+            motion = sequence.motion()
+            freedom = None if model is None else freedom_of(model, motion)
+            if not collides(freedom):
+                break
+            _forbid(paths, sequence.table(), motion, freedom)
     finally:
         bar.finish()
     visited = q[list(tour.order)]
@@ -201,11 +209,16 @@ class _Allowed:
         return ok
 
 
-def _bounds(limits: Limits, share: float) -> tuple[Array, Array]:
+def _bounds(limits: Limits, share: float, kinds: tuple[str, ...]) -> tuple[Array, Array]:
+    """The part of each range that is used; of joints that turn farther, one turn about home, which no winding cuts off."""
     lower = np.where(np.isfinite(limits.lower), limits.lower, -np.pi)
     upper = np.where(np.isfinite(limits.upper), limits.upper, np.pi)
     middle, half = (lower + upper) / 2.0, share * (upper - lower) / 2.0
-    return middle - half, middle + half
+    turns = (np.array(kinds) == "revolute") & (half > np.pi)
+    home = np.clip(limits.home, middle - half, middle + half)
+    low = np.where(turns, np.maximum(middle - half, home - np.pi), middle - half)
+    high = np.where(turns, np.minimum(middle + half, home + np.pi), middle + half)
+    return low, high
 
 
 def _candidates(bounds: tuple[Array, Array], allowed: _Allowed, count: int, seed: int) -> Array:
@@ -224,6 +237,33 @@ def _candidates(bounds: tuple[Array, Array], allowed: _Allowed, count: int, seed
             remedy="widen the cone of view, lower --clearance, or state other surroundings (--floor, --no-floor)",
         )
     return np.concatenate(found)[:count]
+
+
+def _replaced(
+    q: Array, lost: tuple[int, ...], home: Array, candidates: Array, rows: Array, paths: Paths
+) -> Array:
+    """Puts candidates in the place of poses that no move reaches: the best ones with a free move to a pose that is kept."""
+    kept = [k for k in range(len(q)) if k not in lost]
+    near = [home, *(q[k] for k in kept)]
+    picked: list[Array] = []
+    order = np.argsort(-np.linalg.norm(rows, axis=(1, 2)))
+    for k in order:
+        if len(picked) == len(lost):
+            break
+        if any(paths.free(pose, candidates[k]) for pose in near[:: max(len(near) // 6, 1)]):
+            picked.append(candidates[k])
+    return np.vstack([q[kept], *(pose[None] for pose in picked)])
+
+
+def _forbid(paths: Paths, segments: list[dict[str, object]], motion: Motion, freedom: Mapping[str, Any] | None) -> None:
+    """Forbids the move on which a motion collides."""
+    assert freedom is not None
+    time = float(freedom["meetings"][0][1] if freedom.get("meetings") else freedom["time"])
+    for segment in segments:
+        start, end = float(str(segment["start"])), float(str(segment["end"]))
+        if start <= time <= end:
+            rows = np.searchsorted(motion.t, [start, end]).clip(0, len(motion.t) - 1)
+            paths.forbid(motion.q[rows[0]], motion.q[rows[1]])
 
 
 def _home(limits: Limits, how: PoseOptions, allowed: _Allowed, candidates: Array) -> Array:

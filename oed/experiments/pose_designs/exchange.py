@@ -31,7 +31,7 @@ def exchanged(rows: Array, count: int, criterion: Criterion, *, start: list[int]
     Returns:
         Numbers of the candidates that were chosen; one may occur twice.
     """
-    grams = np.einsum("crl,crk->clk", rows, rows)
+    grams = np.swapaxes(rows, 1, 2) @ rows
     size = rows.shape[2]
     ridge = RIDGE * float(np.trace(grams.mean(0))) / size * np.eye(size)
     chosen = list(start or [])
@@ -65,8 +65,7 @@ def exchanged(rows: Array, count: int, criterion: Criterion, *, start: list[int]
 def _determinant_gain(rows: Array, total: Array) -> Array:
     """Factor of the determinant that each candidate brings (C,): ``det(1 + J inv(M) J')``."""
     inverse = np.linalg.inv(total)
-    small = np.einsum("crl,lk,csk->crs", rows, inverse, rows)
-    small += np.eye(rows.shape[1])
+    small = (rows @ inverse) @ np.swapaxes(rows, 1, 2) + np.eye(rows.shape[1])
     return np.asarray(np.linalg.slogdet(small)[1])
 
 

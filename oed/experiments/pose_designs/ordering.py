@@ -11,15 +11,15 @@ from numpy.typing import NDArray
 from oed.experiments.assembly import limits_between_samples
 from oed.retiming import PlannedMove, plan_move
 from oed.trajectories import PiecewisePolynomial, Segment, Sequence
-from robots.collision import CollisionModel, check_motion
+from robots.collision import CollisionModel
 from robots.common.errors import InfeasibleError
 from robots.limits import Limits
-from robots.signals import Motion
 
 Array = NDArray[np.float64]
 
-LOOK = 0.05  # s between looks at a move; between them its way is bounded, and the whole motion is proved afterwards
-NEAR = 12  # way points that are tried between two poses without a direct move
+LOOK = 0.04  # rad or m between looks at a move while the order is sought; the whole motion is proved afterwards
+STRIDE, GROWTH = 0.4, 800  # rad or m of a branch, and branches of a detour
+NEAREST = 3  # poses that are tried by a detour, before the next is left for later
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -74,47 +74,113 @@ class Moves:
 
 
 class Paths:
-    """Moves between poses, each looked at once.
+    """Straight moves between poses, each looked at once.
 
     Args:
-        moves: plans them.
         model: bodies and obstacles; None where collisions are not checked.
         clearance: to keep [m].
+        bounds: lower and upper positions of detours (n,).
+        seed: of detours.
     """
 
-    def __init__(self, moves: Moves, model: CollisionModel | None, clearance: float) -> None:
-        self._moves, self._model, self._clearance = moves, model, clearance
+    def __init__(
+        self, model: CollisionModel | None, clearance: float, bounds: tuple[Array, Array], seed: int = 0
+    ) -> None:
+        self._model, self._clearance, self._bounds = model, clearance, bounds
         self._known: dict[tuple[bytes, bytes], bool] = {}
+        self._rng = np.random.default_rng(seed)
 
     def free(self, start: Array, end: Array) -> bool:
-        """Whether the direct move keeps clear, at looks along it and between them."""
+        """Whether the straight move keeps clear, at points along it."""
         key = (start.tobytes(), end.tobytes())
         if key not in self._known:
-            self._known[key] = self._look(start, end)
+            self._known[key] = self._known[key[::-1]] = self._clear(_line(start, end))
         return self._known[key]
 
-    def _look(self, start: Array, end: Array) -> bool:
-        planned = self._moves.plan(start, end)
-        if planned is None or self._model is None:
-            return True
-        t = np.linspace(0.0, planned.duration, max(int(planned.duration / LOOK), 2) + 1)
-        q, dq, ddq = planned.sample(t)
-        motion = Motion(t=t, q=q, dq=dq, ddq=ddq)
-        report = check_motion(self._model, motion, margin=self._clearance, confirm=False, max_halvings=6)
-        return bool((report.clearance >= self._clearance).all()) and not report.meetings
+    def forbid(self, start: Array, end: Array) -> None:
+        """Notes that a move was not proved free."""
+        for key in ((start.tobytes(), end.tobytes()), (end.tobytes(), start.tobytes())):
+            self._known[key] = False
+
+    def detour(self, start: Array, end: Array) -> list[Array] | None:
+        """Way points from one pose to another (bidirectional random trees: Kuffner and LaValle 2000), or None."""
+        trees = [[start], [end]]
+        parents: list[list[int]] = [[-1], [-1]]
+        for step in range(GROWTH):
+            own, other = step % 2, 1 - step % 2
+            target = self._rng.uniform(*self._bounds)
+            grown = self._grow(trees[own], parents[own], target)
+            if grown is None:
+                continue
+            reached = self._connect(trees[other], parents[other], trees[own][grown])
+            if reached is not None:
+                first, second = _branch(trees[own], parents[own], grown), _branch(trees[other], parents[other], reached)
+                way = [*first[::-1], *second] if own == 0 else [*second[::-1], *first]
+                return self._shortcut(way)[1:-1]
+        return None
+
+    def _grow(self, tree: list[Array], parent: list[int], target: Array) -> int | None:
+        near = int(np.argmin(np.linalg.norm(np.array(tree) - target, axis=1)))
+        way = target - tree[near]
+        length = float(np.abs(way).max())
+        new = tree[near] + way * min(1.0, STRIDE / max(length, 1e-12))
+        if not self.free(tree[near], new):
+            return None
+        tree.append(new)
+        parent.append(near)
+        return len(tree) - 1
+
+    def _connect(self, tree: list[Array], parent: list[int], target: Array) -> int | None:
+        place: int | None = None
+        while True:
+            grown = self._grow(tree, parent, target)
+            if grown is None:
+                return None
+            if np.array_equal(tree[grown], target) or np.abs(tree[grown] - target).max() < 1e-12:
+                return grown
+            if place is not None and len(tree) > GROWTH:
+                return None
+            place = grown
+
+    def _shortcut(self, way: list[Array]) -> list[Array]:
+        """Leaves way points out whose neighbours have a free move."""
+        k = 1
+        while k + 1 < len(way):
+            if self.free(way[k - 1], way[k + 1]):
+                del way[k]
+                k = max(k - 1, 1)
+            else:
+                k += 1
+        return way
+
+    def _clear(self, q: Array) -> bool:
+        return self._model is None or not self._model.pairs or bool((self._model.clearance(q) >= self._clearance).all())
 
 
-def ordered(q: Array, home: Array, limits: Limits, paths: Paths, waypoints: Array) -> Tour:
+def _line(start: Array, end: Array) -> Array:
+    count = max(int(np.ceil(np.abs(end - start).max() / LOOK)), 1)
+    return start + np.linspace(0.0, 1.0, count + 1)[:, None] * (end - start)
+
+
+def _branch(tree: list[Array], parent: list[int], leaf: int) -> list[Array]:
+    """From a leaf to the root."""
+    way = []
+    while leaf >= 0:
+        way.append(tree[leaf])
+        leaf = parent[leaf]
+    return way
+
+
+def ordered(q: Array, home: Array, limits: Limits, paths: Paths) -> Tour:
     """Finds a short order of moves that are free: the nearest reachable pose next, then two moves at a time turned round.
 
-    A pose without a direct move is reached by way points.
+    A pose without a direct move is reached by a detour.
 
     Args:
         q: poses (N, n) [rad or m].
         home: pose at both ends (n,).
         limits: whose velocities say how far poses are apart.
         paths: moves and whether they are free.
-        waypoints: free poses to pass (M, n).
 
     Raises:
         InfeasibleError: no pose can be reached.
@@ -132,14 +198,16 @@ def ordered(q: Array, home: Array, limits: Limits, paths: Paths, waypoints: Arra
         near = sorted(left, key=lambda k: time(here, q[k]))
         following = next((k for k in near if paths.free(here, q[k])), None)
         if following is None:
-            for k in near:
-                detour = _detour(here, q[k], paths, waypoints, time)
+            for k in near[:NEAREST]:
+                detour = paths.detour(here, q[k])
                 if detour is not None:
                     following, via[(place, k)] = k, detour
                     break
         if following is None:
-            lost = left
-            break
+            # This one cannot be left, or those cannot be reached: the nearest is given up.
+            lost.append(near[0])
+            left.remove(near[0])
+            continue
         order.append(following)
         left.remove(following)
         here, place = q[following], following
@@ -149,7 +217,7 @@ def ordered(q: Array, home: Array, limits: Limits, paths: Paths, waypoints: Arra
             remedy="choose another home pose (--home), or state other surroundings (--floor, --no-floor)",
         )
     order = _shortened(order, q, home, paths, time, via)
-    return _tour(order, q, home, paths, waypoints, time, via, tuple(lost))
+    return _tour(order, q, home, paths, via, tuple(lost))
 
 
 def _shortened(
@@ -186,8 +254,6 @@ def _tour(
     q: Array,
     home: Array,
     paths: Paths,
-    waypoints: Array,
-    time: Callable[[Array, Array], float],
     via: dict[tuple[int, int], list[Array]],
     lost: tuple[int, ...],
 ) -> Tour:
@@ -200,27 +266,8 @@ def _tour(
         stops.append(q[k])
         place = k
     if not paths.free(stops[-1], home):
-        detour = _detour(stops[-1], home, paths, waypoints, time)
-        if detour is None:
-            # The way out leads back.
-            detour = stops[1:-1][::-1]
-        stops += detour
+        detour = paths.detour(stops[-1], home)
+        # Without another way, the way out leads back.
+        stops += stops[1:-1][::-1] if detour is None else detour
     stops.append(home)
     return Tour(order=tuple(order), stops=np.array(stops), measured=tuple(measured), left_out=lost)
-
-
-def _detour(
-    start: Array, end: Array, paths: Paths, waypoints: Array, time: Callable[[Array, Array], float]
-) -> list[Array] | None:
-    """One way point, or two, by which a pose can be reached; None where there are none."""
-    ranked = sorted(waypoints, key=lambda w: time(start, w) + time(w, end))[:NEAR]
-    from_start = [w for w in ranked if paths.free(start, w)]
-    to_end = [w for w in ranked if paths.free(w, end)]
-    for w in from_start:
-        if any(w is other for other in to_end):
-            return [w]
-    for first in from_start:
-        for second in to_end:
-            if paths.free(first, second):
-                return [first, second]
-    return None

@@ -51,7 +51,7 @@ def refined(
 
             def cost(poses: Array, without: Array = without) -> Array:
                 own = information.rows(poses)
-                found = without + np.einsum("nrl,nrk->nlk", own, own)
+                found = without + np.swapaxes(own, 1, 2) @ own
                 return np.array([criterion.cost(values) for values in np.linalg.eigvalsh(found)])
 
             best = _moved(q[k], cost, bounds)
