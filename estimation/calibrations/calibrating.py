@@ -179,8 +179,8 @@ def _result(
     warnings = []
     if len(outliers) > COMMON * len(poses):
         warnings.append(
-            f"{len(outliers)} of {len(poses)} poses were left out as outliers: so many are no single faults. Check that "
-            "the file is of this robot, and look for a moved base or a loose marker."
+            f"{len(outliers)} of {len(poses)} poses were left out as outliers: so many are no single faults. Check "
+            "that the file is of this robot, and look for a moved base or a loose marker."
         )
     if errors.rms(used) > _rms(measure(before)[used]):
         warnings.append("The calibrated robot predicts held-out poses no better than the description: do not use it.")

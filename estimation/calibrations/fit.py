@@ -136,7 +136,7 @@ def fit_geometry(
         raise SolverError("no pose has a measurement that the model can predict")
     units = model.poses.measurement.units
     kinds = list(dict.fromkeys(item.kind for item in model.errors))
-    known = {kind: LARGEST for kind in kinds} | {k: v for k, v in (sizes or {}).items() if k in kinds}
+    known = dict.fromkeys(kinds, LARGEST) | {k: v for k, v in (sizes or {}).items() if k in kinds}
     reduction = minimal_set(model, setup, replace(robust_weights(found.residual, units, 0, counts), pose=counts))
     values = _only(values, reduction)
     state = _State(model, values, setup, found, robust_weights(found.residual, units, reduction.rank, counts))
@@ -192,9 +192,7 @@ def _prior(state: _State, kept: Sequence[int], sizes: Mapping[str, float]) -> tu
     return inverse, value
 
 
-def _search(
-    state: _State, reduction: Reduction, sizes: Mapping[str, float], used: Array, robust: bool
-) -> _State:
+def _search(state: _State, reduction: Reduction, sizes: Mapping[str, float], used: Array, robust: bool) -> _State:
     """Levenberg and Marquardt with weights that follow the residuals."""
     model, kept = state.model, list(reduction.kept)
     units, errors = model.poses.measurement.units, len(state.values)

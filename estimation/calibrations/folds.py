@@ -53,7 +53,7 @@ def groups_of(q: Array) -> NDArray[np.int64]:
 
 
 def _runs(scaled: Array) -> NDArray[np.int64]:
-    """Cuts a recording where it has moved by `ALIKE` since the last cut; cells of that size that it visits again join."""
+    """Groups poses of long recordings by cells of the size `ALIKE`."""
     cells = np.floor(scaled / ALIKE).astype(np.int64)
     return np.asarray(np.unique(cells, axis=0, return_inverse=True)[1].ravel(), dtype=np.int64)
 

@@ -57,7 +57,7 @@ def deletion_statistics(fit: GeometryFit) -> tuple[Array, Array, Array]:
     prior = np.diag([1.0 / fit.sizes[fit.parameters[k].kind] if k < len(fit.values) else 0.0 for k in kept])
     stacked = np.vstack([matrix * scale, prior])
     lengths = np.maximum(np.linalg.norm(stacked, axis=0), np.finfo(float).tiny)
-    triangle = np.linalg.qr(stacked / lengths, mode="r")
+    triangle = np.asarray(np.linalg.qr(stacked / lengths, mode="r"))
     own, target = scaled_rows(found, everyone, model, kept)
     basis = np.linalg.solve(triangle.T, (own * scale / lengths).T).T
     number = np.nonzero(np.isfinite(fit.residual))[0]
@@ -74,10 +74,7 @@ def deletion_statistics(fit: GeometryFit) -> tuple[Array, Array, Array]:
         turned = vectors[:, open_].T @ target[rows]
         statistic[pose], freedom[pose] = float(np.sum(turned**2 / values[open_])), int(open_.sum())
         seen = np.isfinite(fit.residual[pose])
-        if fit.used[pose]:
-            deleted = vectors[:, open_] @ (turned / values[open_])
-        else:
-            deleted = target[rows]
+        deleted = vectors[:, open_] @ (turned / values[open_]) if fit.used[pose] else target[rows]
         predicted[pose, seen] = deleted * sigma[seen]
     return statistic, freedom, predicted
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from os import PathLike
 from typing import Any
@@ -39,9 +39,9 @@ MATRIX = tuple(f"r{i}{j}" for i in (1, 2, 3) for j in (1, 2, 3))
 UNIT_LENGTH = 0.05  # a quaternion that is off by more is none
 
 SHOWN = (
-    "x,y,z of a marker or x1,y1,z1,x2,... of several [m]; x,y,z and qx,qy,qz,qw or r11..r33 of a pose; d or d1,d2,... of "
-    "distances [m]; plane or point with the number of what is touched; other1..otherm of a second arm [rad]; u1,v1,... of "
-    "a board [px]; roll,pitch of an inclinometer [rad]"
+    "x,y,z of a marker or x1,y1,z1,x2,... of several [m]; x,y,z and qx,qy,qz,qw or r11..r33 of a pose; d or d1,d2,... "
+    "of distances [m]; plane or point with the number of what is touched; other1..otherm of a second arm [rad]; "
+    "u1,v1,... of a board [px]; roll,pitch of an inclinometer [rad]"
 )
 
 
@@ -72,7 +72,7 @@ class TableOptions:
     board: tuple[int, int, float] | None = None
     intrinsics: tuple[float, float, float, float] | None = None
     camera_on_flange: bool = True
-    known: dict[str, ArrayLike] = field(default_factory=dict)
+    known: Mapping[str, ArrayLike] = field(default_factory=dict)
     temperature: float | None = None
 
     def __post_init__(self) -> None:
@@ -321,7 +321,9 @@ class _Reader:
         names = self._counted(["u", "v"])
         if len(names) != len(kind.columns):
             raise InputError(
-                f"{len(names) // 2} corners", file=self.table.path, allowed=f"{kind.count}, of a board {across:g} x {along:g}"
+                f"{len(names) // 2} corners",
+                file=self.table.path,
+                allowed=f"{kind.count}, of a board {across:g} x {along:g}",
             )
         return kind, self.numbers(kind.columns, empty=True), None
 

@@ -174,12 +174,16 @@ class Calibration:
 
     @property
     def joint_zeros(self) -> dict[str, float]:
-        """What to add to the reading of each joint's encoder, by the joint's name [rad or m]; 0 where none was fitted."""
+        """What to add to the reading of each encoder, by the joint's name [rad or m]; 0 where none was fitted."""
         found = {item.joint: item.value for item in self.parameters if item.kind == "joint_zero"}
         return {name: found.get(i + 1, 0.0) for i, name in enumerate(self.robot.joint_names)}
 
     def shown(self, value: float) -> str:
-        """Writes an error for people."""
+        """Writes an error for people.
+
+        Args:
+            value: in `unit`.
+        """
         unit, factor = SHOWN[self.unit]
         return f"{factor * value:.3g} {unit}"
 
@@ -199,7 +203,9 @@ class Calibration:
         lines.append(f"  what remains, standard deviation per measured number: {noise}")
         if self.repeatability is not None:
             floor = self.repeatability
-            lines.append(f"  repeated poses lie {self.shown(floor.error)} apart ({floor.visits} visits of {floor.poses})")
+            lines.append(
+                f"  repeated poses lie {self.shown(floor.error)} apart ({floor.visits} visits of {floor.poses})"
+            )
         if self.check is not None:
             lines.append(
                 f"  other file: {self.shown(self.check.before)} -> {self.shown(self.check.held_out)}"
@@ -400,5 +406,5 @@ def _plain(levels: ErrorLevels) -> dict[str, Any]:
 
 
 def _levels(data: Mapping[str, Any]) -> ErrorLevels:
-    values = {key: float("nan") if value is None else value for key, value in data.items()}
+    values: dict[str, Any] = {key: float("nan") if value is None else value for key, value in data.items()}
     return ErrorLevels(**{**values, "outside_count": int(values["outside_count"])})

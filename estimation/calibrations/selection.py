@@ -153,9 +153,7 @@ def select_kinds(
         trials.append(best)
 
 
-def held_out_errors(
-    robots: Sequence[Robot], terms: Sequence[ErrorTerm], fit: GeometryFit, *, seed: int = 0
-) -> HeldOut:
+def held_out_errors(robots: Sequence[Robot], terms: Sequence[ErrorTerm], fit: GeometryFit, *, seed: int = 0) -> HeldOut:
     """Predicts each fold by a fit to the others.
 
     Args:

@@ -122,8 +122,8 @@ def _refuse_lost(poses: MeasuredPoses) -> None:
         if run.size:
             raise _error(
                 poses,
-                f"{several(run.size, 'row')} with the measurement of the row before, to the last digit, although the robot "
-                "moved: the marker was lost",
+                f"{several(run.size, 'row')} with the measurement of the row before, to the last digit, although the "
+                "robot moved: the marker was lost",
                 "leave the cells of a lost marker empty, or measure these poses again",
                 column=name,
                 row=int(poses.line[run[0] + 1]),
@@ -276,7 +276,9 @@ def _swapped(i: int, j: int) -> _Reading:
         return replace(given, q=q)
 
     return _Reading(
-        f"the poses fit much better with joints {i + 1} and {j + 1} swapped", f"swap the columns q{i + 1} and q{j + 1}", change
+        f"the poses fit much better with joints {i + 1} and {j + 1} swapped",
+        f"swap the columns q{i + 1} and q{j + 1}",
+        change,
     )
 
 

@@ -50,7 +50,9 @@ class Undetermined:
         if not self.joints:
             return f"{self.name}: more poses, or another measurement, would show it"
         moved = ", ".join(map(str, self.joints))
-        return f"{self.name}: poses with more motion of joint{'s' if len(self.joints) > 1 else ''} {moved} would show it"
+        return (
+            f"{self.name}: poses with more motion of joint{'s' if len(self.joints) > 1 else ''} {moved} would show it"
+        )
 
 
 def undetermined(robots: Sequence[Robot], terms: Sequence[ErrorTerm], fit: GeometryFit) -> tuple[Undetermined, ...]:
@@ -65,7 +67,9 @@ def undetermined(robots: Sequence[Robot], terms: Sequence[ErrorTerm], fit: Geome
     kept = list(fit.reduction.kept)
     place = {k: i for i, k in enumerate(kept)}
     spread = np.sqrt(np.diag(fit.covariance))
-    weak = [k for k in kept if k < len(errors) and spread[place[k]] > LEARNED * fit.sizes[errors[k].kind] * errors[k].scale]
+    weak = [
+        k for k in kept if k < len(errors) and spread[place[k]] > LEARNED * fit.sizes[errors[k].kind] * errors[k].scale
+    ]
     left_out = [k for k in range(len(errors)) if k not in place]
     if not left_out and not weak:
         return ()

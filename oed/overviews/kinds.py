@@ -238,6 +238,17 @@ def _calibration(data: Data) -> Reading:
     )
 
 
+def _pose_design(data: Data) -> Reading:
+    free = data["collision"] is not None and data["collision"]["certified"]
+    return Reading(
+        kind="poses",
+        verdict=f"{len(data['poses'])} poses for a calibration, {data['duration']:.0f} s of motion.",
+        codes=("done",) if free else ("collision.unchecked",),
+        figures={"poses": len(data["poses"]), "O1": data["observability"]["O1"], "duration [s]": data["duration"]},
+        robot=_robot(data),
+    )
+
+
 def _forces(data: Data) -> Reading:
     count = len(data["contacts"])
     return Reading(
@@ -302,6 +313,7 @@ BY_FORMAT: dict[str, Callable[[Data], Reading]] = {
     "robot-oed comparison": _comparison,
     "robot-oed payload": _payload,
     "robot-oed calibration": _calibration,
+    "robot-oed pose design": _pose_design,
     "robot-oed forces": _forces,
     "robot-oed campaign": _campaign,
     "robot-oed pareto front": _pareto,

@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from robots.geometry.chain import Chain, Joint, joint_motion
 from robots.geometry_errors.state import ArmState
@@ -83,7 +83,9 @@ class ArmColumns:
                     if joint == i and fixed == wanted
                 ]
                 shape = (1 if wanted else state.rows, 6, len(rows))
-                twists = np.stack([np.broadcast_to(t, shape[:2]) for _, t in rows], axis=-1) if rows else np.zeros(shape)
+                twists = (
+                    np.stack([np.broadcast_to(t, shape[:2]) for _, t in rows], axis=-1) if rows else np.zeros(shape)
+                )
                 store.append(([k for k, _ in rows], twists))
         self._motions = np.stack(
             [joint_motion(joint.kind, joint.axis, state.q[:, i]) for i, joint in enumerate(robot.chain.joints)], axis=1

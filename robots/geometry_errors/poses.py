@@ -83,7 +83,8 @@ class MeasuredPoses:
             rows: their numbers, from 0, or a mask (N,).
         """
         names = ("q", "observed", "second", "t", "session", "temperature", "velocity", "approach", "torque", "line")
-        return replace(self, **{name: None if (v := getattr(self, name)) is None else v[rows] for name in names})
+        parts: dict[str, Any] = {name: None if (v := getattr(self, name)) is None else v[rows] for name in names}
+        return replace(self, **parts)
 
     def states(self, *robots: Robot, reference: float | None = None) -> tuple[ArmState, ...]:
         """Gives what the errors of each arm depend on.
@@ -92,7 +93,9 @@ class MeasuredPoses:
             robots: one per arm.
             reference: temperature at which the description holds [degC]; the mean of the poses by default.
         """
-        base = None if self.temperature is None else float(self.temperature.mean()) if reference is None else reference
+        warmth = None
+        if self.temperature is not None:
+            warmth = self.temperature - (float(self.temperature.mean()) if reference is None else reference)
         states = []
         for robot, q in zip(robots, (self.q, self.second), strict=False):
             assert q is not None
@@ -106,7 +109,7 @@ class MeasuredPoses:
                 ArmState(
                     q=q,
                     load=load,
-                    temperature=None if self.temperature is None else self.temperature - base,
+                    temperature=warmth,
                     approach=self.approach if first else None,
                     velocity=self.velocity if first else None,
                     session=self.session if first else None,

@@ -71,7 +71,7 @@ def reduce_columns(
     """
     rows, count = matrix.shape
     # A triangle with the same inner products is enough.
-    triangle = np.linalg.qr(matrix, mode="r") if rows > count else np.array(matrix)
+    triangle = np.asarray(np.linalg.qr(matrix, mode="r")) if rows > count else np.array(matrix)
     lengths = np.linalg.norm(triangle, axis=0)
     least = np.maximum(tolerance * lengths, np.finfo(float).eps * rows * lengths.max(initial=0.0))
     least = np.maximum(least, shortest)

@@ -54,8 +54,8 @@ def diagnose_geometry(
 ) -> GeometryDiagnosis:
     """Names causes of errors of the description.
 
-    All causes are linear about the fit. They are added by the Bayesian information criterion (Schwarz 1978), each with an
-    F test; those that later ones make superfluous are taken out again.
+    All causes are linear about the fit. They are added by the Bayesian information criterion (Schwarz 1978), each with
+    an F test; those that later ones make superfluous are taken out again.
 
     Args:
         robots: one per arm; causes are looked for in the first.
@@ -90,9 +90,7 @@ def diagnose_geometry(
 class _Search:
     """Forward selection of groups of columns, in standard deviations."""
 
-    def __init__(
-        self, model: GeometryModel, found: Prediction, weights: Weights, options: Sequence[Candidate]
-    ) -> None:
+    def __init__(self, model: GeometryModel, found: Prediction, weights: Weights, options: Sequence[Candidate]) -> None:
         self.model, self.found, self.weights = model, found, weights
         errors = len(model.errors)
         self.base, self.target = scaled_rows(found, weights, model, range(errors, found.jacobian.shape[2]))
@@ -197,7 +195,10 @@ class _Search:
                 (
                     j
                     for j in scores
-                    if j != k and self.options[j].key != option.key and scores[j][0] > own[0] - RIVAL and scores[j][0] > 0
+                    if j != k
+                    and self.options[j].key != option.key
+                    and scores[j][0] > own[0] - RIVAL
+                    and scores[j][0] > 0
                 ),
                 key=lambda j: -scores[j][0],
             )

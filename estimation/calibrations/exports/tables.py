@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from estimation.calibrations.result import Calibration
 from robots.geometry.dh import Convention
-from robots.geometry.dh_extraction import TableRow, dh_table
+from robots.geometry_errors.dh_extraction import TableRow, dh_table
 
 COLUMNS = ("alpha", "a", "beta", "d", "offset")
 FORMULA = {
@@ -41,7 +41,7 @@ def zeros_text(calibration: Calibration) -> str:
     """
     lines = [
         f"# Joint zeros of {calibration.robot.name}: position = reading + zero [rad; m for joints that slide].",
-        "# A joint without an entry of its own error was not told from the pose of the base or the tool: its zero is 0.",
+        "# The zero is 0 of a joint whose zero no pose tells from the pose of the base or the tool.",
         "joint_zeros:",
     ]
     lines += [f"  {name}: {value:.9g}" for name, value in calibration.joint_zeros.items()]

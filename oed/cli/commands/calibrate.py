@@ -29,7 +29,6 @@ if TYPE_CHECKING:
 
     from estimation.calibrations import TableOptions
     from robots.geometry_errors import MeasuredPoses
-    from robots.robot import Robot
 
 FILES = (
     *("calibration.json", "report.html", "robot.urdf", "robot.xml", "robot.yaml"),
@@ -62,8 +61,8 @@ def calibrate(
         typer.Option(
             "--kinds",
             help="Kinds of errors to fit, comma-separated: joint_zero, link_placement, gear_ratio, eccentricity, "
-            "joint_compliance, link_compliance, thermal_growth, backlash, time_offset, base_motion. Default: those that "
-            "held-out poses support.",
+            "joint_compliance, link_compliance, thermal_growth, backlash, time_offset, base_motion. Default: those "
+            "that held-out poses support.",
             show_default=False,
         ),
     ] = None,
@@ -95,7 +94,7 @@ def calibrate(
         Path | None,
         typer.Option(
             "--model",
-            help="A model.json of the robot: its torque of gravity bends the joints, in place of the description's masses.",
+            help="A model.json of the robot: its torque of gravity bends the joints, not that of the description.",
             show_default=False,
         ),
     ] = None,

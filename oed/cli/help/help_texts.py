@@ -66,6 +66,7 @@ EXAMPLES = {
     "design": (
         "oed design --robot er3a --out experiment",
         "oed design --robot arm.urdf --tip tool0 --criterion d --velocity-fraction 0.7 --out experiment",
+        "oed design --robot er3a --for calibration --poses 30 --out poses",
     ),
     "pareto": ("oed pareto --robot er3a --criteria cond,d --points 5 --out pareto",),
     "retime": (

@@ -210,7 +210,7 @@ class _Allowed:
 
 
 def _bounds(limits: Limits, share: float, kinds: tuple[str, ...]) -> tuple[Array, Array]:
-    """The part of each range that is used; of joints that turn farther, one turn about home, which no winding cuts off."""
+    """The part of each range that is used; of joints that turn farther, one turn about home."""
     lower = np.where(np.isfinite(limits.lower), limits.lower, -np.pi)
     upper = np.where(np.isfinite(limits.upper), limits.upper, np.pi)
     middle, half = (lower + upper) / 2.0, share * (upper - lower) / 2.0
@@ -239,10 +239,8 @@ def _candidates(bounds: tuple[Array, Array], allowed: _Allowed, count: int, seed
     return np.concatenate(found)[:count]
 
 
-def _replaced(
-    q: Array, lost: tuple[int, ...], home: Array, candidates: Array, rows: Array, paths: Paths
-) -> Array:
-    """Puts candidates in the place of poses that no move reaches: the best ones with a free move to a pose that is kept."""
+def _replaced(q: Array, lost: tuple[int, ...], home: Array, candidates: Array, rows: Array, paths: Paths) -> Array:
+    """Puts candidates in the place of poses that no move reaches: with a free move to a pose that is kept."""
     kept = [k for k in range(len(q)) if k not in lost]
     near = [home, *(q[k] for k in kept)]
     picked: list[Array] = []

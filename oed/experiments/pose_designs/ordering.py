@@ -172,7 +172,7 @@ def _branch(tree: list[Array], parent: list[int], leaf: int) -> list[Array]:
 
 
 def ordered(q: Array, home: Array, limits: Limits, paths: Paths) -> Tour:
-    """Finds a short order of moves that are free: the nearest reachable pose next, then two moves at a time turned round.
+    """Finds a short order of moves that are free: the nearest reachable pose next, then parts are turned round.
 
     A pose without a direct move is reached by a detour.
 

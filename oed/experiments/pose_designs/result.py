@@ -46,9 +46,9 @@ class PoseDesign:
         motion: all moves, with a rest at each pose, at the controller's period.
         segments: kind, start [s] and end [s] of each part; those of kind "pose" are the rests.
         parameters: that the poses determine.
-        eigenvalues: of the scaled information, ascending.
-        random_eigenvalues: of as many random poses, to compare with.
-        expected: standard errors of the parameters in SI units.
+        eigenvalues: of the scaled information, ascending (L,).
+        random_eigenvalues: of as many random poses, to compare with (L,).
+        expected: standard errors of the parameters (L,), in SI units.
         prediction: expected error of predicted measurements elsewhere, in `unit`.
         unit: of the measurement.
         left_out: poses of the design that no free move reaches.
@@ -102,7 +102,11 @@ class PoseDesign:
         ]
         for kind in dict.fromkeys(item.kind for item in self.parameters if item.kind != "setup"):
             for shown in dict.fromkeys(item.shown for item in self.parameters if item.kind == kind):
-                own_ = [e for item, e in zip(self.parameters, self.expected, strict=True) if (item.kind, item.shown) == (kind, shown)]
+                own_ = [
+                    e
+                    for item, e in zip(self.parameters, self.expected, strict=True)
+                    if (item.kind, item.shown) == (kind, shown)
+                ]
                 lines.append(f"    {kind.replace('_', ' '):18} {shown[1] * max(own_):.3g} {shown[0]}")
         if self.left_out:
             lines.append(f"  {self.left_out} poses were left out: no free move reaches them")
@@ -186,13 +190,13 @@ class PoseDesign:
         columns |= {name: np.full(len(self.q), np.nan) for name in self.settings["columns"]}
         units = {f"q{i + 1}": self.robot.limits.unit(i) for i in range(self.robot.n)} | {"start": "s", "end": "s"}
         write_table(place / POSES, columns, {"robot": self.robot.stated or self.robot.origin}, units=units, force=force)
-        write_trajectory(
-            place / TRAJECTORY,
-            self.motion,
-            {"robot": self.robot.stated or self.robot.origin, "criterion": self.criterion, "tool_version": VERSION},
-            kinds=self.robot.chain.kinds,
-            force=force,
-        )
+        stated = {
+            "robot": self.robot.stated or self.robot.origin or self.robot.name,
+            "criterion": self.criterion,
+            "collisions": freedom_text(self.freedom),
+            "tool_version": VERSION,
+        }
+        write_trajectory(place / TRAJECTORY, self.motion, stated, kinds=self.robot.chain.kinds, force=force)
 
 
 def load_pose_design(folder: str | Path, robot: Robot | None = None) -> PoseDesign:

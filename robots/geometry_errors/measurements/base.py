@@ -141,8 +141,8 @@ def setup_jacobian(setup: Setup, parts: Mapping[str, Array], rows: int, size: in
 def affine_fit(flange: Array, points: Array) -> tuple[Array, Array, Array]:
     """Fits ``A y + s = p + R m`` to flanges and one measured point of each, without starting values.
 
-    A is the inverse of the tracker's rotation, times the unit of the measurement: its singular values show another unit,
-    its determinant a left-handed frame.
+    A is the inverse of the tracker's rotation, times the unit of the measurement: its singular values show another
+    unit, its determinant a left-handed frame.
 
     Args:
         flange: (N, 4, 4).

@@ -62,7 +62,7 @@ class CameraBoard(Measurement):
     def corners(self) -> Array:
         """Corners on the board (K, 3) [m], row by row."""
         x, y = np.meshgrid(np.arange(self.across), np.arange(self.rows))
-        return self.spacing * np.column_stack([x.ravel(), y.ravel(), np.zeros(self.count)])
+        return self.spacing * np.column_stack([x.ravel(), y.ravel(), np.zeros(self.count)]).astype(float)
 
     @property
     def units(self) -> tuple[str, ...]:

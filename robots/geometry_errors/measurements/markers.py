@@ -76,9 +76,7 @@ class Markers(Measurement):
             parts["tracker"][:, block] = point_by_twist(tracker[:3, :3], base)
             parts[name] = np.zeros((rows, size, 3))
             parts[name][:, block] = turn
-        return Evaluation(
-            residual=residual, by_flange=(by_flange,), by_setup=setup_jacobian(setup, parts, rows, size)
-        )
+        return Evaluation(residual=residual, by_flange=(by_flange,), by_setup=setup_jacobian(setup, parts, rows, size))
 
     def simulate(self, flanges: Sequence[Array], setup: Setup, noise: Mapping[str, float], seed: int) -> Array:
         """Gives positions (N, 3 count) [m]."""

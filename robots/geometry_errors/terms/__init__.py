@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from robots.common.errors import InputError
 from robots.geometry_errors.terms.backlash import Backlash
-from robots.geometry_errors.terms.base_motion import BaseMotion
 from robots.geometry_errors.terms.base import Column, ErrorParameter, ErrorTerm
+from robots.geometry_errors.terms.base_motion import BaseMotion
 from robots.geometry_errors.terms.eccentricity import Eccentricity
 from robots.geometry_errors.terms.gear_ratio import GearRatio
 from robots.geometry_errors.terms.joint_compliance import JointCompliance

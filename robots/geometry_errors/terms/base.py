@@ -51,13 +51,14 @@ class Column:
 
 
 class ErrorTerm(ABC):
-    """A kind of geometric errors: the frame of joint i moves by ``exp(sum of parameter * twist)`` before the joint turns.
+    """A kind of geometric errors: the frame of joint i moves by ``exp(sum of value * twist)`` before the joint turns.
 
     Attributes:
         kind: its name in files.
         title: its name for people.
         constant: whether the twists are the same at all poses, so that a URDF can state it.
-        of_link: whether it moves the frame before all other kinds do, which then act in the axes of the moved frame.        includes: kinds that this one contains, and that are fitted with it.
+        of_link: whether it moves the frame before all other kinds do, which then act in the axes of the moved frame.
+        includes: kinds that this one contains, and that are fitted with it.
     """
 
     kind: ClassVar[str]

@@ -18,14 +18,18 @@ class Eccentricity(ErrorTerm):
     def parameters(self, robot: Robot, state: ArmState) -> tuple[ErrorParameter, ...]:
         """Lists ``sine_i`` and ``cosine_i`` of each joint i that turns."""
         return tuple(
-            parameter(f"{part}_{i + 1}", self.kind, i, "rad", 1e-3) for i in _turning(robot) for part in ("sine", "cosine")
+            parameter(f"{part}_{i + 1}", self.kind, i, "rad", 1e-3)
+            for i in _turning(robot)
+            for part in ("sine", "cosine")
         )
 
     def columns(self, robot: Robot, state: ArmState) -> tuple[Column, ...]:
         """Gives twists along the axes, once per turn."""
         turning = _turning(robot)
         both = np.stack([np.sin(state.q[:, turning]), np.cos(state.q[:, turning])], axis=-1)
-        return one_each(robot, self.parameters(robot, state), both.reshape(state.rows, -1), np.repeat(turning, 2).tolist())
+        return one_each(
+            robot, self.parameters(robot, state), both.reshape(state.rows, -1), np.repeat(turning, 2).tolist()
+        )
 
 
 def _turning(robot: Robot) -> list[int]:

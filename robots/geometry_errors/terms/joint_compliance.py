@@ -23,9 +23,7 @@ class JointCompliance(ErrorTerm):
     def parameters(self, robot: Robot, state: ArmState) -> tuple[ErrorParameter, ...]:
         """Lists ``joint_compliance_1`` to ``joint_compliance_n``."""
         return tuple(
-            parameter(
-                f"joint_compliance_{i + 1}", self.kind, i, "m/N" if kind == "prismatic" else "rad/(N m)", 1e-4
-            )
+            parameter(f"joint_compliance_{i + 1}", self.kind, i, "m/N" if kind == "prismatic" else "rad/(N m)", 1e-4)
             for i, kind in enumerate(robot.chain.kinds)
         )
 

@@ -37,5 +37,6 @@ class LinkPlacement(ErrorTerm):
         """Gives constant unit twists."""
         units = np.eye(6)[:, None, :]
         return tuple(
-            Column(parameter=item, twists=((k // 6, units[k % 6]),)) for k, item in enumerate(self.parameters(robot, state))
+            Column(parameter=item, twists=((k // 6, units[k % 6]),))
+            for k, item in enumerate(self.parameters(robot, state))
         )

@@ -10,7 +10,7 @@ from robots.robot import Robot
 
 
 class ThermalGrowth(ErrorTerm):
-    """The shift from one joint to the next grows by ``expansion * (temperature - reference)``: a parameter per link [1/K].
+    """The shift from one joint to the next grows by ``expansion * (temperature - reference)``: one per link [1/K].
 
     A link of steel has 12e-6/K, one of aluminium 23e-6/K. Links without length have no parameter.
     """

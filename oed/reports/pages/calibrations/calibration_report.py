@@ -53,8 +53,8 @@ def calibration_page(calibration: Calibration) -> Page:
             Section(
                 title="Errors",
                 paragraphs=(
-                    "Each pose was predicted by a fit to others that are not alike. Outside the range of those the error "
-                    "is larger.",
+                    "Each pose was predicted by a fit to others that are not alike. Outside the range of those the "
+                    "error is larger.",
                 ),
                 pictures=(_pose_picture(calibration), _joint_picture(calibration)),
                 tables=(_level_table(calibration),),
@@ -123,7 +123,11 @@ def _joint_picture(calibration: Calibration) -> Picture:
                 series=(
                     Series(x=poses.q[:, j], y=factor * poses.before, name="description", kind="markers", role="second"),
                     Series(
-                        x=poses.q[:, j], y=factor * poses.held_out, name="calibrated, held out", kind="markers", role="main"
+                        x=poses.q[:, j],
+                        y=factor * poses.held_out,
+                        name="calibrated, held out",
+                        kind="markers",
+                        role="main",
                     ),
                 ),
             )
@@ -219,7 +223,7 @@ def visiting(robot: Robot, q: Array) -> Motion:
         if k + 1 < len(q):
             rows.append(pose + smooth[:, None] * (q[k + 1] - pose))
     path = np.vstack(rows)
-    t = STEP * np.arange(len(path))
+    t = np.asarray(STEP * np.arange(len(path)), dtype=float)
     speed = np.gradient(path, STEP, axis=0)
     return Motion(t=t, q=path, dq=speed, ddq=np.gradient(speed, STEP, axis=0))
 

@@ -19,8 +19,10 @@ UP = np.array([0.0, 0.0, 1.0])
 
 @dataclass(frozen=True, kw_only=True)
 class TableRow:
-    """One row: ``Rx(alpha) Tx(a) Ry(beta) Rz(q + offset) Tz(d)`` modified, ``Rz(q + offset) Tz(d) Tx(a) Rx(alpha) Ry(beta)``
-    standard (Hayati and Mirmirani 1985). Beta is zero where the axes are not nearly parallel.
+    """One row.
+
+    Modified: ``Rx(alpha) Tx(a) Ry(beta) Rz(q + offset) Tz(d)``. Standard: ``Rz(q + offset) Tz(d) Tx(a) Rx(alpha)
+    Ry(beta)``. Beta is zero where the axes are not nearly parallel (Hayati and Mirmirani 1985).
 
     Attributes:
         name: of the joint.
