@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from estimation.calibrations.fit import GeometryFit, fit_geometry, scaled_rows
-from estimation.uncertainty.quantiles import chi2_limit
+from estimation.uncertainty.quantiles import chi2_limit, normal_limit, robust_deviation
 from robots.geometry_errors.model import Prediction
 
 Array = NDArray[np.float64]
@@ -79,6 +79,19 @@ def deletion_statistics(fit: GeometryFit) -> tuple[Array, Array, Array]:
     return statistic, freedom, predicted
 
 
+def _excess(statistic: Array, freedom: Array, used: NDArray[np.bool_]) -> Array:
+    """How far each pose is beyond what chance allows (N,): above one it is an outlier.
+
+    It has to be far by chi-square, and far beside the other poses: what a model misses is not independent within a
+    pose, so that all poses are spread more widely. The cube root is nearly normal (Wilson and Hilferty 1931).
+    """
+    limits = np.array([chi2_limit(ALPHA, max(int(f), 1), len(used)) for f in freedom])
+    root = np.cbrt(statistic / np.maximum(freedom, 1.0))
+    middle = float(np.median(root[used]))
+    spread = max(float(robust_deviation(root[used] - middle)), np.finfo(float).tiny)
+    return np.minimum(statistic / limits, (root - middle) / spread / normal_limit(2.0 * ALPHA, len(used)))
+
+
 def without_outliers(start: GeometryFit) -> tuple[GeometryFit, tuple[OutlierPose, ...]]:
     """Leaves poses out one by one, the farthest first, and fits the others by least squares.
 
@@ -96,8 +109,7 @@ def without_outliers(start: GeometryFit) -> tuple[GeometryFit, tuple[OutlierPose
     fit = replace(fit, weights=replace(fit.weights, sigma=start.weights.sigma))
     for _ in range(int(MOST * len(poses))):
         statistic, freedom, _ = deletion_statistics(fit)
-        limits = np.array([chi2_limit(ALPHA, max(int(f), 1), len(poses)) for f in freedom])
-        ratio = np.where(used, statistic / limits, 0.0)
+        ratio = np.where(used, _excess(statistic, freedom, used), 0.0)
         worst = int(np.argmax(ratio))
         if ratio[worst] <= 1.0:
             break
