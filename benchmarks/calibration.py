@@ -90,9 +90,12 @@ def arms(draws: int, name: str, select: bool) -> None:
         errors_.append(float(np.sqrt(np.mean(residual**2))))
         ratios.append(errors_[-1] / NOISE)
         if (draw + 1) % 10 == 0:
-            print(f"{name}: {draw + 1} draws, held out {1e3 * np.median(errors_):.4f} mm per number "
-                  f"({np.median(ratios):.3f} of the noise, worst {np.max(ratios):.3f}); 95 % intervals hold "
-                  f"{100 * hits / total:.1f} % of {total}; determined but not by exact poses: {wrong}", flush=True)
+            print(
+                f"{name}: {draw + 1} draws, held out {1e3 * np.median(errors_):.4f} mm per number "
+                f"({np.median(ratios):.3f} of the noise, worst {np.max(ratios):.3f}); 95 % intervals hold "
+                f"{100 * hits / total:.1f} % of {total}; determined but not by exact poses: {wrong}",
+                flush=True,
+            )
 
 
 def fit_setup(robot, terms, poses, found, fitted):
@@ -102,7 +105,8 @@ def fit_setup(robot, terms, poses, found, fitted):
     from robots.geometry_errors.measurements.setup import Unknown
 
     return {
-        name: Unknown(kind=part.kind, value=np.array(found.setup[name]), known=part.known) for name, part in start.items()
+        name: Unknown(kind=part.kind, value=np.array(found.setup[name]), known=part.known)
+        for name, part in start.items()
     }
 
 
@@ -165,17 +169,18 @@ def rank(urdfs: list[str]) -> None:
         robot = load_robot(path, tip=tip, joints=joints, unlimited=True) if joints else _load(path)
         q = random_positions(robot, 40, seed=3)
         other, columns = pinocchio_rank(path, robot, q[:, :])
-        poses = MeasuredPoses(
-            q=q, measurement=BodyPoses(), observed=np.tile([0, 0, 0, 0, 0, 0, 1.0], (len(q), 1))
-        )
+        poses = MeasuredPoses(q=q, measurement=BodyPoses(), observed=np.tile([0, 0, 0, 0, 0, 0, 1.0], (len(q), 1)))
         model = GeometryModel([robot], [error_term("joint_zero"), error_term("link_placement")], poses)
         setup = BodyPoses().example
         parameters = model.parameters(setup)
         scale = np.array([item.scale for item in parameters])
         matrix = (model.evaluate(np.zeros(len(model.errors)), setup).jacobian * scale).reshape(-1, len(scale))
         ours = reduce_columns(matrix, preference(parameters)).rank
-        print(f"{name}: {robot.n} joints, rank {ours}, pinocchio {other} of {columns}: "
-              f"{'equal' if ours == other else 'DIFFERENT'}", flush=True)
+        print(
+            f"{name}: {robot.n} joints, rank {ours}, pinocchio {other} of {columns}: "
+            f"{'equal' if ours == other else 'DIFFERENT'}",
+            flush=True,
+        )
 
 
 def _load(path: Path):
@@ -247,10 +252,15 @@ def causes(cases: int, without: int) -> None:
         extra = len(told) - (1 if right else 0)
         named += right
         false += extra
-        print(f"{number:3} {robot.name:6} {kind:13} {joint} -> {told}{'' if right or kind == 'none' else '  MISSED'}"
-              f"{'' if not extra else '  FALSE'}", flush=True)
-    print(f"named {named} of {cases} ({100 * named / max(cases, 1):.0f} %); named but not there: {false} in "
-          f"{cases + without} cases")
+        print(
+            f"{number:3} {robot.name:6} {kind:13} {joint} -> {told}{'' if right or kind == 'none' else '  MISSED'}"
+            f"{'' if not extra else '  FALSE'}",
+            flush=True,
+        )
+    print(
+        f"named {named} of {cases} ({100 * named / max(cases, 1):.0f} %); named but not there: {false} in "
+        f"{cases + without} cases"
+    )
 
 
 def designs(names: list[str], sets: int) -> None:
@@ -287,14 +297,21 @@ def designs(names: list[str], sets: int) -> None:
         for _ in range(50):
             own = rows[rng.permutation(len(rows))[:60]]
             total = np.einsum("nrl,nrk->lk", own, own)
-            sixty.append((information.prediction_error(total, elsewhere), float(np.exp(np.mean(np.log(
-                information.spread(total)))))))
+            sixty.append(
+                (
+                    information.prediction_error(total, elsewhere),
+                    float(np.exp(np.mean(np.log(information.spread(total))))),
+                )
+            )
         spread = float(np.exp(np.mean(np.log(design.expected))))
         prediction, error = np.median(sixty, axis=0)
-        print(f"{name}: O1 of 20 designed {design.observability['O1']:.4g}, best of {sets} random sets {best:.4g}, "
-              f"exchange alone {exchange:.4g}; prediction error 20 designed {1e3 * design.prediction:.4f} mm, 60 random "
-              f"{1e3 * prediction:.4f} mm; geometric mean of standard errors, designed over 60 random "
-              f"{spread / error:.3f}; {took:.1f} s, success {design.success}", flush=True)
+        print(
+            f"{name}: O1 of 20 designed {design.observability['O1']:.4g}, best of {sets} random sets {best:.4g}, "
+            f"exchange alone {exchange:.4g}; prediction error 20 designed {1e3 * design.prediction:.4f} mm, 60 random "
+            f"{1e3 * prediction:.4f} mm; geometric mean of standard errors, designed over 60 random "
+            f"{spread / error:.3f}; {took:.1f} s, success {design.success}",
+            flush=True,
+        )
 
 
 def speed() -> None:
@@ -307,8 +324,10 @@ def speed() -> None:
     started = time.time()
     model = GeometryModel([robot], [term for term in TERMS if term.kind not in ("base_motion",)], poses)
     fit = fit_geometry(model)
-    print(f"fit of {len(fit.parameters)} parameters, {fit.reduction.rank} independent, to 2,000 poses: "
-          f"{time.time() - started:.1f} s; sigma {1e3 * fit.weights.sigma['m']:.4f} mm")
+    print(
+        f"fit of {len(fit.parameters)} parameters, {fit.reduction.rank} independent, to 2,000 poses: "
+        f"{time.time() - started:.1f} s; sigma {1e3 * fit.weights.sigma['m']:.4f} mm"
+    )
     started = time.time()
     found = calibrate(robot, poses)
     print(f"calibrate with choice of kinds, held-out poses and diagnosis: {time.time() - started:.1f} s")
@@ -345,10 +364,13 @@ def tiago(folder: Path, urdf: Path) -> None:
             fitted = 1e3 * np.linalg.norm(inner.residual(values, setup)[:, :3], axis=1)[found.poses.used]
             rms = lambda e: float(np.sqrt(np.mean(e**2)))  # noqa: E731
             label = "chosen by held-out poses" if kinds is None else "+".join(kinds) or "registration"
-            print(f"{count} marker(s), {label} ({', '.join(found.kinds)}), {len(found.errors)} errors: training "
-                  f"{rms(fitted):.2f} mm, other session {rms(error):.2f} mm; repeated {rms(error[near]):.2f}, new inside "
-                  f"{rms(error[~near & ~outside]):.2f}, outside {rms(error[outside & ~near]):.2f}; outliers "
-                  f"{len(found.outliers)}", flush=True)
+            print(
+                f"{count} marker(s), {label} ({', '.join(found.kinds)}), {len(found.errors)} errors: training "
+                f"{rms(fitted):.2f} mm, other session {rms(error):.2f} mm; repeated {rms(error[near]):.2f}, new inside "
+                f"{rms(error[~near & ~outside]):.2f}, outside {rms(error[outside & ~near]):.2f}; outliers "
+                f"{len(found.outliers)}",
+                flush=True,
+            )
 
 
 def main() -> None:

@@ -12,6 +12,7 @@ Array = NDArray[np.float64]
 LARGEST, SMALLEST = 30.0, 1e-3
 """Bounds of the size of a kind, in the usual sizes of its parameters: 150 mrad and 5 urad of joint zeros."""
 
+QUIETEST = 1e-6  # variance of rows in standard deviations of the noise; less is rounding of exact poses
 ROUNDS = 40
 CONVERGED = 0.01
 
@@ -92,7 +93,7 @@ def estimate_sizes(
                 sizes[k] = np.clip(size, SMALLEST, LARGEST)
         left = normal.square - 2.0 * x @ normal.right + x @ normal.gram @ x
         noise = max(float(left), 0.0) / max(normal.rows - float(np.sum(determined)), 1.0)
-        noise = max(noise, np.finfo(float).tiny)
+        noise = max(noise, QUIETEST)
         change = np.max(np.abs(np.log(sizes / before[0])), initial=abs(np.log(noise / before[1])))
         if change < CONVERGED:
             break

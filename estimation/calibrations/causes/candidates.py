@@ -73,10 +73,10 @@ def candidates(model: GeometryModel, found: Prediction) -> Iterator[Candidate]:
     groups: dict[tuple[str, int | None], list[int]] = {}
     for k, item in enumerate(errors):
         if item.kind in CAUSES:
-            groups.setdefault((CAUSES[item.kind], item.joint), []).append(k)
-    for (cause, joint), numbers in groups.items():
+            groups.setdefault((item.kind, item.joint), []).append(k)
+    for (kind, joint), numbers in groups.items():
         yield Candidate(
-            cause=cause,
+            cause=CAUSES[kind],
             joint=joint,
             parameters=tuple(errors[k].name for k in numbers),
             units=tuple(errors[k].unit for k in numbers),

@@ -145,7 +145,7 @@ EXAMPLES = {
         "oed benchmark answer blind --by residual-fit",
         "oed benchmark score blind blind.residual-fit others/answers.json --markdown table.md",
     ),
-    "example": ("oed example --out example",),
+    "example": ("oed example --out example", "oed example --for calibration --out calibration"),
     "robots": ("oed robots",),
     "robot": ("oed robot show ur10", "oed robot show arm.urdf --tip tool0 --json"),
     "effects": ("oed effects", "oed effects --json"),
