@@ -208,23 +208,26 @@ def _search(state: _State, reduction: Reduction, sizes: Mapping[str, float], use
         inverse, value = _prior(now, kept, sizes)
         matrix = np.vstack([matrix * scale[kept], np.diag(inverse)])
         target = np.concatenate([target, -inverse * value])
-        lengths, cost = np.linalg.norm(matrix, axis=0), float(target @ target)
+        lengths, cost, rows = np.linalg.norm(matrix, axis=0), float(target @ target), len(target)
+        # A triangle has the same normal equations, and few rows.
+        both = np.asarray(np.linalg.qr(np.column_stack([matrix, target]), mode="r"))
+        triangle, aim = both[:, :-1], both[:, -1]
         moved = False
         while damping < DAMPED:
-            system = np.vstack([matrix, np.sqrt(damping) * np.diag(lengths)])
-            step = np.linalg.lstsq(system, np.concatenate([target, np.zeros(len(kept))]), rcond=None)[0]
+            system = np.vstack([triangle, np.sqrt(damping) * np.diag(lengths)])
+            step = np.linalg.lstsq(system, np.concatenate([aim, np.zeros(len(kept))]), rcond=None)[0]
             whole = np.zeros(len(scale))
             whole[kept] = step * scale[kept]
             tried = values + whole[:errors], moved_setup(setup, whole[errors:])
             new = model.evaluate(*tried)
             _, remaining = scaled_rows(replace(new, jacobian=new.jacobian[:, :, :0]), weights, model)
             left = float(remaining @ remaining) + float(np.sum((inverse * (value + step)) ** 2))
-            if len(remaining) + len(kept) == len(target) and left <= cost:
+            if len(remaining) + len(kept) == rows and left <= cost:
                 values, setup, found = *tried, new
                 damping, moved = max(damping * GAIN, 1e-12), True
                 break
             damping *= LOSS
-        if not moved or float(np.max(np.abs(step) * lengths, initial=0.0)) < SMALL_STEP * np.sqrt(max(len(target), 1)):
+        if not moved or float(np.max(np.abs(step) * lengths, initial=0.0)) < SMALL_STEP * np.sqrt(max(rows, 1)):
             break
         damping = min(damping, 1.0)
     return _State(model, values, setup, found, weights)

@@ -29,6 +29,7 @@ MOST = 30  # causes that are named
 NEW = 1e-6  # share of a column that the causes before do not explain already
 RIVAL = 6.0  # of the evidence (log of the odds), within which another cause may be meant
 PERMUTATIONS = 999
+LARGEST = 500  # poses that are compared with each other
 SINGLE = 0.1  # share of outliers, above which they are no single faults and count
 
 
@@ -226,31 +227,39 @@ class _Search:
         return best
 
     def structure(self, chosen: Sequence[int]) -> float:
-        """Probability that residuals of like poses are as alike by chance as they are (permutations of the poses)."""
+        """Probability that residuals of like poses are as alike by chance as they are (permutations of the poses).
+
+        Poses are alike in their joint positions, or in the place of the flange: the lower probability counts twice.
+        """
         basis = self._basis(chosen)
         left = self.target - basis @ (basis.T @ self.target)
         whole = np.zeros(self.found.residual.shape)
         factor = self.weights.rows(self.model.poses.measurement.units)
         whole[np.isfinite(self.found.residual) & (factor > 0.0)] = left
-        used = self.weights.pose > 0.0
-        whole, q = whole[used], self.model.poses.q[used]
+        rows = np.flatnonzero(self.weights.pose > 0.0)
+        if len(rows) > LARGEST:
+            rows = rows[np.linspace(0, len(rows) - 1, LARGEST).astype(int)]
+        whole, q = whole[rows], self.model.poses.q[rows]
         span = np.ptp(q, axis=0)
-        scaled = q / np.where(span > 0.0, span, 1.0)
-        if len(q) > 500:
-            keep = np.linspace(0, len(q) - 1, 500).astype(int)
-            whole, scaled = whole[keep], scaled[keep]
-        distance = np.linalg.norm(scaled[:, None] - scaled[None], axis=2)
-        np.fill_diagonal(distance, np.inf)
-        near = np.argsort(distance, axis=1)[:, :3]
-        alike = whole @ whole.T
+        places = self.model.robots[0].chain.flange(q)[:, :3, 3]
+        found = [_likeness(whole, where) for where in (q / np.where(span > 0.0, span, 1.0), places)]
+        return min(1.0, 2.0 * min(found))
 
-        def statistic(order: NDArray[np.int64]) -> float:
-            return float(alike[order[:, None], order[near]].sum())
 
-        rng = np.random.default_rng(0)
-        own = statistic(np.arange(len(q)))
-        above = sum(statistic(rng.permutation(len(q))) >= own for _ in range(PERMUTATIONS))
-        return (above + 1) / (PERMUTATIONS + 1) if above else _normal_tail(own, statistic, len(q), rng)
+def _likeness(residual: Array, where: Array) -> float:
+    """Probability that residuals of the three nearest neighbours are as alike as they are, by permutations."""
+    distance = np.linalg.norm(where[:, None] - where[None], axis=2)
+    np.fill_diagonal(distance, np.inf)
+    near = np.argsort(distance, axis=1)[:, :3]
+    alike = residual @ residual.T
+
+    def statistic(order: NDArray[np.int64]) -> float:
+        return float(alike[order[:, None], order[near]].sum())
+
+    rng = np.random.default_rng(0)
+    own = statistic(np.arange(len(where)))
+    above = sum(statistic(rng.permutation(len(where))) >= own for _ in range(PERMUTATIONS))
+    return (above + 1) / (PERMUTATIONS + 1) if above else _normal_tail(own, statistic, len(where), rng)
 
 
 def _normal_tail(own: float, statistic: Any, rows: int, rng: np.random.Generator) -> float:

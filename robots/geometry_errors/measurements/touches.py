@@ -70,7 +70,7 @@ class Planes(Measurement):
         for k in range(1, self.count + 1):
             mine = (own == k - 1)[:, None, None]
             parts[f"normal_{k}"] = mine * (tip @ tangents(normals[k - 1]))[:, None, :]
-            parts[f"height_{k}"] = -mine * np.ones((rows, 1, 1))
+            parts[f"height_{k}"] = -1.0 * mine * np.ones((rows, 1, 1))
         return Evaluation(
             residual=residual[:, None], by_flange=(by_flange,), by_setup=setup_jacobian(setup, parts, rows, 1)
         )
@@ -123,5 +123,5 @@ class Points(Measurement):
         residual = np.where(np.isfinite(observed), points[own] - tip, np.nan)
         parts: dict[str, Array] = {"tool": by_twist[..., :3]}
         for k in range(self.count):
-            parts[f"point_{k + 1}"] = -(own == k)[:, None, None] * np.eye(3)
+            parts[f"point_{k + 1}"] = -1.0 * (own == k)[:, None, None] * np.eye(3)
         return Evaluation(residual=residual, by_flange=(by_twist,), by_setup=setup_jacobian(setup, parts, rows, 3))
