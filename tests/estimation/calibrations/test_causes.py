@@ -45,6 +45,6 @@ def test_smooth_errors_of_no_known_cause_are_unexplained(robots):
     from dataclasses import replace
 
     places = poses.observed.reshape(len(poses.q), 3, 3)
-    bent = places + 4e-4 * np.sin(7.0 * places[..., [1, 2, 0]])
+    bent = places + 1e-3 * np.sin(6.0 * places[..., [1, 2, 0]])
     found = calibrate(robot, replace(poses, observed=bent.reshape(len(poses.q), -1))).causes["findings"]
     assert "unexplained" in {item["cause"] for item in found}

@@ -158,7 +158,8 @@ def test_both_arms_that_hold_a_part_agree():
         Joint(f"g{k}", kind, np.eye(3), np.zeros(3), axis)
         for k, (kind, axis) in enumerate(zip(kinds, axes, strict=True))
     )
-    wide = Limits(lower=np.full(6, -9.0), upper=np.full(6, 9.0), **{k: np.ones(6) for k in ("velocity", "torque")})
+    ones = {name: np.ones(6) for name in ("velocity", "acceleration", "jerk", "torque")}
+    wide = Limits(lower=np.full(6, -9.0), upper=np.full(6, 9.0), **ones)
     first, second = Robot(name="gantry", chain=Chain(joints), limits=wide), load_robot("er3a")
     base, part = np.eye(4), np.eye(4)
     base[:3, :3], base[:3, 3] = Rotation.from_rotvec([0.3, -0.5, 1.0]).as_matrix(), (1.0, 0.2, 0.1)

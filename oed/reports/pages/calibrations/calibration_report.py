@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -15,7 +17,10 @@ from oed.reports.rendering.picture import Panel, Picture, Series
 from oed.reports.rendering.provenance import footer
 from oed.reports.rendering.saving import save_page
 from robots.common.files import ResultFolder
+from robots.geometry_errors.poses import approaches
+from robots.geometry_errors.state import ArmState, gravity_loads
 from robots.geometry_errors.terms import error_term
+from robots.geometry_errors.terms.joint_compliance import axis_loads
 from robots.robot import Robot
 from robots.signals import Motion
 
@@ -67,6 +72,12 @@ def calibration_page(calibration: Calibration) -> Page:
                 ),
                 animation=_animation(calibration),
                 tables=(_worst_table(calibration),),
+            ),
+            Section(
+                title="Causes",
+                paragraphs=_cause_paragraphs(calibration),
+                pictures=tuple(_load_picture(calibration)),
+                tables=(_evidence_table(calibration),),
             ),
             Section(title="What was fitted", tables=(_trial_table(calibration), _parameter_table(calibration))),
             Section(title="What the poses leave open", tables=(_open_table(calibration),), folded=True),
@@ -133,6 +144,58 @@ def _joint_picture(calibration: Calibration) -> Picture:
             )
         )
     return Picture(name="joints", title="Error over the position of each joint", panels=tuple(panels), columns=2)
+
+
+def _cause_paragraphs(calibration: Calibration) -> tuple[str, ...]:
+    found = calibration.causes.get("findings", ())
+    if not found:
+        return ("No single cause is significant.",)
+    return (
+        "Causes of what the description gets wrong, those with the largest share of the squared error first. The table "
+        "has the p-value of each by itself.",
+    )
+
+
+def _load_picture(calibration: Calibration) -> Iterator[Picture]:
+    """The error over what bends the arm, and over the direction in which each joint came to the pose."""
+    unit, factor = SHOWN[calibration.unit]
+    poses, robot = calibration.poses, calibration.robot
+    drivers = []
+    if robot.has_masses:
+        torque = axis_loads(robot, ArmState(q=poses.q, load=gravity_loads(robot, poses.q)))
+        drivers.append(("loads", "Error over the torque of gravity", "torque of gravity [N m or N]", torque))
+    drivers.append(("approaches", "Error over the direction of approach", "direction", approaches(poses.q)))
+    for name, title, label, values in drivers:
+        panels = [
+            Panel(
+                title=joint,
+                x_label=label,
+                y_label=f"error [{unit}]",
+                series=(
+                    Series(x=values[:, j], y=factor * poses.before, name="description", kind="markers", role="second"),
+                    Series(
+                        x=values[:, j],
+                        y=factor * poses.held_out,
+                        name="calibrated, held out",
+                        kind="markers",
+                        role="main",
+                    ),
+                ),
+            )
+            for j, joint in enumerate(joint_titles(robot.joint_names, robot.n))
+        ]
+        yield Picture(name=name, title=title, panels=tuple(panels), columns=2)
+
+
+def _evidence_table(calibration: Calibration) -> Table:
+    evidence = calibration.causes.get("evidence", {})
+    ranked = sorted(evidence.items(), key=lambda pair: pair[1])
+    rows: list[tuple[Cell, ...]] = [(label, "below 0.001" if p < 0.001 else f"{p:.2g}") for label, p in ranked]
+    return Table(
+        headings=("cause", "p-value by itself"),
+        rows=tuple(rows),
+        caption="Each alone beside the setup, corrected for the number of causes.",
+    )
 
 
 def _level_table(calibration: Calibration) -> Table:
