@@ -17,11 +17,11 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
 
-from benchmarks.calibration_parts import oracle  # noqa: E402
-from estimation.calibrations import CalibrationOptions, calibrate  # noqa: E402
-from estimation.calibrations.fit import fit_geometry, preference  # noqa: E402
-from robots import load_robot  # noqa: E402
-from robots.geometry_errors import (  # noqa: E402
+from benchmarks.calibration_parts import oracle
+from estimation.calibrations import CalibrationOptions, calibrate
+from estimation.calibrations.fit import fit_geometry, preference
+from robots import load_robot
+from robots.geometry_errors import (
     TERMS,
     BodyPoses,
     GeometryModel,
@@ -31,7 +31,7 @@ from robots.geometry_errors import (  # noqa: E402
     random_positions,
     reduce_columns,
 )
-from robots.geometry_errors.poses import approaches  # noqa: E402
+from robots.geometry_errors.poses import approaches
 
 NOISE = 5e-5  # m
 KINDS = ("joint_zero", "link_placement", "eccentricity", "joint_compliance")

@@ -67,7 +67,8 @@ print(calibration.summary())
 # %% [markdown]
 # ## Errors before and after
 #
-# The intervals hold the truth with 95 %. Zeros of the first and last joint cannot be told from the tracker and the tool.
+# The intervals hold the truth with 95 %. Zeros of the first and last joint cannot be distinguished from the tracker
+# and the tool.
 
 # %%
 found = {item.name: item for item in calibration.errors}

@@ -1,7 +1,7 @@
 """A virtual arm with geometric errors in plain numpy and scipy: it shares no code with the calibration.
 
-It takes the numbers of a description (placements, axes, masses) and computes the rest by itself: matrices are multiplied
-joint by joint, turns are scipy's, and the torque of gravity is the derivative of the potential energy by differences.
+It takes the numbers of a description (placements, axes, masses) and computes the rest by itself: matrices are
+multiplied joint by joint, turns are scipy's, and the torque of gravity is the derivative of the potential energy.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ SCARA = """<?xml version="1.0"?>
 
 @dataclass
 class Arm:
-    """Numbers of a description: what joint i stands on, its axis, and whether it slides; mass and centre of each link."""
+    """Numbers of a description: placement and axis of each joint, whether it slides, mass and centre of each link."""
 
     placements: np.ndarray
     axes: np.ndarray

@@ -71,7 +71,7 @@ def calibrate(
     """Fits joint zeros, links and other geometric errors of a robot to measured poses.
 
     The poses of instrument and tool are estimated, too. Kinds of errors are added while they predict held-out poses
-    better; errors that no pose tells apart are left out, and named. Poses that do not fit are left out, and named
+    better; errors that no pose distinguishes are left out, and named. Poses that do not fit are left out, and named
     (Hollerbach, Khalil and Gautier, Springer Handbook of Robotics 2016, chapter 6).
 
     Args:

@@ -1,4 +1,4 @@
-"""What poses do not determine: errors that no pose tells apart, and errors that other poses would show."""
+"""What poses do not determine: errors that no pose distinguishes, and errors that other poses would show."""
 
 from __future__ import annotations
 
@@ -31,8 +31,8 @@ class Undetermined:
     Attributes:
         name: of the parameter.
         joint: that it belongs to, from 1.
-        reason: "redundant": no pose tells it from others. "poses": other poses would show it.
-        partners: names of the parameters that it cannot be told from; the estimates contain it.
+        reason: "redundant": no pose distinguishes it from others. "poses": other poses would show it.
+        partners: names of the parameters that it cannot be distinguished from; the estimates contain it.
         joints: joints whose motion would show it, from 1.
     """
 
@@ -46,7 +46,7 @@ class Undetermined:
         """Says it in words."""
         if self.reason == "redundant":
             where = f" from {', '.join(self.partners)}" if self.partners else ": it moves nothing that was measured"
-            return f"{self.name}: no pose tells it{where}"
+            return f"{self.name}: no pose distinguishes it{where}"
         if not self.joints:
             return f"{self.name}: more poses, or another measurement, would show it"
         moved = ", ".join(map(str, self.joints))

@@ -1,4 +1,4 @@
-"""Minimal sets: which parameters the Jacobian of some poses tells apart, and what the others hide behind."""
+"""Minimal sets: which parameters the Jacobian of some poses distinguishes, and what the others hide behind."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ class Reduction:
         return len(self.kept)
 
     def partners(self, column: int, share: float = 0.05) -> tuple[int, ...]:
-        """Names the kept columns that a dropped one cannot be told from.
+        """Names the kept columns that a dropped one cannot be distinguished from.
 
         Args:
             column: number of a dropped column.

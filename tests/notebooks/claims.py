@@ -121,6 +121,7 @@ CLAIMS: dict[str, Callable[[Names], None]] = {
         first_tour,
         real_robot,
         hidden_effect,
+        calibration,
         payload,
         thermal_friction,
         mujoco_corrected,

@@ -52,7 +52,7 @@ class CauseFinding:
         where = f" of joint {self.joint}" if self.joint is not None else ""
         since = f" from pose {self.since} on" if self.since is not None else ""
         p = "p < 0.001" if self.p_value < 0.001 else f"p = {self.p_value:.2g}"
-        rivals = f"; it cannot be told from {' or '.join(self.rivals)}" if self.rivals else ""
+        rivals = f"; it cannot be distinguished from {' or '.join(self.rivals)}" if self.rivals else ""
         head = {
             "zero": f"the zero{where} is off by {self._size()}",
             "link": f"joint {self.joint} stands elsewhere on its link, by {self._size()}",

@@ -41,7 +41,7 @@ def zeros_text(calibration: Calibration) -> str:
     """
     lines = [
         f"# Joint zeros of {calibration.robot.name}: position = reading + zero [rad; m for joints that slide].",
-        "# The zero is 0 of a joint whose zero no pose tells from the pose of the base or the tool.",
+        "# The zero is 0 of a joint whose zero no pose distinguishes from the pose of the base or the tool.",
         "joint_zeros:",
     ]
     lines += [f"  {name}: {value:.9g}" for name, value in calibration.joint_zeros.items()]

@@ -1,4 +1,4 @@
-"""What each pose tells of the errors of a robot: rows of the scaled Jacobian."""
+"""What each pose informs of the errors of a robot: rows of the scaled Jacobian."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from robots.robot import Robot
 Array = NDArray[np.float64]
 
 REFERENCE = 300
-"""Random poses by which the errors that any pose tells apart are chosen."""
+"""Random poses by which the errors that poses distinguish are chosen."""
 
 UNSUITED = ("backlash", "time_offset", "thermal_growth", "base_motion")
 """Kinds that depend on more than the pose."""
@@ -64,7 +64,7 @@ class PoseInformation:
 
     @property
     def size(self) -> int:
-        """Number of parameters that poses tell apart."""
+        """Number of parameters that poses distinguish."""
         return len(self.kept)
 
     def rows(self, q: Array) -> Array:

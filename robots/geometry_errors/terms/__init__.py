@@ -27,7 +27,7 @@ TERMS: tuple[ErrorTerm, ...] = (
     TimeOffset(),
     BaseMotion(),
 )
-"""All kinds, in the order in which parameters that no pose tells apart are kept."""
+"""All kinds, in the order in which parameters that no pose distinguishes are kept."""
 
 
 def error_term(kind: str) -> ErrorTerm:

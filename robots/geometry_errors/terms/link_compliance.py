@@ -12,7 +12,7 @@ from robots.robot import MASSES_REMEDY, Robot
 class LinkCompliance(ErrorTerm):
     """The frame of joint i turns by ``compliance * moment`` across its axis: one parameter per joint [rad/(N m)].
 
-    Along the axis of a joint that turns, the joint's own compliance cannot be told from it. A joint that slides
+    Along the axis of a joint that turns, the joint's own compliance cannot be distinguished from it. A joint that slides
     bends in all three directions.
     """
 

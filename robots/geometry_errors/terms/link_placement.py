@@ -15,7 +15,7 @@ AXES = ("x", "y", "z", "rx", "ry", "rz")
 class LinkPlacement(ErrorTerm):
     """Six parameters per joint: shifts and turns in the axes of the joint frame.
 
-    Many move the flange as others do: what no pose tells apart is left out by the rank of the Jacobian. With parallel
+    Many move the flange as others do: what no pose distinguishes is left out by the rank of the Jacobian. With parallel
     axes this leaves the turns of Hayati (1983) without a rule of their own.
     """
 

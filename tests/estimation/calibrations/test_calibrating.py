@@ -19,7 +19,7 @@ FIXED = CalibrationOptions(kinds=("joint_zero", "link_placement"), diagnose=Fals
 
 @pytest.mark.slow
 def test_held_out_poses_are_predicted_to_the_noise(calibration):
-    """An arm with zeros, links, eccentricity and compliance is predicted to the noise, and the kinds are those it has."""
+    """An arm with zeros, links, eccentricity and compliance is predicted to the noise, by the kinds that it has."""
     # Three numbers a marker: the distance is root three times the noise; forty poses leave an error of estimation of a
     # sixth of the noise.
     assert calibration.levels.held_out < 1.25 * np.sqrt(3.0) * NOISE

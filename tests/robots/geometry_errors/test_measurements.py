@@ -69,7 +69,7 @@ def model_of(robot, measurement, rng):
 
 @pytest.mark.parametrize("measurement", MEASUREMENTS, ids=lambda m: f"{m.kind}-{getattr(m, 'on_flange', '')}")
 def test_derivatives_are_those_of_the_prediction(robot, measurement):
-    """The Jacobian of every kind of error and of the setup is the derivative of the residual, by central differences."""
+    """The Jacobian of every kind of error and of the setup is the derivative of the prediction, by differences."""
     model, values, setup = model_of(robot, measurement, np.random.default_rng(0))
     found = model.evaluate(values, setup)
     assert np.isfinite(found.residual).any()
