@@ -198,6 +198,8 @@ class Calibration:
             lines.append(
                 f"  within the range of the other poses {self.shown(levels.inside)}, outside it "
                 f"{self.shown(levels.outside)} ({levels.outside_count} poses)"
+                if np.isfinite(levels.inside)
+                else "  each pose lies outside the range of the others"
             )
         noise = ", ".join(f"{SHOWN[u][1] * value:.3g} {SHOWN[u][0]}" for u, value in self.noise.items())
         lines.append(f"  what remains, standard deviation per measured number: {noise}")

@@ -40,10 +40,10 @@ def refuse_suspicious(robots: Sequence[Robot], poses: MeasuredPoses) -> None:
     Raises:
         InputError: with the cause and what to do.
     """
+    _refuse_repeated(poses)
     require_enough(robots, poses)
     _refuse_degrees(robots[0], poses)
     _refuse_lost(poses)
-    _refuse_repeated(poses)
     if poses.measurement.kind in ("markers", "poses"):
         _refuse_frame(robots[0], poses)
     _refuse_other_readings(robots, poses)
@@ -60,14 +60,16 @@ def require_enough(robots: Sequence[Robot], poses: MeasuredPoses) -> None:
         NotIdentifiableError: naming how many there are and how many are needed.
     """
     observed, units = poses.observed, poses.measurement.units
-    seen = int(np.isfinite(observed).any(axis=1).sum()) if observed.shape[1] else len(poses)
+    rows = np.isfinite(observed).any(axis=1) if observed.shape[1] else np.ones(len(poses), dtype=bool)
+    # Visits of one pose are one pose.
+    seen = len(np.unique(np.round(poses.q[rows] / CLOSE), axis=0))
     needed = LEAST
     if seen >= LEAST:
         setup = GeometryModel(robots, [], poses).start().values()
         needed = max(LEAST, int(np.ceil((sum(part.size for part in setup if not part.known) + 1) / len(units))))
     if seen < needed:
         raise NotIdentifiableError(
-            f"{several(seen, 'measured pose')}",
+            several(seen, "measured pose") if seen == rows.sum() else f"{rows.sum()} rows of {several(seen, 'pose')}",
             file=poses.source.get("file"),
             allowed=f"at least {needed} for {poses.measurement.title}, and 30 or more for links",
             remedy="measure more poses; oed design --for calibration chooses them",
@@ -190,6 +192,8 @@ def _refuse_other_readings(robots: Sequence[Robot], poses: MeasuredPoses) -> Non
         misfit = _misfit(robots, reading.change(poses))
         if misfit < best:
             best, found = misfit, reading
+        if misfit < GOOD / BETTER:
+            break
     if found is not None:
         raise _error(poses, found.problem, found.remedy)
     if own > 10.0 * GOOD:

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import warnings
 from importlib.resources import files
 from os import PathLike
 from pathlib import Path
 
 import numpy as np
 
+from robots.common.errors import AssumedValueWarning
 from robots.common.files import ResultFolder, write_atomic
 
 ROBOT = "er3a"
@@ -40,7 +42,10 @@ def write_calibration_example(folder: str | PathLike[str], *, force: bool = Fals
     from robots.geometry_errors import Markers, random_positions, simulate_poses
     from robots.loading import load_robot
 
-    robot = load_robot(ROBOT)
+    with warnings.catch_warnings():
+        # Assumed masses and limits are of no concern for files to try a command on.
+        warnings.simplefilter("ignore", AssumedValueWarning)
+        robot = load_robot(ROBOT)
     measurement = Markers(count=3)
     setup = dict(measurement.example)
     # The tracker stands two metres in front of the robot and looks back.

@@ -12,8 +12,8 @@ from robots.robot import MASSES_REMEDY, Robot
 class LinkCompliance(ErrorTerm):
     """The frame of joint i turns by ``compliance * moment`` across its axis: one parameter per joint [rad/(N m)].
 
-    Along the axis of a joint that turns, the joint's own compliance cannot be distinguished from it. A joint that slides
-    bends in all three directions.
+    Along the axis of a joint that turns, it cannot be distinguished from the joint's own compliance. A joint that
+    slides bends in all three directions.
     """
 
     kind = "link_compliance"
