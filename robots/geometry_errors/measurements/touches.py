@@ -106,8 +106,8 @@ class Points(Measurement):
         rows[:, :, :3] = flange[:, :3, :3]
         for axis in range(3):
             rows[np.arange(len(flange)), axis, 3 + 3 * own + axis] = -1.0
-        found = np.linalg.lstsq(rows.reshape(-1, rows.shape[2]), -flange[:, :3, 3].ravel(), rcond=1e-9)[0]
-        found = np.asarray(found, dtype=np.float64)
+        solved = np.linalg.lstsq(rows.reshape(-1, rows.shape[2]), -flange[:, :3, 3].ravel(), rcond=1e-9)[0]
+        found: Array = np.asarray(solved, dtype=np.float64)
         points = {
             f"point_{k + 1}": Unknown(kind="point", value=found[3 + 3 * k : 6 + 3 * k]) for k in range(self.count)
         }
