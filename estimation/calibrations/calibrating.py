@@ -103,7 +103,7 @@ def calibrate(
         first = fit_geometry(_model(robots, terms, poses))
         fit, outliers = without_outliers(first)
         bar.update(0, "predicting held-out poses")
-        errors = held_out_errors(robots, terms, fit, seed=how.seed)
+        errors = held_out_errors(fit, seed=how.seed)
         open_ = undetermined(robots, terms, fit)
         causes: dict[str, Any] = {}
         if how.diagnose:

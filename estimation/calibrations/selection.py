@@ -153,30 +153,22 @@ def select_kinds(
         trials.append(best)
 
 
-def held_out_errors(robots: Sequence[Robot], terms: Sequence[ErrorTerm], fit: GeometryFit, *, seed: int = 0) -> HeldOut:
-    """Predicts each fold by a fit to the others.
+def held_out_errors(fit: GeometryFit, *, seed: int = 0) -> HeldOut:
+    """Predicts each fold by a fit to the others, linear about the fit to all.
 
     Args:
-        robots: one per arm.
-        terms: kinds of errors.
-        fit: to all poses, from which the fits to the folds start.
+        fit: to all poses.
         seed: of the folds.
     """
     poses, used = fit.model.poses, fit.used
     folds = fold_numbers(poses.q, seed=seed)
-    residual = np.full(fit.residual.shape, np.nan)
+    residual = LinearFolds(fit, folds).residuals({item.kind for item in fit.model.errors})
     outside = np.zeros(len(poses), dtype=bool)
-    reference = None if poses.temperature is None else float(poses.temperature.mean())
     for fold in np.unique(folds):
         mine = folds == fold
-        if not (used & ~mine).any():
-            continue
-        model = GeometryModel(robots, terms, poses, reference=reference)
-        found = fit_geometry(model, start=(fit.values, fit.setup), used=used & ~mine, robust=False, sizes=fit.sizes)
-        residual[mine] = found.residual[mine]
-        outside[mine] = outside_range(poses.q[mine], poses.q[~mine & used])
-    error = poses.measurement.error(residual)
-    return HeldOut(residual=residual, error=error, outside=outside)
+        if (used & ~mine).any():
+            outside[mine] = outside_range(poses.q[mine], poses.q[~mine & used])
+    return HeldOut(residual=residual, error=poses.measurement.error(residual), outside=outside)
 
 
 def _about(whole: GeometryModel, robots: Sequence[Robot], chosen: list[ErrorTerm], poses: MeasuredPoses) -> GeometryFit:
