@@ -5,6 +5,7 @@ from __future__ import annotations
 from robots.common.lazy import lazy_exports, listed
 
 _EXPORTS = {
+    "Calibration": "estimation.calibrations",
     "Diagnosis": "estimation.diagnosis",
     "Estimate": "estimation.identifications.estimate",
     "GateReport": "estimation.gate",
@@ -15,6 +16,7 @@ _EXPORTS = {
     "ThermalEstimate": "estimation.thermal",
     "ThermalRun": "estimation.thermal",
     "bootstrap": "estimation.identifications.bootstrap",
+    "calibrate": "estimation.calibrations",
     "check_log": "estimation.gate",
     "choose_thermal": "estimation.thermal",
     "compare": "estimation.comparisons",
@@ -28,12 +30,14 @@ _EXPORTS = {
     "identify": "estimation.identifications.identification",
     "identify_drive_gains": "estimation.identifications.drive_gains",
     "identify_payload": "estimation.payloads",
+    "load_calibration": "estimation.calibrations",
     "load_model": "estimation.models.model",
     "load_payload": "estimation.payloads",
     "on_one_clock": "estimation.logs.clocks",
     "predict": "estimation.predictions.prediction",
     "read_log": "estimation.logs",
     "read_logs": "estimation.logs",
+    "read_poses": "estimation.calibrations",
     "write_log": "estimation.logs",
     "__version__": "robots.version",
 }

@@ -185,7 +185,7 @@ def _updated(source: str, robot: Robot, inertia: Array, remarks: list[str]) -> E
 
 def _set_inertial(link: Element, parameters: Array) -> None:
     _remove_inertial(link)
-    link.insert(0, _inertial(parameters))
+    link.insert(0, inertial_element(parameters))
 
 
 def _end(joint: Element, tag: str) -> str | None:
@@ -204,23 +204,31 @@ def _chain(robot: Robot, inertia: Array) -> Element:
     limits = robot.limits
     for i, joint in enumerate(robot.chain.joints):
         link = ElementTree.SubElement(root, "link", name=f"link_{i + 1}")
-        link.append(_inertial(inertia[i]))
+        link.append(inertial_element(inertia[i]))
         parent = f"link_{i}" if i else "base"
         bounds = (limits.lower[i], limits.upper[i], limits.velocity[i], limits.torque[i])
-        root.append(_joint(joint, parent, f"link_{i + 1}", bounds))
+        root.append(joint_element(joint, parent, f"link_{i + 1}", bounds))
     return root
 
 
-def _joint(joint: Joint, parent: str, child: str, bounds: Sequence[float]) -> Element:
+def joint_element(joint: Joint, parent: str, child: str, bounds: Sequence[float]) -> Element:
+    """Writes a ``<joint>``.
+
+    Args:
+        joint: the joint.
+        parent: name of a link.
+        child: name of the link that it moves.
+        bounds: lower, upper, velocity, effort; infinite where unknown.
+    """
     lower, upper, velocity, effort = (float(value) for value in bounds)
     limited = bool(np.isfinite([lower, upper]).all())
     kind = joint.kind if joint.kind == "prismatic" or limited else "continuous"
     element = Element("joint", name=joint.name, type=kind)
-    pose = {"xyz": _numbers(joint.translation), "rpy": _numbers(_rpy(np.asarray(joint.rotation)))}
+    pose = {"xyz": numbers(joint.translation), "rpy": numbers(roll_pitch_yaw(np.asarray(joint.rotation)))}
     ElementTree.SubElement(element, "origin", pose)
     ElementTree.SubElement(element, "parent", link=parent)
     ElementTree.SubElement(element, "child", link=child)
-    ElementTree.SubElement(element, "axis", xyz=_numbers(joint.axis))
+    ElementTree.SubElement(element, "axis", xyz=numbers(joint.axis))
     limit = {"lower": lower, "upper": upper} if limited else {}
     # A reader needs both, or neither: a missing one makes the file invalid.
     if limited or np.isfinite([velocity, effort]).any():
@@ -229,13 +237,13 @@ def _joint(joint: Joint, parent: str, child: str, bounds: Sequence[float]) -> El
     return element
 
 
-def _inertial(parameters: Array) -> Element:
+def inertial_element(parameters: Array) -> Element:
     """The ``<inertial>`` of ten parameters about the link frame: mass, centre of mass, inertia about it."""
     mass = float(parameters[0])
     centre = parameters[1:4] / mass
     about = symmetric(parameters[4:]) - mass * (centre @ centre * np.eye(3) - np.outer(centre, centre))
     element = Element("inertial")
-    ElementTree.SubElement(element, "origin", xyz=_numbers(centre), rpy="0 0 0")
+    ElementTree.SubElement(element, "origin", xyz=numbers(centre), rpy="0 0 0")
     ElementTree.SubElement(element, "mass", value=repr(mass))
     names = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
     values = about[np.triu_indices(3)]
@@ -243,7 +251,7 @@ def _inertial(parameters: Array) -> Element:
     return element
 
 
-def _rpy(rotation: Array) -> Array:
+def roll_pitch_yaw(rotation: Array) -> Array:
     """Roll, pitch and yaw of R = Rz(yaw) Ry(pitch) Rx(roll)."""
     horizontal = float(np.hypot(rotation[0, 0], rotation[1, 0]))
     pitch = np.arctan2(-rotation[2, 0], horizontal)
@@ -253,5 +261,6 @@ def _rpy(rotation: Array) -> Array:
     return np.array([roll, pitch, yaw])
 
 
-def _numbers(values: Sequence[float] | Array) -> str:
+def numbers(values: Sequence[float] | Array) -> str:
+    """Writes numbers that read back exactly."""
     return " ".join(repr(float(value)) for value in values)

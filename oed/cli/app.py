@@ -9,6 +9,7 @@ import typer
 from oed.cli.command import HELP
 from oed.cli.commands.actuators import actuators
 from oed.cli.commands.benchmark import benchmark
+from oed.cli.commands.calibrate import calibrate
 from oed.cli.commands.campaign import campaign
 from oed.cli.commands.check import check
 from oed.cli.commands.compare import compare
@@ -60,6 +61,7 @@ FUNCTIONS = (
     monitor,
     fleet,
     payload,
+    calibrate,
     force,
     benchmark,
     view,

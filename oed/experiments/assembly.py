@@ -92,14 +92,14 @@ def _ends(segment: Segment) -> tuple[Array, Array]:
     return q[0], q[1]
 
 
-def _between_samples(limits: Limits, period: float) -> Limits:
+def limits_between_samples(limits: Limits, period: float) -> Limits:
     """Lowers jerk and acceleration so that the moves keep the limits between the samples, too."""
     jerk = np.minimum(limits.jerk / QUINTIC_JERK, limits.acceleration / period)
     return replace(limits, jerk=jerk, acceleration=limits.acceleration - QUINTIC_ACCELERATION * jerk * period)
 
 
 def _move(kind: str, limits: Limits, start: Array, end: Array, period: float) -> list[Segment]:
-    planned = plan_move(_between_samples(limits, period), start, end, period=period)
+    planned = plan_move(limits_between_samples(limits, period), start, end, period=period)
     if planned is None:
         return []
     pieces = PiecewisePolynomial(breakpoints=planned.breakpoints, coefficients=planned.coefficients)

@@ -23,6 +23,7 @@ HEAD = 4096
 
 PRIMARY = (
     "design.json",
+    "calibration.json",
     "diagnosis.json",
     "monitor.json",
     "compare.json",

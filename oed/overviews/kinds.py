@@ -238,6 +238,19 @@ def _drives(data: Data) -> Reading:
     )
 
 
+def _calibration(data: Data) -> Reading:
+    levels, factor = data["levels"], 1e3 if data["unit"] != "px" else 1.0
+    unit = {"m": "mm", "rad": "mrad", "px": "px"}[data["unit"]]
+    before, after = factor * levels["before"], factor * levels["held_out"]
+    return Reading(
+        kind="calibration",
+        verdict=f"Error of held-out poses {before:.3g} -> {after:.3g} {unit}.",
+        codes=("calibration.doubtful",) if data["warnings"] else ("done",),
+        figures={f"before [{unit}]": before, f"held out [{unit}]": after, "outliers": len(data["outliers"])},
+        robot=_robot(data),
+    )
+
+
 def _drive_design(data: Data) -> Reading:
     ratios = sorted(i["standard_error"] / i["of_chirp"] for i in data["expected"] if i["of_chirp"])
     middle = ratios[len(ratios) // 2] if ratios else math.nan
@@ -245,6 +258,17 @@ def _drive_design(data: Data) -> Reading:
         kind="motion for drives",
         verdict=f"Standard errors {middle:.2g} times those of a chirp.",
         figures={"parameters": len(data["expected"])},
+        robot=_robot(data),
+    )
+
+
+def _pose_design(data: Data) -> Reading:
+    free = data["collision"] is not None and data["collision"]["certified"]
+    return Reading(
+        kind="poses",
+        verdict=f"{len(data['poses'])} poses for a calibration, {data['duration']:.0f} s of motion.",
+        codes=("done",) if free else ("collision.unchecked",),
+        figures={"poses": len(data["poses"]), "O1": data["observability"]["O1"], "duration [s]": data["duration"]},
         robot=_robot(data),
     )
 
@@ -314,6 +338,8 @@ BY_FORMAT: dict[str, Callable[[Data], Reading]] = {
     "robot-oed actuators": _drives,
     "robot-oed drive design": _drive_design,
     "robot-oed payload": _payload,
+    "robot-oed calibration": _calibration,
+    "robot-oed pose design": _pose_design,
     "robot-oed forces": _forces,
     "robot-oed campaign": _campaign,
     "robot-oed pareto front": _pareto,

@@ -12,7 +12,7 @@ from oed.trajectories.base import Array, Kinematics, Trajectory, count_periods
 from robots.common.errors import InputError
 from robots.signals import Motion
 
-KINDS = ("approach", "fourier", "excitation", "sinusoid", "friction", "warm_up", "move")
+KINDS = ("approach", "fourier", "excitation", "sinusoid", "friction", "warm_up", "move", "pose")
 """The kinds of segment a design file may name."""
 
 POSITION_TOLERANCE = 1e-9

@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING, Annotated, Any, TypeVar
 import typer
 
 from oed.cli.console import Console
-from oed.cli.links import is_given
 from oed.cli.options import (
     ROBOT,
     ForceOption,
@@ -230,27 +229,6 @@ def positions(lock: Sequence[str] | None) -> dict[str, float] | None:
         except ValueError:
             raise InputError(f"--lock {item}", allowed="name=value with the value in rad or m") from None
     return found or None
-
-
-MEANINGLESS = (
-    *("criterion", "friction", "offset", "family", "harmonics", "base_frequency", "periods", "strokes"),
-    *("payload", "tool_box", "singularity", "essential", "scaling", "noise", "after", "task", "payload_only"),
-    *("discriminate", "effort", "time_limit", "workers", "cluster", "tip", "torque_margin", "velocity_fraction"),
-    *("floor", "no_floor", "keep_out", "clearance", "torque", "assume_masses"),
-)
-"""Options of other designs."""
-
-
-def refuse_beside_drives(context: typer.Context) -> None:
-    """Refuses options that do not apply with ``--for actuators``.
-
-    Raises:
-        InputError: naming them.
-    """
-    given = [f"--{name.replace('_', '-')}" for name in MEANINGLESS if is_given(context, name)]
-    if given:
-        verb = "does" if len(given) == 1 else "do"
-        raise InputError(f"{', '.join(given)} {verb} not apply with --for actuators", remedy="remove these options")
 
 
 def design_for_drives(

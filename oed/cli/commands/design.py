@@ -10,6 +10,18 @@ import typer
 
 from oed.cli.configuration.defaults import is_from_file
 from oed.cli.console import Console
+from oed.cli.designs.payload_designs import is_given, refuse_beside_payload
+from oed.cli.designs.pose_designs import (
+    FacingOption,
+    KindsOption,
+    MeasurementOption,
+    PosesOption,
+    ViewConeOption,
+    ViewFromOption,
+    ViewTowardsOption,
+    design_calibration,
+)
+from oed.cli.designs.purposes import ForOption, refuse_unsuited
 from oed.cli.options import (
     AssumeMassesOption,
     BaseFrequencyOption,
@@ -39,20 +51,13 @@ from oed.cli.options import (
     numbers,
     robot_from,
 )
-from oed.cli.payload_designs import is_given, refuse_beside_payload
 from oed.cli.set_up import CarriedOption
 
 
 def design(
     context: typer.Context,
     robot: RobotOption,
-    purpose: Annotated[
-        str,
-        typer.Option(
-            "--for",
-            help="What the motion is to determine: dynamics, or actuators (commands for drives without torque).",
-        ),
-    ] = "dynamics",
+    for_: ForOption = "dynamics",
     gains: Annotated[
         Path | None,
         typer.Option(
@@ -67,7 +72,8 @@ def design(
         typer.Option(
             help=(
                 "Design criterion: cond (condition number), d (log determinant), a (trace of the inverse), e (smallest "
-                "singular value), i (prediction variance, needs --task), or cond-d (cond and d)."
+                "singular value), i (prediction variance, needs --task), or cond-d (cond and d). Calibration: d by "
+                "default, or an observability index, o1 to o5."
             )
         ),
     ] = "cond",
@@ -118,7 +124,9 @@ def design(
     noise: Annotated[
         str | None,
         typer.Option(
-            help="Standard deviation of the torque noise of each joint [N m or N], comma-separated.", show_default=False
+            help="Standard deviation of the torque noise of each joint [N m or N], comma-separated. Calibration: of "
+            "the measurement [m], of poses also [rad].",
+            show_default=False,
         ),
     ] = None,
     after: Annotated[
@@ -158,6 +166,13 @@ def design(
             show_default=False,
         ),
     ] = None,
+    poses: PosesOption = 30,
+    measurement: MeasurementOption = "markers:3",
+    kinds: KindsOption = "joint_zero,link_placement",
+    view_from: ViewFromOption = None,
+    view_towards: ViewTowardsOption = None,
+    view_cone: ViewConeOption = 30.0,
+    facing: FacingOption = None,
     effort: Annotated[str, typer.Option(help="Search effort: quick, standard or thorough.")] = "standard",
     time_limit: Annotated[
         float | None,
@@ -177,21 +192,18 @@ def design(
     json: JsonOption = False,
     quiet: QuietOption = False,
 ) -> None:
-    """Designs an excitation experiment for a robot.
+    """Designs an experiment for a robot: an excitation trajectory, or poses for a calibration.
 
-    Writes trajectory.csv, design.json and report.html.
+    Writes trajectory.csv, design.json and report.html; for a calibration also poses.csv.
     """
     console = Console(json=json, quiet=quiet, introduces=True)
     with console.working() as progress:
         from oed.cli.spaces import spaces_from, surroundings_from
-        from robots.common.errors import InputError
 
-        if purpose not in ("dynamics", "actuators"):
-            raise InputError(f"--for {purpose}", allowed="dynamics or actuators")
-        if purpose == "actuators":
-            from oed.cli.commands.actuators import design_for_drives, refuse_beside_drives
+        refuse_unsuited(context, for_)
+        if for_ == "actuators":
+            from oed.cli.commands.actuators import design_for_drives
 
-            refuse_beside_drives(context)
             summary, data = design_for_drives(
                 robot,
                 gains,
@@ -206,8 +218,34 @@ def design(
             )
             console.result(f"{summary}\nwritten to {out.resolve()}", data)
             return
+        if for_ == "calibration":
+            chosen = is_given(context, "criterion") or is_from_file(context, "criterion")
+            summary, data = design_calibration(
+                robot_from(robot, tip, joints, lock, unlimited=unlimited, assume_masses=assume_masses),
+                poses=poses,
+                criterion=criterion if chosen else "d",
+                measurement=measurement,
+                kinds=kinds,
+                view_from=view_from,
+                view_towards=view_towards,
+                view_cone=view_cone,
+                facing=facing,
+                noise=numbers("--noise", noise),
+                home=numbers("--home", home),
+                velocity_fraction=velocity_fraction,
+                collision=collision,
+                clearance=clearance,
+                surroundings=surroundings_from(floor, no_floor, keep_out),
+                seed=seed,
+                out=out,
+                png=png,
+                force=force,
+                progress=progress,
+            )
+            console.result(f"{summary}\nwritten to {out.resolve()}", data)
+            return
         if discriminate is not None:
-            from oed.cli.discriminating import design_discriminating, refuse_others
+            from oed.cli.designs.discriminating import design_discriminating, refuse_others
 
             refuse_others(context)
             summary, data = design_discriminating(

@@ -7,8 +7,8 @@ from pathlib import Path
 from typing import Any
 
 from oed.cli.configuration.defaults import is_from_file
-from oed.cli.discriminating import APPLY
-from oed.cli.payload_designs import MEANINGLESS
+from oed.cli.designs.discriminating import APPLY
+from oed.cli.designs.payload_designs import MEANINGLESS
 
 _Given = Callable[[str], bool]
 

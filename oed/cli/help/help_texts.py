@@ -8,7 +8,7 @@ COMMANDS: dict[str, tuple[str, ...]] = {
     "First steps": ("example", "robots", "robot", "effects", "doctor"),
     "Experiments": ("design", "pareto", "retime", "campaign", "export", "show"),
     "Robot and virtual robot": ("stream", "record", "loop", "controller", "simulate"),
-    "Models": ("check", "identify", "actuators", "thermal", "predict", "payload"),
+    "Models": ("check", "identify", "actuators", "thermal", "predict", "payload", "calibrate"),
     "Diagnosis": ("diagnose", "compare", "monitor", "fleet", "force", "view", "benchmark"),
 }
 """Commands by purpose; those that are not listed come last."""
@@ -16,12 +16,13 @@ COMMANDS: dict[str, tuple[str, ...]] = {
 OTHER = "Other commands"
 
 OPTIONS = {
-    "Robot": ("robot", "tip", "joints", "lock", "unlimited", "assume_masses", "home"),
+    "Robot": ("robot", "second", "tip", "joints", "lock", "unlimited", "assume_masses", "home"),
     "Input": (
         *(
             "trajectory",
             "log",
             "log_dir",
+            "poses",
             "state",
             "without",
             "held_out",
@@ -66,6 +67,7 @@ EXAMPLES = {
     "design": (
         "oed design --robot er3a --out experiment",
         "oed design --robot arm.urdf --tip tool0 --criterion d --velocity-fraction 0.7 --out experiment",
+        "oed design --robot er3a --for calibration --poses 30 --out poses",
     ),
     "pareto": ("oed pareto --robot er3a --criteria cond,d --points 5 --out pareto",),
     "retime": (
@@ -135,6 +137,10 @@ EXAMPLES = {
         "oed payload --robot ur10 --log with.csv --without without.csv --to urscript --out payload",
         "oed payload --model model --log with.csv --to franka kuka --out payload",
     ),
+    "calibrate": (
+        "oed calibrate --robot arm.urdf --poses poses.csv --out calibrated",
+        "oed calibrate --robot ur10 --poses poses.csv --lengths mm --angles deg --held-out other.csv --out calibrated",
+    ),
     "force": (
         "oed force --model model --log log.csv --healthy healthy.csv --out forces",
         "oed force --model model --log log.csv --calibration forces/forces.json --out other",
@@ -144,7 +150,7 @@ EXAMPLES = {
         "oed benchmark answer blind --by residual-fit",
         "oed benchmark score blind blind.residual-fit others/answers.json --markdown table.md",
     ),
-    "example": ("oed example --out example",),
+    "example": ("oed example --out example", "oed example --for calibration --out calibration"),
     "robots": ("oed robots",),
     "robot": ("oed robot show ur10", "oed robot show arm.urdf --tip tool0 --json"),
     "effects": ("oed effects", "oed effects --json"),

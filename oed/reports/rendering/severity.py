@@ -67,6 +67,10 @@ LEVELS: dict[str, Level] = {
     "drives.note": "note",
     "drives.undetermined": "note",
     "drives.unexplained": "note",
+    "calibration.doubtful": "act",
+    "calibration.cause": "note",
+    "calibration.outlier": "note",
+    "calibration.open": "note",
     # Diagnoses and comparisons.
     "diagnosis.ambiguous": "act",
     "diagnosis.unexplained": "act",

@@ -91,4 +91,4 @@ def test_segments_must_fit_the_period_and_each_other():
 
 def test_every_kind_of_the_design_file_is_known():
     """The kinds are those of the file's contract."""
-    assert set(KINDS) == {"approach", "fourier", "excitation", "sinusoid", "friction", "warm_up", "move"}
+    assert set(KINDS) == {"approach", "fourier", "excitation", "sinusoid", "friction", "warm_up", "move", "pose"}

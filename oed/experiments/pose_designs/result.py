@@ -1,0 +1,252 @@
+"""A design of poses: the poses in order, the motion, and what to expect of the calibration."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from oed.experiments.pose_designs.observability import observability_indices
+from oed.experiments.safety_checks.freedom import freedom_text, is_free
+from oed.exports import write_trajectory
+from robots.common.errors import InputError
+from robots.common.files import existing_file, write_atomic
+from robots.common.plain import finite
+from robots.common.tables.table_files import write_table
+from robots.geometry_errors.terms import ErrorParameter
+from robots.robot import Robot
+from robots.signals import Motion
+from robots.version import VERSION
+
+if TYPE_CHECKING:
+    import pandas as pd
+    from matplotlib.axes import Axes
+
+Array = NDArray[np.float64]
+
+FORMAT = "robot-oed pose design"
+DESIGN, POSES, TRAJECTORY = "design.json", "poses.csv", "trajectory.csv"
+SHOWN = {"m": ("mm", 1e3), "rad": ("mrad", 1e3), "px": ("px", 1.0)}
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class PoseDesign:
+    """Poses for a calibration.
+
+    Attributes:
+        robot: what they are for.
+        criterion: what was optimised.
+        q: poses in the order of the moves (N, n) [rad or m].
+        home: pose at both ends (n,).
+        motion: all moves, with a rest at each pose, at the controller's period.
+        segments: kind, start [s] and end [s] of each part; those of kind "pose" are the rests.
+        parameters: that the poses determine.
+        eigenvalues: of the scaled information, ascending (L,).
+        random_eigenvalues: of as many random poses, to compare with (L,).
+        expected: standard errors of the parameters (L,), in SI units.
+        prediction: expected error of predicted measurements elsewhere, in `unit`.
+        unit: of the measurement.
+        left_out: poses of the design that no free move reaches.
+        freedom: of collisions, as `collision_data` writes it; None where they were not checked.
+        settings: everything that makes the same design again.
+    """
+
+    robot: Robot
+    criterion: str
+    q: Array
+    home: Array
+    motion: Motion
+    segments: tuple[Mapping[str, Any], ...]
+    parameters: tuple[ErrorParameter, ...]
+    eigenvalues: Array
+    random_eigenvalues: Array
+    expected: Array
+    prediction: float
+    unit: str
+    left_out: int
+    freedom: Mapping[str, Any] | None
+    settings: Mapping[str, Any]
+
+    def __repr__(self) -> str:
+        return f"PoseDesign({self.robot.name!r}, {len(self.q)} poses, O1 {self.observability['O1']:.3g})"
+
+    def _repr_html_(self) -> str:
+        return f"<pre>{self.summary()}</pre>"
+
+    @property
+    def observability(self) -> dict[str, float]:
+        """The indices O1 to O5."""
+        return observability_indices(self.eigenvalues, len(self.q))
+
+    @property
+    def success(self) -> bool:
+        """Whether all poses are reached and the moves are proved free of collisions."""
+        return self.left_out == 0 and (self.freedom is None or is_free(self.freedom))
+
+    def summary(self) -> str:
+        """Says how good the poses are, what errors to expect, and whether the moves are free."""
+        own, other = self.observability, observability_indices(self.random_eigenvalues, len(self.q))
+        unit, factor = SHOWN[self.unit]
+        lines = [
+            f"{self.robot.name}: {len(self.q)} poses for a calibration of {len(self.parameters)} parameters, "
+            f"{self.motion.duration:.0f} s of motion",
+            f"  {'observability':16} {'designed':>10} {'random':>10}",
+            *(f"  {name:16} {own[name]:10.3g} {other[name]:10.3g}" for name in own),
+            f"  expected error of predicted measurements elsewhere: {factor * self.prediction:.3g} {unit}",
+            "  expected standard errors, largest of each kind:",
+        ]
+        for kind in dict.fromkeys(item.kind for item in self.parameters if item.kind != "setup"):
+            for shown in dict.fromkeys(item.shown for item in self.parameters if item.kind == kind):
+                own_ = [
+                    e
+                    for item, e in zip(self.parameters, self.expected, strict=True)
+                    if (item.kind, item.shown) == (kind, shown)
+                ]
+                lines.append(f"    {kind.replace('_', ' '):18} {shown[1] * max(own_):.3g} {shown[0]}")
+        if self.left_out:
+            lines.append(f"  {self.left_out} poses were left out: no free move reaches them")
+        lines.append(f"  {freedom_text(self.freedom)}")
+        return "\n".join(lines)
+
+    def to_frame(self) -> pd.DataFrame:
+        """Gives a row per pose: q1..qn."""
+        import pandas as pd
+
+        index = pd.RangeIndex(1, len(self.q) + 1, name="pose")
+        return pd.DataFrame(self.q, columns=[f"q{i + 1}" for i in range(self.robot.n)], index=index)
+
+    def plot(self, ax: Axes | None = None) -> Axes:
+        """Draws the singular values of the scaled Jacobian beside those of random poses.
+
+        Args:
+            ax: where to draw; a new figure by default.
+        """
+        from matplotlib.figure import Figure
+
+        axes = ax if ax is not None else Figure(figsize=(6, 4)).subplots()
+        for values, label in ((self.eigenvalues, "designed"), (self.random_eigenvalues, "random")):
+            axes.semilogy(np.sqrt(np.maximum(values, 0.0))[::-1], "o-", markersize=3, label=label)
+        axes.set_xlabel("direction")
+        axes.set_ylabel("singular value")
+        axes.legend()
+        return axes
+
+    def to_dict(self) -> dict[str, Any]:
+        """Writes the result as plain data for `design.json`."""
+        return {
+            "format": FORMAT,
+            "format_version": 1,
+            "tool_version": VERSION,
+            "robot": {"name": self.robot.name, "origin": self.robot.origin, "sha256": self.robot.digest},
+            "criterion": self.criterion,
+            "poses": self.q.tolist(),
+            "home": self.home.tolist(),
+            "observability": self.observability,
+            "random_observability": observability_indices(self.random_eigenvalues, len(self.q)),
+            "eigenvalues": self.eigenvalues.tolist(),
+            "random_eigenvalues": self.random_eigenvalues.tolist(),
+            "parameters": [
+                {
+                    "name": item.name,
+                    "kind": item.kind,
+                    "joint": item.joint,
+                    "unit": item.unit,
+                    "scale": item.scale,
+                    "expected_standard_error": finite(float(error)),
+                }
+                for item, error in zip(self.parameters, self.expected, strict=True)
+            ],
+            "prediction": self.prediction,
+            "unit": self.unit,
+            "left_out": self.left_out,
+            "duration": self.motion.duration,
+            "segments": [dict(segment) for segment in self.segments],
+            "collision": self.freedom,
+            "settings": dict(self.settings),
+        }
+
+    def save(self, folder: str | Path, *, force: bool = False) -> None:
+        """Writes `design.json`, `poses.csv` and `trajectory.csv` into a folder that is there.
+
+        Args:
+            folder: an existing one.
+            force: replace files that are there.
+
+        Raises:
+            InputError: a file is there, and force is not given.
+        """
+        place = Path(folder)
+        text = json.dumps(self.to_dict(), indent=2, allow_nan=False) + "\n"
+        write_atomic(place / DESIGN, text, force=force)
+        rests = [segment for segment in self.segments if segment["kind"] == "pose"]
+        columns: dict[str, Any] = {"pose": np.arange(1, len(self.q) + 1)}
+        columns |= {f"q{i + 1}": values for i, values in enumerate(self.q.T)}
+        columns |= {"start": np.array([r["start"] for r in rests]), "end": np.array([r["end"] for r in rests])}
+        columns |= {name: np.full(len(self.q), np.nan) for name in self.settings["columns"]}
+        units = {f"q{i + 1}": self.robot.limits.unit(i) for i in range(self.robot.n)} | {"start": "s", "end": "s"}
+        write_table(place / POSES, columns, {"robot": self.robot.stated or self.robot.origin}, units=units, force=force)
+        stated = {
+            "robot": self.robot.stated or self.robot.origin or self.robot.name,
+            "criterion": self.criterion,
+            "collisions": freedom_text(self.freedom),
+            "tool_version": VERSION,
+        }
+        write_trajectory(place / TRAJECTORY, self.motion, stated, kinds=self.robot.chain.kinds, force=force)
+
+
+def load_pose_design(folder: str | Path, robot: Robot | None = None) -> PoseDesign:
+    """Reads a saved design of poses.
+
+    Args:
+        folder: where `save` wrote.
+        robot: the robot; by default the one that the design names.
+
+    Raises:
+        InputError: a missing or damaged file.
+    """
+    from oed.exports import read_trajectory
+    from robots.geometry_errors.terms.base import shown_unit
+    from robots.loading import load_robot
+
+    file = existing_file(Path(folder) / DESIGN)
+    try:
+        data = json.loads(file.read_text(encoding="utf-8"))
+        if data.get("format") != FORMAT:
+            raise InputError("is no design of poses", file=file)
+        known = robot or load_robot(data["robot"]["origin"], unlimited=True)
+        return PoseDesign(
+            robot=known,
+            criterion=data["criterion"],
+            q=np.array(data["poses"], dtype=float),
+            home=np.array(data["home"], dtype=float),
+            motion=read_trajectory(Path(folder) / TRAJECTORY)[0],
+            segments=tuple(data["segments"]),
+            parameters=tuple(
+                ErrorParameter(
+                    name=item["name"],
+                    kind=item["kind"],
+                    joint=item["joint"],
+                    unit=item["unit"],
+                    scale=item["scale"],
+                    shown=shown_unit(item["unit"]),
+                )
+                for item in data["parameters"]
+            ),
+            eigenvalues=np.array(data["eigenvalues"]),
+            random_eigenvalues=np.array(data["random_eigenvalues"]),
+            expected=np.array(
+                [np.nan if (e := item["expected_standard_error"]) is None else e for item in data["parameters"]]
+            ),
+            prediction=data["prediction"],
+            unit=data["unit"],
+            left_out=data["left_out"],
+            freedom=data["collision"],
+            settings=data["settings"],
+        )
+    except (OSError, UnicodeDecodeError, json.JSONDecodeError, KeyError, TypeError, AttributeError) as error:
+        raise InputError(f"is damaged ({type(error).__name__}: {error})", file=file) from error

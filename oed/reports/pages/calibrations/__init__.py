@@ -1,0 +1,1 @@
+"""Pages of calibrations and of designs of poses."""

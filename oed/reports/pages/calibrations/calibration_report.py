@@ -1,0 +1,295 @@
+"""The page of a calibration."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+from numpy.typing import NDArray
+
+from estimation.calibrations import Calibration
+from estimation.calibrations.result import SHOWN, error_words
+from oed.reports.animations.animation import Animation
+from oed.reports.animations.building import animate
+from oed.reports.rendering.joint_units import joint_titles
+from oed.reports.rendering.page import Cell, Fact, Finding, Page, Section, Table, findings_of
+from oed.reports.rendering.picture import Panel, Picture, Series
+from oed.reports.rendering.provenance import footer
+from oed.reports.rendering.saving import save_page
+from robots.common.files import ResultFolder
+from robots.geometry_errors.poses import approaches
+from robots.geometry_errors.state import ArmState, gravity_loads
+from robots.geometry_errors.terms import error_term
+from robots.geometry_errors.terms.joint_compliance import axis_loads
+from robots.robot import Robot
+from robots.signals import Motion
+
+Array = NDArray[np.float64]
+
+WORST = 6  # poses in the picture of the robot
+HOLD, MOVE, STEP = 1.0, 1.5, 0.04  # s at a pose, between two, and between frames
+
+
+def save_calibration_report(calibration: Calibration, folder: ResultFolder, *, png: bool = False) -> None:
+    """Writes the page of a calibration, and its pictures as PNG on request."""
+    save_page(calibration_page(calibration), folder, png=png)
+
+
+def calibration_page(calibration: Calibration) -> Page:
+    """Builds the page: errors before and after, what was fitted, what is left open, and the worst poses in 3-D."""
+    levels, shown = calibration.levels, calibration.shown
+    better = levels.held_out < levels.before
+    return Page(
+        title="Calibration",
+        robot=calibration.robot.name,
+        verdict=(
+            f"The calibrated robot predicts poses that it has not seen to {shown(levels.held_out)} instead of "
+            f"{shown(levels.before)}."
+            if better
+            else "The poses do not support a calibration: the description predicts held-out poses as well."
+        ),
+        findings=_findings(calibration),
+        facts=(
+            Fact(label="Before", value=shown(levels.before), note=error_words(calibration.measurement)),
+            Fact(label="After, held out", value=shown(levels.held_out), status="good" if better else "act"),
+            Fact(label="Poses", value=len(calibration.poses.line), note=f"{len(calibration.outliers)} left out"),
+        ),
+        sections=(
+            Section(
+                title="Errors",
+                paragraphs=(
+                    "Each pose was predicted by a fit to others that are not alike. Outside the range of those the "
+                    "error is larger.",
+                ),
+                pictures=(_pose_picture(calibration), _joint_picture(calibration)),
+                tables=(_level_table(calibration),),
+            ),
+            Section(
+                title="Worst poses",
+                paragraphs=(
+                    f"The robot visits the {min(WORST, len(calibration.poses.line))} poses with the largest held-out "
+                    "errors, the largest first.",
+                ),
+                animation=_animation(calibration),
+                tables=(_worst_table(calibration),),
+            ),
+            Section(
+                title="Causes",
+                paragraphs=_cause_paragraphs(calibration),
+                pictures=tuple(_load_picture(calibration)),
+                tables=(_evidence_table(calibration),),
+            ),
+            Section(title="What was fitted", tables=(_trial_table(calibration), _parameter_table(calibration))),
+            Section(title="What the poses leave open", tables=(_open_table(calibration),), folded=True),
+        ),
+        footer=footer(),
+    )
+
+
+def _findings(calibration: Calibration) -> tuple[Finding, ...]:
+    found = list(findings_of("calibration.doubtful", calibration.warnings))
+    found += [
+        Finding(code="calibration.cause", text=cause["sentence"], action=cause.get("action", ""))
+        for cause in calibration.causes.get("findings", ())
+    ]
+    found += [
+        Finding(
+            code="calibration.outlier",
+            subject=f"Pose {item.pose}:",
+            text=f"line {item.line} of the file is off by {calibration.shown(item.error)}; it was left out.",
+            action="Measure it again, or remove it.",
+        )
+        for item in calibration.outliers
+    ]
+    return tuple(found)
+
+
+def _pose_picture(calibration: Calibration) -> Picture:
+    unit, factor = SHOWN[calibration.unit]
+    poses = calibration.poses
+    place = np.arange(1.0, len(poses.line) + 1.0)
+    texts = tuple(f"pose {k + 1}, line {line}" for k, line in enumerate(poses.line))
+    series = [
+        Series(x=place, y=factor * values, name=name, kind="markers", role=role, texts=texts)
+        for values, name, role in (
+            (poses.before, "description", "second"),
+            (poses.held_out, "calibrated, held out", "main"),
+        )
+    ]
+    panel = Panel(title="Error of each pose", x_label="pose", y_label=f"error [{unit}]", series=tuple(series))
+    return Picture(name="poses", title="Error of each pose, before and after", panels=(panel,))
+
+
+def _joint_picture(calibration: Calibration) -> Picture:
+    unit, factor = SHOWN[calibration.unit]
+    poses, robot = calibration.poses, calibration.robot
+    panels = []
+    for j, title in enumerate(joint_titles(robot.joint_names, robot.n)):
+        slides = robot.chain.kinds[j] == "prismatic"
+        panels.append(
+            Panel(
+                title=title,
+                x_label="position [m]" if slides else "position [rad]",
+                y_label=f"error [{unit}]",
+                series=(
+                    Series(x=poses.q[:, j], y=factor * poses.before, name="description", kind="markers", role="second"),
+                    Series(
+                        x=poses.q[:, j],
+                        y=factor * poses.held_out,
+                        name="calibrated, held out",
+                        kind="markers",
+                        role="main",
+                    ),
+                ),
+            )
+        )
+    return Picture(name="joints", title="Error over the position of each joint", panels=tuple(panels), columns=2)
+
+
+def _cause_paragraphs(calibration: Calibration) -> tuple[str, ...]:
+    found = calibration.causes.get("findings", ())
+    if not found:
+        return ("No single cause is significant.",)
+    return (
+        "Causes of what the description gets wrong, those with the largest share of the squared error first. The table "
+        "has the p-value of each by itself.",
+    )
+
+
+def _load_picture(calibration: Calibration) -> Iterator[Picture]:
+    """The error over what bends the arm, and over the direction in which each joint came to the pose."""
+    unit, factor = SHOWN[calibration.unit]
+    poses, robot = calibration.poses, calibration.robot
+    drivers = []
+    if robot.has_masses:
+        torque = axis_loads(robot, ArmState(q=poses.q, load=gravity_loads(robot, poses.q)))
+        drivers.append(("loads", "Error over the torque of gravity", "torque of gravity [N m or N]", torque))
+    drivers.append(("approaches", "Error over the direction of approach", "direction", approaches(poses.q)))
+    for name, title, label, values in drivers:
+        panels = [
+            Panel(
+                title=joint,
+                x_label=label,
+                y_label=f"error [{unit}]",
+                series=(
+                    Series(x=values[:, j], y=factor * poses.before, name="description", kind="markers", role="second"),
+                    Series(
+                        x=values[:, j],
+                        y=factor * poses.held_out,
+                        name="calibrated, held out",
+                        kind="markers",
+                        role="main",
+                    ),
+                ),
+            )
+            for j, joint in enumerate(joint_titles(robot.joint_names, robot.n))
+        ]
+        yield Picture(name=name, title=title, panels=tuple(panels), columns=2)
+
+
+def _evidence_table(calibration: Calibration) -> Table:
+    evidence = calibration.causes.get("evidence", {})
+    ranked = sorted(evidence.items(), key=lambda pair: pair[1])
+    rows: list[tuple[Cell, ...]] = [(label, "below 0.001" if p < 0.001 else f"{p:.2g}") for label, p in ranked]
+    return Table(
+        headings=("cause", "p-value by itself"),
+        rows=tuple(rows),
+        caption="Each alone beside the setup, corrected for the number of causes.",
+    )
+
+
+def _level_table(calibration: Calibration) -> Table:
+    levels, unit = calibration.levels, SHOWN[calibration.unit]
+    rows: list[tuple[Cell, ...]] = [
+        ("description, setup fitted", unit[1] * levels.before),
+        ("calibrated, fitted poses", unit[1] * levels.after),
+        ("calibrated, held-out poses", unit[1] * levels.held_out),
+        ("  within the range of the others", _cell(unit[1] * levels.inside)),
+        (f"  outside it ({levels.outside_count} poses)", _cell(unit[1] * levels.outside)),
+    ]
+    if calibration.repeatability is not None:
+        rows.append(("repeated poses (floor)", unit[1] * calibration.repeatability.error))
+    if calibration.check is not None:
+        rows += [
+            ("other file: description", unit[1] * calibration.check.before),
+            ("other file: calibrated", unit[1] * calibration.check.held_out),
+        ]
+    return Table(headings=("poses", f"RMS error [{unit[0]}]"), rows=tuple(rows))
+
+
+def _trial_table(calibration: Calibration) -> Table:
+    unit, factor = SHOWN[calibration.unit]
+    rows: list[tuple[Cell, ...]] = [
+        (error_term(t.kind).title, factor * t.without, factor * t.with_it, "yes" if t.added else "no")
+        for t in calibration.trials
+    ]
+    return Table(
+        headings=("kind of errors", f"held-out error without [{unit}]", f"with [{unit}]", "supported"),
+        rows=tuple(rows),
+        caption="Kinds of errors in the order in which they were added; those without support last.",
+    )
+
+
+def _parameter_table(calibration: Calibration) -> Table:
+    rows: list[tuple[Cell, ...]] = []
+    for item in calibration.parameters:
+        unit, factor = item.shown
+        half = factor * item.standard_error
+        rows.append((item.name, factor * item.value, half, factor * item.lower, factor * item.upper, unit))
+    return Table(
+        headings=("parameter", "value", "standard error", "lower", "upper", "unit"),
+        rows=tuple(rows),
+        caption="Lower and upper end of the 95 % interval.",
+    )
+
+
+def _open_table(calibration: Calibration) -> Table:
+    rows: list[tuple[Cell, ...]] = [
+        (item.name, "no pose" if item.reason == "redundant" else "other poses", item.sentence())
+        for item in calibration.undetermined
+    ]
+    return Table(headings=("parameter", "what would show it", "why"), rows=tuple(rows))
+
+
+def _worst(calibration: Calibration) -> list[int]:
+    errors = np.nan_to_num(calibration.poses.held_out, nan=-1.0)
+    return [int(k) for k in np.argsort(-errors)[:WORST]]
+
+
+def _worst_table(calibration: Calibration) -> Table:
+    unit, factor = SHOWN[calibration.unit]
+    poses = calibration.poses
+    rows: list[tuple[Cell, ...]] = [
+        (k + 1, int(poses.line[k]), _cell(factor * poses.before[k]), _cell(factor * poses.held_out[k]))
+        for k in _worst(calibration)
+    ]
+    return Table(headings=("pose", "line", f"before [{unit}]", f"after, held out [{unit}]"), rows=tuple(rows))
+
+
+def _animation(calibration: Calibration) -> Animation:
+    q = calibration.poses.q[_worst(calibration)]
+    return animate(calibration.corrected, visiting(calibration.robot, q), margins=(), source="tour of the worst poses")
+
+
+def visiting(robot: Robot, q: Array) -> Motion:
+    """A motion for pictures that holds at each pose and moves smoothly to the next.
+
+    Args:
+        robot: for the number of joints.
+        q: poses (K, n) [rad or m].
+    """
+    rows: list[Array] = []
+    share = np.arange(0.0, 1.0, STEP / MOVE)
+    smooth = 0.5 - 0.5 * np.cos(np.pi * share)
+    for k, pose in enumerate(q):
+        rows.append(np.repeat(pose[None], max(int(HOLD / STEP), 2), axis=0))
+        if k + 1 < len(q):
+            rows.append(pose + smooth[:, None] * (q[k + 1] - pose))
+    path = np.vstack(rows)
+    t = np.asarray(STEP * np.arange(len(path)), dtype=float)
+    speed = np.gradient(path, STEP, axis=0)
+    return Motion(t=t, q=path, dq=speed, ddq=np.gradient(speed, STEP, axis=0))
+
+
+def _cell(value: float) -> float | None:
+    return float(value) if np.isfinite(value) else None

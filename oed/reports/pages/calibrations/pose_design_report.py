@@ -1,0 +1,103 @@
+"""The page of a design of poses."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from oed.experiments.pose_designs import PoseDesign, observability_indices
+from oed.experiments.pose_designs.result import SHOWN
+from oed.experiments.safety_checks.freedom import freedom_text, is_free
+from oed.reports.animations.building import animate
+from oed.reports.rendering.page import Cell, Fact, Finding, Page, Section, Table
+from oed.reports.rendering.picture import Panel, Picture, Series
+from oed.reports.rendering.provenance import footer
+from oed.reports.rendering.saving import save_page
+from robots.common.files import ResultFolder
+
+
+def save_pose_design_report(design: PoseDesign, folder: ResultFolder, *, png: bool = False) -> None:
+    """Writes the page of a design of poses, and its picture as PNG on request."""
+    save_page(pose_design_page(design), folder, png=png)
+
+
+def pose_design_page(design: PoseDesign) -> Page:
+    """Builds the page: what the poses determine, the robot in 3-D on its way, and the poses."""
+    unit, factor = SHOWN[design.unit]
+    findings = []
+    if design.freedom is None:
+        findings.append(Finding(code="collision.unchecked", text=freedom_text(None)))
+    elif not is_free(design.freedom):
+        findings.append(Finding(code="collision.found", text=freedom_text(design.freedom)))
+    if design.left_out:
+        findings.append(
+            Finding(code="experiment.note", text=f"{design.left_out} poses were left out: no free move reaches them.")
+        )
+    return Page(
+        title="Poses for a calibration",
+        robot=design.robot.name,
+        verdict=(
+            f"Measured at these {len(design.q)} poses, the calibrated robot is expected to be right to "
+            f"{factor * design.prediction:.3g} {unit}, if the kinds of errors are these and the noise is as stated."
+        ),
+        findings=tuple(findings),
+        facts=(
+            Fact(label="Poses", value=len(design.q), note=f"{design.motion.duration:.0f} s of motion"),
+            Fact(label="Parameters", value=len(design.parameters)),
+            Fact(label="O1", value=design.observability["O1"], note="observability index"),
+        ),
+        sections=(
+            Section(
+                title="Motion",
+                paragraphs=("The robot rests at each pose while it is measured.", freedom_text(design.freedom)),
+                animation=animate(design.robot, design.motion, margins=(), source="tour of the poses"),
+            ),
+            Section(title="Observability", pictures=(_picture(design),), tables=(_indices(design),)),
+            Section(title="Expected standard errors", tables=(_expected(design),)),
+            Section(title="Poses", tables=(_poses(design),), folded=True),
+        ),
+        footer=footer(),
+    )
+
+
+def _picture(design: PoseDesign) -> Picture:
+    series = tuple(
+        Series(
+            x=np.arange(1.0, len(values) + 1.0),
+            y=np.sqrt(np.maximum(values, 1e-300))[::-1],
+            name=name,
+            kind="markers",
+            role=role,
+        )
+        for values, name, role in (
+            (design.eigenvalues, "designed", "main"),
+            (design.random_eigenvalues, "random", "second"),
+        )
+    )
+    panel = Panel(
+        title="Singular values of the scaled Jacobian",
+        x_label="direction",
+        y_label="singular value",
+        series=series,
+    )
+    return Picture(name="singular_values", title="How well each direction is determined", panels=(panel,))
+
+
+def _indices(design: PoseDesign) -> Table:
+    own, other = design.observability, observability_indices(design.random_eigenvalues, len(design.q))
+    rows: list[tuple[Cell, ...]] = [(name, own[name], other[name]) for name in own]
+    return Table(headings=("index", "designed", "as many random poses"), rows=tuple(rows))
+
+
+def _expected(design: PoseDesign) -> Table:
+    rows: list[tuple[Cell, ...]] = []
+    for item, error in zip(design.parameters, design.expected, strict=True):
+        unit, factor = item.shown
+        rows.append((item.name, factor * float(error) if np.isfinite(error) else None, unit))
+    return Table(headings=("parameter", "expected standard error", "unit"), rows=tuple(rows))
+
+
+def _poses(design: PoseDesign) -> Table:
+    limits = design.robot.limits
+    headings = ("pose", *(f"q{i + 1} [{limits.unit(i)}]" for i in range(design.robot.n)))
+    rows: list[tuple[Cell, ...]] = [(k + 1, *map(float, pose)) for k, pose in enumerate(design.q)]
+    return Table(headings=headings, rows=tuple(rows))
