@@ -29,7 +29,7 @@ MOST = 30  # causes that are named
 NEW = 1e-6  # share of a column that the causes before do not explain already
 RIVAL = 6.0  # of the evidence (log of the odds), within which another cause may be meant
 PERMUTATIONS = 999
-LARGEST = 500  # poses that are compared with each other
+LARGEST = 400  # poses that are looked at, evenly chosen
 SINGLE = 0.1  # share of outliers, above which they are no single faults and count
 
 
@@ -72,6 +72,11 @@ def diagnose_geometry(
     rows = np.ones(len(poses), dtype=bool) if used is None else used
     if np.mean(~rows) > SINGLE:
         rows = np.ones(len(poses), dtype=bool)
+    counted = np.flatnonzero(rows)
+    if len(counted) > LARGEST:
+        # More poses make no cause clearer that these do not show.
+        rows = np.zeros(len(poses), dtype=bool)
+        rows[counted[np.linspace(0, len(counted) - 1, LARGEST).astype(int)]] = True
     weights = Weights(sigma=fit.weights.sigma, pose=rows.astype(float))
     # Taking the fitted errors back leaves what the description gets wrong.
     target = found.residual + found.jacobian[:, :, :errors] @ theta
@@ -237,8 +242,6 @@ class _Search:
         factor = self.weights.rows(self.model.poses.measurement.units)
         whole[np.isfinite(self.found.residual) & (factor > 0.0)] = left
         rows = np.flatnonzero(self.weights.pose > 0.0)
-        if len(rows) > LARGEST:
-            rows = rows[np.linspace(0, len(rows) - 1, LARGEST).astype(int)]
         whole, q = whole[rows], self.model.poses.q[rows]
         span = np.ptp(q, axis=0)
         places = self.model.robots[0].chain.flange(q)[:, :3, 3]
