@@ -188,7 +188,14 @@ class Estimate:
         return "\n".join(lines)
 
     def conf_int(self, level: float = 0.95) -> pd.DataFrame:
-        """Gives the confidence interval of each parameter, see `Model.conf_int`."""
+        """Gives the confidence interval of each parameter, see `Model.conf_int`.
+
+        Args:
+            level: chance that an interval holds the parameter, between 0 and 1.
+
+        Returns:
+            A row per parameter: lower, upper.
+        """
         return self.model.conf_int(level)
 
     def to_frame(self) -> pd.DataFrame:

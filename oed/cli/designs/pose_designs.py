@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
-import numpy as np
 import typer
 
 from oed.cli.options import numbers
@@ -155,6 +155,6 @@ def _view(origin: str | None, towards: str | None, cone: float, facing: str | No
     return View(
         origin=place,
         towards=numbers("--view-towards", towards),
-        cone=float(np.deg2rad(cone)),
+        cone=math.radians(cone),
         axis=numbers("--facing", facing),
     )
