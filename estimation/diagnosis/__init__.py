@@ -4,10 +4,5 @@ from __future__ import annotations
 
 from robots.common.lazy import lazy_exports
 
-_EXPORTS = {
-    "Diagnosis": "estimation.diagnosis.results.diagnosis",
-    "Finding": "estimation.diagnosis.results.diagnosis",
-    "diagnose": "estimation.diagnosis.pipeline",
-}
-__all__ = list(_EXPORTS)
-__getattr__ = lazy_exports(__name__, _EXPORTS)
+# The stub beside this file says which module has which name.
+__getattr__, __dir__, __all__ = lazy_exports(__name__, __file__)

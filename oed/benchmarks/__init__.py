@@ -1,19 +1,8 @@
 """The hidden-effect benchmark: blind cases, answers of any tool, and their scores."""
 
-from robots.common.lazy import lazy_exports, listed
+from __future__ import annotations
 
-_EXPORTS = {
-    "Answers": "oed.benchmarks.answers",
-    "Benchmark": "oed.benchmarks.folders",
-    "MakeOptions": "oed.benchmarks.making",
-    "Scores": "oed.benchmarks.scores",
-    "answer_benchmark": "oed.benchmarks.solving",
-    "make_benchmark": "oed.benchmarks.making",
-    "read_answers": "oed.benchmarks.answers",
-    "read_benchmark": "oed.benchmarks.folders",
-    "score_benchmark": "oed.benchmarks.scores",
-    "write_answers": "oed.benchmarks.answers",
-}
-__all__ = list(_EXPORTS)
-__getattr__ = lazy_exports(__name__, _EXPORTS)
-__dir__ = listed(_EXPORTS)
+from robots.common.lazy import lazy_exports
+
+# The stub beside this file says which module has which name.
+__getattr__, __dir__, __all__ = lazy_exports(__name__, __file__)

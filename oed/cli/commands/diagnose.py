@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from contextlib import ExitStack
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -265,9 +266,8 @@ def _diagnosis(
         # Opened before the work: an existing file ends the command early.
         streams = {path: files.enter_context(open_atomic(path, force=force)) for path in models if path}
         with ResultFolder(out, force, names=["diagnosis.json", "model.json", "report.html"]) as folder:
-            given = {"n": robot.n, "mapping": mapping, "joints": robot.joint_names, "kinds": robot.chain.kinds}
-            read = list(read_logs(logs, **given))
-            other = list(read_logs(held_out, **given)) if held_out else []
+            reader = partial(read_logs, n=robot.n, mapping=mapping, joints=robot.joint_names, kinds=robot.chain.kinds)
+            read, other = list(reader(logs)), list(reader(held_out)) if held_out else []
             # Held-out logs are numbered after the others.
             both = with_known_setup([*read, *other], *known)
             robot, both = with_torque_meaning(robot, both, torque_is, both[: len(read)])

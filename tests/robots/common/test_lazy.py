@@ -3,8 +3,12 @@
 from __future__ import annotations
 
 import importlib
+import math
 import subprocess
 import sys
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -14,18 +18,43 @@ PACKAGES = ("robots", "estimation", "oed")
 HEAVY = ("casadi", "pandas", "pinocchio", "matplotlib", "scipy", "plotly", "cvxpy", "ruckig", "toppra", "pyarrow")
 
 
-def test_loads_on_use() -> None:
-    """A name is imported from its module when it is asked for."""
-    load = lazy_exports("made", {"sqrt": "math"})
-    import math
+@pytest.fixture
+def exports(tmp_path: Path) -> tuple[Callable[[str], Any], Callable[[], list[str]], list[str]]:
+    """What a package with one public name gets from its stub."""
+    (tmp_path / "__init__.pyi").write_text("from math import sqrt as sqrt\nfrom robots.version import __version__\n")
+    return lazy_exports("made", str(tmp_path / "__init__.py"))
 
+
+def test_loads_on_use(exports: tuple[Callable[[str], Any], Callable[[], list[str]], list[str]]) -> None:
+    """A name is imported from the module that the stub states, when it is asked for."""
+    load, listed, public = exports
     assert load("sqrt") is math.sqrt
+    assert listed() == ["__version__", "sqrt"]
+    assert public == ["sqrt"]
 
 
-def test_unknown_name() -> None:
+def test_unknown_name(exports: tuple[Callable[[str], Any], Callable[[], list[str]], list[str]]) -> None:
     """Any other name is missing, as in every module."""
     with pytest.raises(AttributeError, match="module 'made' has no attribute 'nothing'"):
-        lazy_exports("made", {"sqrt": "math"})("nothing")
+        exports[0]("nothing")
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("package", PACKAGES)
+def test_a_misspelt_name_is_an_error_of_types(tmp_path: Path, package: str) -> None:
+    """A type checker finds every public name of a package, and none that there is not."""
+    names = importlib.import_module(package).__all__
+    (tmp_path / "use.py").write_text(
+        "\n".join([f"import {package}", *(f"{package}.{n}" for n in names), f"{package}.none"])
+    )
+    root = Path(__file__).parents[3]
+    # What the stub imports is skipped: the packages themselves are checked elsewhere.
+    options = ["--config-file", "", "--follow-imports", "skip", "--no-incremental", "--explicit-package-bases"]
+    command = [sys.executable, "-m", "mypy", *options, str(tmp_path / "use.py"), str(root / package / "__init__.pyi")]
+    done = subprocess.run(command, cwd=root, capture_output=True, text=True)
+    errors = [line for line in done.stdout.splitlines() if "error:" in line and "use.py" in line]
+    assert len(errors) == 1, done.stdout + done.stderr
+    assert '"none"' in errors[0]
 
 
 @pytest.mark.parametrize("package", PACKAGES)
