@@ -14,15 +14,15 @@ from estimation.gate.quick_fits.gravity_rows import gravity_rows
 from estimation.gate.quick_fits.joint_columns import OWN
 from estimation.gate.stages.fitted import Fitted
 from robots.common.plain import joints_in_words, two_digits
-from robots.common.stretches import spans
+from robots.common.stretches import joined_spans
 
 Array = NDArray[np.float64]
 
 # Share of the fitted weight that the torque at rest has at most, and of the largest torque that this weight has at
 # least.
 UNLOADED, HEAVY = 0.1, 0.2
-# Stretches that are listed.
-LISTED = 3
+# Stretches that are listed, and rows at rest that are looked at.
+LISTED, ROWS = 3, 1000
 
 
 class UnloadedRest(Check):
@@ -35,17 +35,24 @@ class UnloadedRest(Check):
     def run(self, context: Context) -> list[Finding]:
         """Compares the torques at rest with the weight that the fit of the motion gives."""
         fitted = context.fitted
-        weight = _static_torques(fitted)
+        at = np.flatnonzero(fitted.rows.rest.any(axis=1))
+        if not len(at):
+            return []
+        at = at[:: max(1, len(at) // ROWS)]
+        static = _static_torques(fitted, at)
         tau = np.column_stack([fitted.rows.raw(j) for j in range(fitted.robot.n)])
-        rest = fitted.rows.rest & (np.abs(weight) > HEAVY * np.abs(tau).max(axis=0)) & (weight != 0)
-        unloaded = rest & (np.abs(tau) < UNLOADED * np.abs(weight))
+        rest = fitted.rows.rest[at] & (np.abs(static) > HEAVY * np.abs(tau).max(axis=0)) & (static != 0)
+        unloaded = rest & (np.abs(tau[at]) < UNLOADED * np.abs(static))
         joints = [j for j in range(fitted.robot.n) if unloaded[:, j].sum() > 0.5 * rest[:, j].sum() > 0]
         if not joints:
             return []
         t = np.concatenate([part.t for part in fitted.rows.excerpts]) - context.recorded.log.t[0]
-        times = [f"{t[a]:.3g} to {t[b - 1]:.3g} s" for a, b in spans(unloaded[:, joints].any(axis=1)) if b - a > 1]
+        flags = np.zeros(len(t), dtype=bool)
+        flags[at] = unloaded[:, joints].any(axis=1)
+        gap = 2 * float(np.median(np.diff(t[at]))) if len(at) > 1 else 0.0
+        times = [f"{t[a]:.3g} to {t[b - 1]:.3g} s" for a, b in joined_spans(flags, t, gap) if b - a > 1]
         where = ", ".join(times[:LISTED]) + (f" and {len(times) - LISTED} times more" if len(times) > LISTED else "")
-        most = [float(np.abs(weight[unloaded[:, j], j]).max()) for j in joints]
+        most = [float(np.abs(static[unloaded[:, j], j]).max()) for j in joints]
         return [
             Finding(
                 name="unloaded_rest",
@@ -60,14 +67,14 @@ class UnloadedRest(Check):
         ]
 
 
-def _static_torques(fitted: Fitted) -> Array:
-    """Gives the torque of gravity and offset (M, n) by the fits of the joints, as far as friction cannot hold it.
+def _static_torques(fitted: Fitted, at: NDArray[np.intp]) -> Array:
+    """Gives the torque of gravity and offset (K, n) in rows (K,), as far as friction cannot hold it.
 
     It is zero for a joint without a fit.
     """
-    rows, robot = fitted.rows, fitted.robot
-    heavy = np.einsum("jmkp,k->jmp", gravity_rows(robot, rows.q), np.asarray(robot.chain.gravity))
-    torques = np.zeros(rows.q.shape)
+    q, robot = fitted.rows.q[at], fitted.robot
+    heavy = np.einsum("jmkp,k->jmp", gravity_rows(robot, q), np.asarray(robot.chain.gravity))
+    torques = np.zeros(q.shape)
     for joint, fit in enumerate(fitted.fits):
         if fit is not None:
             values = fit.values / fit.scale

@@ -87,4 +87,4 @@ def test_a_motion_for_drives(run, files: Path, tmp_path: Path) -> None:
     refused = run(*words, "--criterion", "d", "--out", tmp_path / "other")
     assert (refused.code, "--criterion does not apply with --for actuators" in refused.err) == (2, True)
     refused = run("design", "--for", "drives", "--robot", "er3a", "--out", tmp_path / "other")
-    assert (refused.code, "--for drives; allowed: dynamics or actuators" in refused.err) == (2, True)
+    assert (refused.code, "--for drives; allowed: dynamics, calibration, actuators" in refused.err) == (2, True)
