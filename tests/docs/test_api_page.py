@@ -13,6 +13,9 @@ PAGE = (Path(__file__).parents[2] / "docs" / "api.md").read_text(encoding="utf-8
 
 @pytest.mark.parametrize("package", ["oed", "estimation", "robots"])
 def test_public_names_are_documented(package):
-    """Every public name of a package is on the page, and nothing else is."""
-    documented = re.findall(rf"^\.\. auto\w+:: {package}\.(?:\w+\.)*(\w+)$", PAGE, flags=re.MULTILINE)
-    assert sorted(documented) == sorted(importlib.import_module(package).__all__)
+    """Every public name of a package is on the page, and nothing else but public names of its own packages."""
+    documented = re.findall(rf"^\.\. auto\w+:: ({package}(?:\.\w+)*)\.(\w+)$", PAGE, flags=re.MULTILINE)
+    public = importlib.import_module(package).__all__
+    assert set(public) <= {name for _, name in documented}
+    for module, name in documented:
+        assert name in public or name in importlib.import_module(module).__all__
