@@ -247,13 +247,13 @@ def causes(cases: int, without: int) -> None:
         kind = CAUSES[number % len(CAUSES)] if number < cases else "none"
         robot, joint, poses = hidden(kind, number, robots)
         found = calibrate(robot, poses).causes["findings"]
-        told = [(item["cause"], item["joint"]) for item in found]
-        right = bool(told) and told[0] == (kind, joint)
-        extra = len(told) - (1 if right else 0)
+        causes = [(item["cause"], item["joint"]) for item in found]
+        right = bool(causes) and causes[0] == (kind, joint)
+        extra = len(causes) - (1 if right else 0)
         named += right
         false += extra
         print(
-            f"{number:3} {robot.name:6} {kind:13} {joint} -> {told}{'' if right or kind == 'none' else '  MISSED'}"
+            f"{number:3} {robot.name:6} {kind:13} {joint} -> {causes}{'' if right or kind == 'none' else '  MISSED'}"
             f"{'' if not extra else '  FALSE'}",
             flush=True,
         )

@@ -76,9 +76,14 @@ class DriveDesign:
     collisions: str = UNKNOWN_COLLISIONS
 
     @property
+    def collides(self) -> bool:
+        """Whether the check found a collision."""
+        return self.collisions.startswith("COLLIDES")
+
+    @property
     def success(self) -> bool:
         """Whether the motion is better than a chirp in most parameters, and does not collide."""
-        return bool(self.ratio < 1) and not self.collisions.startswith("COLLIDES")
+        return bool(self.ratio < 1) and not self.collides
 
     @property
     def ratio(self) -> float:

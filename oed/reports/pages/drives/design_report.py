@@ -40,7 +40,7 @@ def drive_design_page(design: DriveDesign) -> Page:
         title="Motion for drives",
         robot=design.robot,
         verdict=f"Do not play this motion. {design.collisions}"
-        if design.collisions.startswith("COLLIDES")
+        if design.collides
         else f"Standard errors will be {design.ratio:.2g} times those of a chirp of the same time and limits.",
         findings=findings_of("experiment.note", [design.collisions]),
         facts=(
