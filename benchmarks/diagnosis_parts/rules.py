@@ -132,7 +132,7 @@ RULES: dict[str, Rule] = {
         ("validations.held_out_validation:_is_insignificant",), _no, lambda result, _: bool(result), late=True
     ),
     "free functions together": Rule(
-        ("validations.held_out_validation:_harmful_free_functions",),
+        ("validations.held_out_validation:_harmful_together",),
         lambda *_: [],
         lambda result, _: bool(result),
         True,
