@@ -17,13 +17,11 @@ from estimation.linear_algebra.scaled import lengths
 from estimation.preprocessing import Harmonics
 from estimation.regressions.joint_regressor import JointRegressor, chunks
 from estimation.regressions.moments import Moments
-from estimation.regressions.preparation import Prepared, Rows, prepare_all
+from estimation.regressions.preparation import Prepared, Rows
 from estimation.uncertainty.blocks import circular_block_counts
 from robots.base_parameters import find_base_parameters
 from robots.common.errors import InputError, NotIdentifiableError
 from robots.common.parallel import one_blas_thread, threaded
-from robots.robot import Robot
-from robots.signals import Log
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -98,9 +96,7 @@ class Bootstrap:
 
 
 @one_blas_thread()
-def bootstrap(
-    robot: Robot, logs: Log | Sequence[Log], estimate: Estimate, *, resamples: int = 500, seed: int = 0
-) -> Bootstrap:
+def bootstrap(estimate: Estimate, *, resamples: int = 500, seed: int = 0) -> Bootstrap:
     """Refits to resampled data, and compares the scatter with the stated standard errors.
 
     Whole logs are drawn if there are eight or more, whole periods if the motion repeats eight times or more, otherwise
@@ -110,9 +106,7 @@ def bootstrap(
     multiplied by sqrt(K / (K - 1)), and is itself uncertain by a share of 1 / sqrt(2 K).
 
     Args:
-        robot: the robot.
-        logs: what the estimate was made of.
-        estimate: by ``wls`` or ``ols``.
+        estimate: by ``wls`` or ``ols``, with its recording.
         resamples: how many refits.
         seed: of the draws.
 
@@ -120,7 +114,7 @@ def bootstrap(
         Both standard errors of each parameter.
 
     Raises:
-        InputError: an estimate of another robot or method, other logs, or less than two resamples.
+        InputError: an estimate of another method or of a log that was read in pieces, or less than two resamples.
         NotIdentifiableError: too little data to be resampled.
 
     Source: Kuensch, "The jackknife and the bootstrap for general stationary observations", Ann. Stat. 17 (1989).
@@ -131,23 +125,16 @@ def bootstrap(
         raise InputError(f"an estimate by {method}", allowed=" or ".join(METHODS))
     if resamples < 2:
         raise InputError(f"{resamples} resamples", allowed="2 or more")
-    data = [logs] if isinstance(logs, Log) else list(logs)
-    gates = estimate.gates
-    if gates and len(gates) != len(data):
-        raise InputError(f"{len(data)} logs", allowed=f"{len(gates)}, as in the estimate")
+    if estimate.recording is None:
+        raise InputError("an estimate of a log that was read in pieces", allowed="one whose logs are in memory")
     base = find_base_parameters(model.torque_model, gravities=model.gravities)
-    if base.independent != tuple(model.columns) or robot.n != model.robot.n:
-        raise InputError("the estimate is of another robot", remedy="identify it again")
-    usable = [part for log, gate in zip(data, gates, strict=True) for part in gate.usable(log)] if gates else data
-    prepared = prepare_all(robot, usable)
+    prepared = estimate.recording.prepared
     rows = [log.rows(choice.smoother) for log in prepared]
-    if sum(len(part.motion) for part in rows) != len(estimate.t):
-        raise InputError("other logs", allowed="the logs of the estimate")
     kind, pieces, moving = _pieces(prepared, rows, estimate)
     regressor = JointRegressor(base)
     found = list(threaded(lambda piece: _moments(regressor, *piece), pieces))
     total = reduce(add, found)
-    weights = 1.0 / total.level(model.values) ** 2 if method == "wls" else np.ones(robot.n)
+    weights = 1.0 / total.level(model.values) ** 2 if method == "wls" else np.ones(model.robot.n)
     gram = np.array([np.tensordot(weights, part.gram, axes=1) for part in found])
     cross = np.array([weights @ part.cross for part in found])
     values = _refits(gram, cross, moving, resamples, np.random.default_rng(seed))

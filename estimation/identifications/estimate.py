@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from estimation.gate import GateReport
 from estimation.identifications.choices import Choice
 from estimation.models.model import Model
+from estimation.recordings import Recording
 from robots.common.plain import finite, percent
 
 if TYPE_CHECKING:
@@ -75,6 +76,7 @@ class Estimate:
         predicted: by the model (N, n).
         dropped_rows: rows of the logs that repeated an old position.
         gates: what the gate found in each log; empty where it was not asked.
+        recording: the logs as they were made ready; None where the log was read in pieces.
         fitted_rows: number of fitted rows, where the arrays hold evenly spread stretches of a log that was read in
             pieces; None where they hold all.
     """
@@ -89,6 +91,7 @@ class Estimate:
     predicted: Array
     dropped_rows: int
     gates: tuple[GateReport, ...] = ()
+    recording: Recording | None = field(default=None, repr=False)
     fitted_rows: int | None = None
 
     @property

@@ -9,7 +9,6 @@ from numpy.typing import NDArray
 
 from estimation.estimators import Estimator
 from estimation.estimators import estimator as choose_estimator
-from estimation.gate import check_logs
 from estimation.identifications.choices import Candidates, Choice, choose
 from estimation.identifications.estimate import Estimate, JointFit, colour_of
 from estimation.identifications.fit import Fit, fit
@@ -19,11 +18,11 @@ from estimation.logs.known_setup import gravities_of, require_plain
 from estimation.logs.provenance import describe_logs
 from estimation.models.model import Model
 from estimation.preprocessing import Harmonics
-from estimation.regressions.preparation import Prepared, prepare_all
-from estimation.regressions.torque_meanings import as_joint_torque, with_torque_constants
+from estimation.recordings import make_ready
+from estimation.regressions.preparation import Prepared
 from estimation.uncertainty import fast_noise, period_noise
 from estimation.uncertainty.quantiles import band_of
-from robots.common.errors import InputError, NotIdentifiableError
+from robots.common.errors import NotIdentifiableError
 from robots.common.parallel import one_blas_thread
 from robots.common.progress import SILENT, Progress
 from robots.robot import Robot
@@ -86,21 +85,14 @@ def identify(
         NotIdentifiableError: logs in which no joint moves, or no joint's torque can be predicted.
     """
     chosen = choose_estimator(method)
-    data = [logs] if isinstance(logs, Log) else list(logs)
-    robot = with_torque_constants(robot, data)
-    data = [as_joint_torque(robot, log, estimate=False) for log in data]
-    if not data:
-        raise InputError("no logs", allowed="one or more")
+    given = [logs] if isinstance(logs, Log) else list(logs)
     if chosen.simulates:
-        require_plain(data, f"the method {chosen.name}")
+        require_plain(given, f"the method {chosen.name}")
     bar = progress or SILENT
     bar.start("identifying", 3.0)
-    _require_motion(data)
-    gates = check_logs(robot, data, lambda: bar.update(0.0, "checking the logs")) if check else ()
-    parts = [gate.usable(log) for log, gate in zip(data, gates, strict=True)] if gates else [(log,) for log in data]
-    data = [log for log, own in zip(data, parts, strict=True) if own]
-    usable = [part for own in parts for part in own]
-    prepared = prepare_all(robot, usable)
+    _require_motion(given)
+    recording = make_ready(robot, given, check=check, before_each=lambda: bar.update(0.0, "checking the logs"))
+    robot, data, prepared = recording.robot, recording.used, recording.prepared
     by_position = friction == "auto" if position is None else position
     if friction == "auto":
         friction = BendingFriction.within(usual_speeds(prepared))
@@ -146,7 +138,8 @@ def identify(
         measured=np.concatenate([part.tau for part in rows]),
         predicted=found.torque,
         dropped_rows=sum(log.positions.dropped for log in prepared),
-        gates=gates,
+        gates=recording.gates,
+        recording=recording,
     )
 
 
@@ -170,7 +163,7 @@ def recorded_ranges(q: Array, dq: Array, ddq: Array) -> dict[str, list[list[floa
 
 
 def _require_motion(logs: Sequence[Log]) -> None:
-    if not any(np.ptp(log.q, axis=0).any() for log in logs):
+    if logs and not any(np.ptp(log.q, axis=0).any() for log in logs):
         raise NotIdentifiableError("no joint moves", remedy="record a log in which the arm moves")
 
 

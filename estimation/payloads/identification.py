@@ -8,7 +8,6 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from estimation.gate import check_logs
 from estimation.identifications.estimate import Estimate
 from estimation.identifications.identification import identify
 from estimation.linear_algebra.scaled import floored_inverse
@@ -23,8 +22,8 @@ from estimation.payloads.intervals import quantities
 from estimation.payloads.paths import PathMatch, match_paths
 from estimation.payloads.physical import PhysicalBody, physical_body
 from estimation.payloads.result import JointEvidence, PayloadEstimate
+from estimation.recordings import Recording, make_ready
 from estimation.regressions.preparation import Prepared, Rows, prepare_all, still_joints
-from estimation.regressions.torque_meanings import as_joint_torque, with_torque_constants
 from robots.common.errors import InputError, NotIdentifiableError
 from robots.common.parallel import one_blas_thread
 from robots.common.progress import SILENT, Progress
@@ -89,11 +88,11 @@ def identify_payload(
     machine = robot if robot is not None else None if known is None else known.robot
     if machine is None:
         raise InputError("no robot", remedy="name the robot of the logs")
-    machine = with_torque_constants(machine, free)
-    loaded, free = ([as_joint_torque(machine, log, estimate=False) for log in some] for some in (loaded, free))
-    if free and estimate is None:
-        estimate = identify(machine, free, seed=seed, progress=progress)
-        known = estimate.model
+    reference = None
+    if free:
+        estimate = estimate or identify(machine, free, seed=seed, progress=progress)
+        known, reference = estimate.model, estimate.recording or make_ready(machine, free)
+        machine = reference.robot
     assert known is not None
     require_flange(known.robot)
     bar.start("fitting the payload", None)
@@ -102,32 +101,29 @@ def identify_payload(
             require_known(known.torque_model, known.columns, known.gravities, log.gravity)
     cutoff = float(known.provenance.get("cutoff_hz", CUTOFF))
     arm = _arm_of_logs(estimate) if estimate is not None and free else _arm_of_model(known)
-    carried, bare = _usable(machine, loaded), _usable(machine, free)
-    prepared = _prepared(machine, carried, bare, known)
+    prepared, carried = _prepared(make_ready(machine, loaded), reference, known)
     sources = [
-        Source.of(arm, rows, k < len(carried), _extra(known, rows), log.period)
+        Source.of(arm, rows, k < carried, _extra(known, rows), log.period)
         for k, (log, rows) in enumerate((log, log.rows(cutoff)) for log in prepared)
     ]
-    equations, match = _equations(arm, sources, len(carried))
+    equations, match = _equations(arm, sources, carried)
     period = float(np.median([log.positions.period for log in prepared]))
     found = fit_payload(arm, equations, period=period, seed=seed)
     bar.finish()
     return _result(machine, known, sources, found, match, loaded, free)
 
 
-def _usable(robot: Robot, logs: Sequence[Log]) -> list[Log]:
-    reports = check_logs(robot, logs) if logs else ()
-    return [part for log, report in zip(logs, reports, strict=True) for part in report.usable(log)]
-
-
-def _prepared(robot: Robot, loaded: Sequence[Log], free: Sequence[Log], model: Model) -> list[Prepared]:
-    prepared = prepare_all(robot, [*loaded, *free])
+def _prepared(loaded: Recording, free: Recording | None, model: Model) -> tuple[list[Prepared], int]:
+    """Prepares all logs together, those with the payload first, and counts these."""
+    carried, bare = ([part for own in some.parts for part in own] if some else [] for some in (loaded, free))
+    prepared = prepare_all(loaded.robot, [*carried, *bare])
     if free or "recorded" not in model.provenance:
-        return prepared
+        return prepared, len(carried)
     lowest, highest = np.asarray(model.provenance["recorded"]["position"], dtype=float)
     still = still_joints([log.positions.q for log in prepared], highest - lowest)
     # Friction holds a joint that stands with any torque.
-    return [replace(log, still=own, held=own) if own.any() else log for log, own in zip(prepared, still, strict=True)]
+    held = [replace(log, still=own, held=own) if own.any() else log for log, own in zip(prepared, still, strict=True)]
+    return held, len(carried)
 
 
 def _arm_of_logs(estimate: Estimate) -> Arm:

@@ -35,7 +35,7 @@ def coloured(arm_plant, fourier_motion):
 def by_periods(arm, coloured):
     log = coloured(24)
     estimate = identify(arm, log)
-    return log, estimate, bootstrap(arm, log, estimate)
+    return log, estimate, bootstrap(estimate)
 
 
 def test_periods_agree_with_the_sandwich(by_periods):
@@ -57,10 +57,10 @@ def test_moving_blocks_and_logs_agree_with_the_sandwich(arm, coloured):
     """Without periods, and with many logs, the errors agree as well; 1 in 1000 seeds fails wrongly."""
     log = coloured(4)
     estimate = identify(arm, log)
-    blocks = bootstrap(arm, log, estimate)
+    blocks = bootstrap(estimate)
     assert blocks.kind == "blocks"
     logs = [coloured(2, seed) for seed in range(10)]
-    found = bootstrap(arm, logs, identify(arm, logs))
+    found = bootstrap(identify(arm, logs))
     assert (found.kind, found.blocks) == ("logs", 10)
     for ratio in (blocks.ratio, found.ratio):
         assert 0.5 < ratio < 1.8
@@ -76,13 +76,13 @@ def test_a_mean_has_its_textbook_error():
 def test_the_same_seed_gives_the_same_errors(arm, by_periods):
     """Draws follow from the seed alone."""
     log, estimate, found = by_periods
-    np.testing.assert_array_equal(bootstrap(arm, log, estimate).errors, found.errors)
+    np.testing.assert_array_equal(bootstrap(estimate).errors, found.errors)
 
 
 def test_what_cannot_be_resampled_is_refused(arm, by_periods):
-    """Other logs, and too few resamples, are refused."""
+    """A log that was read in pieces, and too few resamples, are refused."""
     log, estimate, _ = by_periods
     with pytest.raises(InputError, match="resamples"):
-        bootstrap(arm, log, estimate, resamples=1)
-    with pytest.raises(InputError, match="logs"):
-        bootstrap(arm, [log, log], estimate)
+        bootstrap(estimate, resamples=1)
+    with pytest.raises(InputError, match="in pieces"):
+        bootstrap(replace(estimate, recording=None))
