@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from estimation.diagnosis.base_models.prepared_logs import prepare_logs
+from estimation.diagnosis.base_models.prepared_logs import TOLERATED, prepare_logs
 from estimation.diagnosis.experiment_plans.detection_limits import find_limits
 from estimation.diagnosis.hypothesis_tests.hypotheses import all_hypotheses
 from estimation.diagnosis.hypothesis_tests.scan import measure
@@ -15,25 +15,27 @@ from estimation.diagnosis.validations.decision import decide
 from estimation.diagnosis.validations.extended_model import fit_extended_model
 from estimation.diagnosis.validations.name_comparison import compare_with_free_functions
 from estimation.diagnosis.validations.validation import validate
-from estimation.regressions.torque_meanings import with_torque_constants
+from estimation.identifications.estimate import Estimate
+from estimation.recordings import Recording, make_ready
 from robots.common.errors import InputError
 from robots.common.memory import give_back
 from robots.common.parallel import one_blas_thread
 from robots.common.progress import SILENT, Progress
 from robots.robot import Robot
 from robots.signals import Log
+from robots.terms import BendingFriction, FrictionTerm
 from robots.terms.discrepancies.patterns import all_patterns
 from robots.terms.effects import EFFECTS, Effect, check_effect
 
 
 @one_blas_thread()
 def diagnose(
-    robot: Robot,
-    logs: Log | Sequence[Log],
+    what: Robot | Estimate,
+    logs: Log | Sequence[Log] = (),
     *,
     held_out: Log | Sequence[Log] | None = None,
     candidates: Sequence[str | Effect] | None = None,
-    friction: str = "auto",
+    friction: str | FrictionTerm | None = None,
     false_alarm: float = 0.01,
     check: bool = True,
     seed: int = 0,
@@ -49,17 +51,18 @@ def diagnose(
     compared by the Bayesian information criterion (Schwarz 1978).
 
     Args:
-        robot: the robot.
-        logs: one or several, of t, q and tau or current; t is one clock. Logs that overlap count one after the other,
-            in the order given. A log that says so carries a known payload, or was recorded under another gravity.
+        what: the robot; or its estimate, whose logs are then diagnosed as they were made ready for it.
+        logs: of a robot, one or several, of t, q and tau or current; t is one clock. Logs that overlap count one after
+            the other, in the order given. A log that says so carries a known payload, or was recorded under another
+            gravity.
         held_out: logs of other motions for validation; without them, logs or stretches are left out in turn.
         candidates: effects to look for, by name or as objects; by default all that are registered. An own effect is
             registered by being given.
         friction: of the base model: ``auto`` (`BendingFriction`, which grows linearly beyond the recorded speeds),
-            ``polynomial`` or ``coulomb-viscous``.
+            ``polynomial``, ``coulomb-viscous``, or a term of one's own. None: that of the estimate, or ``auto``.
         false_alarm: chance of finding an effect in logs that have none.
         check: whether each log passes the gate first, which rejects unusable logs. Outlier rows are then interpolated,
-            and logs are cut at gaps.
+            and logs are cut at gaps. The logs of an estimate were checked for it.
         seed: of the resampling behind the gains' intervals.
         progress: receives the progress.
 
@@ -67,22 +70,22 @@ def diagnose(
         The diagnosis.
 
     Raises:
-        InputError: logs of another robot, without torque, too short, given twice or refused by the gate; an unknown
-            effect or option.
+        InputError: logs of another robot, without torque, too short, given twice or refused by the gate; logs beside
+            an estimate, or an estimate of a log that was read in pieces; an unknown effect or option.
         NotIdentifiableError: no joint moves.
     """
     if not 0 < false_alarm < 0.5:
         raise InputError(f"false-alarm probability {false_alarm}", allowed="between 0 and 0.5")
-    given, other = _listed(logs), _listed(held_out)
-    if not given:
-        raise InputError("no logs", allowed="one or more")
-    robot = with_torque_constants(robot, given)
+    robot = what if isinstance(what, Robot) else what.model.robot
     effects = _effects(robot, candidates)
     bar = progress or SILENT
     bar.start("diagnosing", 1.0)
     try:
         bar.update(0.0, "checking the logs" if check else "reading the logs")
-        prepared = prepare_logs(robot, given, other, friction, check=check)
+        fit = make_ready(what, logs, check=check, tolerated=TOLERATED) if isinstance(what, Robot) else _of(what, logs)
+        robot = fit.robot
+        unseen = make_ready(robot, held_out, check=check, tolerated=TOLERATED) if held_out else None
+        prepared = prepare_logs(fit, unseen, friction or _friction_of(what))
         found = search(prepared.base, prepared.recording, effects, false_alarm, bar)
         bar.update(0.75, "detection limits")
         limits = find_limits(found.problem, found.entries, false_alarm=false_alarm)
@@ -103,8 +106,25 @@ def diagnose(
         bar.finish()
 
 
-def _listed(logs: Log | Sequence[Log] | None) -> list[Log]:
-    return [] if logs is None else [logs] if isinstance(logs, Log) else list(logs)
+def _of(estimate: Estimate, logs: Log | Sequence[Log]) -> Recording:
+    """The logs of an estimate, as they were made ready for it."""
+    if logs:
+        raise InputError("logs beside an estimate", allowed="the estimate, which has its logs; or a robot and logs")
+    if estimate.recording is None:
+        raise InputError(
+            "an estimate of a log that was read in pieces",
+            allowed="one whose logs are in memory",
+            remedy="diagnose the robot and a part of the log",
+        )
+    return estimate.recording
+
+
+def _friction_of(what: Robot | Estimate) -> str | FrictionTerm:
+    if isinstance(what, Robot):
+        return "auto"
+    term = next(term for term in what.model.torque_model.terms if isinstance(term, FrictionTerm))
+    # The bends of a diagnosis are finer: a curve that its base model cannot follow would have a name.
+    return "auto" if isinstance(term, BendingFriction) else term
 
 
 def _effects(robot: Robot, candidates: Sequence[str | Effect] | None) -> list[Effect]:

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,6 +12,7 @@ from numpy.typing import NDArray
 from estimation.gate.finding import Finding
 from estimation.gate.gate import check_log
 from estimation.gate.report import GateReport, worst_first
+from robots.common.forks import forked
 from robots.robot import Robot
 from robots.signals import Log
 
@@ -18,9 +20,7 @@ from robots.signals import Log
 REPEATED = 0.3
 
 
-def check_logs(
-    robot: Robot, logs: Sequence[Log], before_each: Callable[[], None] = lambda: None
-) -> tuple[GateReport, ...]:
+def check_logs(robot: Robot, logs: Sequence[Log], tolerated: Collection[str] = ()) -> tuple[GateReport, ...]:
     """Checks logs that are fitted together.
 
     A log that only rests, or is too short, is left out if others can be fitted. It has no fault, and a campaign has
@@ -29,7 +29,7 @@ def check_logs(
     Args:
         robot: the robot.
         logs: one or more.
-        before_each: is called before each log.
+        tolerated: names of findings that refuse no log: what is asked of the logs may be their cause.
 
     Returns:
         A report per log. `usable` of one that is left out is empty.
@@ -37,15 +37,13 @@ def check_logs(
     Raises:
         InputError: a log with a fault, or no log that can be fitted.
     """
-    reports = []
-    for log in logs:
-        before_each()
-        report = check_log(robot, log)
+    reports = forked(partial(check_log, robot), logs)
+    judged = [report.without(tolerated) for report in reports]
+    for report in judged:
         if not report.without_motion:
             report.raise_if_refused()
-        reports.append(report)
-    if all(report.without_motion for report in reports):
-        reports[0].raise_if_refused()
+    if all(report.without_motion for report in judged):
+        judged[0].raise_if_refused()
     keys = [_row_keys(log) for log in logs] if len(logs) > 1 else []
     for later, report in enumerate(reports):
         shares = [len(np.intersect1d(keys[later], other)) / max(len(keys[later]), 1) for other in keys[:later]]
@@ -53,7 +51,9 @@ def check_logs(
             earlier = int(np.argmax(shares))
             found = _repeated(logs[earlier], earlier, shares[earlier])
             reports[later] = replace(report, findings=worst_first([*report.findings, found]))
-    return tuple(report.left_out() if report.without_motion else report for report in reports)
+    return tuple(
+        report.left_out() if own.without_motion else report for report, own in zip(reports, judged, strict=True)
+    )
 
 
 def _row_keys(log: Log) -> NDArray[np.uint64]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
@@ -10,6 +11,7 @@ from numpy.typing import NDArray
 
 from estimation.gate.finding import SEVERITIES, Finding, Severity
 from estimation.gate.measurements.held_torque import between_updates
+from estimation.gate.measurements.outliers import interpolated
 from estimation.gate.measurements.timing import FEWEST
 from estimation.logs.torque_source import NO_TORQUE
 from robots.common.errors import InputError, NotIdentifiableError
@@ -130,11 +132,15 @@ class GateReport:
             remedy=first.action,
         )
 
-    def usable(self, log: Log) -> tuple[Log, ...]:
-        """Removes outliers and repeated rows, and splits the log at its gaps.
+    def usable(self, log: Log, *, interpolate: Collection[str] = (), shortest: float = 0.0) -> tuple[Log, ...]:
+        """Repairs the log and splits it at its gaps.
+
+        Rows with wrong times are left out, and so are rows with outliers where these are not interpolated.
 
         Args:
             log: the log that was checked.
+            interpolate: the columns whose outliers are interpolated: of ``q``, ``tau`` and ``current``.
+            shortest: duration [s] of the shortest part that is of use.
 
         Returns:
             Its parts of 20 samples or more; the log itself if it has no fault; nothing if the log is left out.
@@ -147,12 +153,16 @@ class GateReport:
         if not self.parts:
             return ()
         log = self.corrected(log)
-        if self.parts == ((0, len(log)),) and not len(self.spikes) and not len(self.stale):
-            return (log,)
+        if interpolate and len(self.spikes):
+            log = interpolated(log, interpolate)
         kept = np.ones(len(log), dtype=bool)
-        kept[self.spikes] = kept[self.stale] = False
+        kept[self.stale] = False
+        kept[self.spikes] &= bool(interpolate)
+        if self.parts == ((0, len(log)),) and kept.all():
+            return (log,)
         parts = [np.arange(first, stop)[kept[first:stop]] for first, stop in self.parts]
-        logs = tuple(log.rows(part) for part in parts if len(part) >= FEWEST)
+        long = [part for part in parts if len(part) >= FEWEST and log.t[part[-1]] - log.t[part[0]] >= shortest]
+        logs = tuple(log.rows(part) for part in long)
         if not logs:
             raise InputError("no part of the log is long enough", file=self.log or None, allowed=f"{FEWEST} rows")
         return logs
@@ -163,6 +173,10 @@ class GateReport:
         if not same_times or not same_angles:
             log = replace(log, t=log.t if same_times else self.t, q=log.q if same_angles else self.q)
         return between_updates(log, self.updates)
+
+    def without(self, names: Collection[str]) -> GateReport:
+        """Gives the report without findings of some names."""
+        return replace(self, findings=tuple(finding for finding in self.findings if finding.name not in names))
 
     def left_out(self) -> GateReport:
         """Gives the report for a log that is left out of a fit to several logs: nothing is refused or usable."""
@@ -176,14 +190,14 @@ class GateReport:
 
     def for_motion(self) -> GateReport:
         """Gives the report for a log of which only the motion is used: findings on torques are warnings at most."""
-        kept = [finding for finding in self.findings if finding.name not in NOT_OF_MOTION]
+        kept = self.without(NOT_OF_MOTION).findings
         mild = [
             replace(finding, severity="warning")
             if finding.severity == "refuse" and (finding.name in OF_TORQUE or _is_of_torque(finding))
             else finding
             for finding in kept
         ]
-        return replace(self, findings=worst_first(mild))
+        return replace(self, findings=worst_first(mild), parts=self.motion_parts)
 
     def summary(self) -> str:
         """Gives the verdict and lists the findings, the worst first."""

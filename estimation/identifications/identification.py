@@ -91,7 +91,8 @@ def identify(
     bar = progress or SILENT
     bar.start("identifying", 3.0)
     _require_motion(given)
-    recording = make_ready(robot, given, check=check, before_each=lambda: bar.update(0.0, "checking the logs"))
+    bar.update(0.0, "checking the logs")
+    recording = make_ready(robot, given, check=check)
     robot, data, prepared = recording.robot, recording.used, recording.prepared
     by_position = friction == "auto" if position is None else position
     if friction == "auto":

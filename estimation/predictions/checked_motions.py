@@ -9,8 +9,6 @@ from dataclasses import replace
 import numpy as np
 
 from estimation.gate import GateReport, check_log
-from estimation.gate.measurements.outliers import interpolated
-from estimation.gate.measurements.timing import FEWEST
 from estimation.models.model import Model
 from estimation.preprocessing import LowPass, Smoother, SmoothingSpline
 from robots.common.errors import AssumedValueWarning
@@ -31,19 +29,16 @@ def checked_motion(robot: Robot, log: Log) -> tuple[GateReport, list[Log]]:
 
     Returns:
         The findings, those on torques as warnings at most; and the parts of the log between gaps, with unwrapped
-        angles and interpolated outliers of positions. The whole log, if all parts are too short.
+        angles and interpolated outliers of positions.
 
     Raises:
-        InputError: the motion is wrong: units of time or position, wrapped angles, jumps, impossible values.
+        InputError: the motion is wrong: units of time or position, wrapped angles, jumps, impossible values; or all
+            parts are too short.
     """
     gate = check_log(robot, log).for_motion()
     gate.raise_if_refused()
-    log = gate.corrected(log)
-    log = interpolated(log, ["q"]) if len(gate.spikes) else log
-    if gate.motion_parts == ((0, len(log)),):
-        return gate, [log]
-    parts = [log.rows(slice(first, stop)) for first, stop in gate.motion_parts if stop - first >= FEWEST]
-    return gate, parts or [log]
+    # Copied positions stay: what smooths them knows them, and a torque is wanted in every row.
+    return gate, list(replace(gate, stale=gate.stale[:0]).usable(log, interpolate=["q"]))
 
 
 def joined(parts: Sequence[Log]) -> Log:

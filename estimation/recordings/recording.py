@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -36,6 +36,21 @@ class Recording:
         """The logs of which some rows are used."""
         return [log for log, own in zip(self.logs, self.parts, strict=True) if own]
 
+    def repaired(self, shortest: float) -> list[tuple[Log, ...]]:
+        """Gives each used log's rows between its gaps, with interpolated outliers, so that rows stay evenly spaced.
+
+        Args:
+            shortest: duration [s] of the shortest part that is of use beside longer ones.
+        """
+        if not self.gates:
+            return [(log,) for log in self.logs]
+        found = []
+        for gate, log, own in zip(self.gates, self.logs, self.parts, strict=True):
+            if own:
+                longest = max(float(gate.t[stop - 1] - gate.t[first]) for first, stop in gate.parts)
+                found.append(gate.usable(log, interpolate=("q", "tau", "current"), shortest=min(shortest, longest)))
+        return found
+
     @cached_property
     def prepared(self) -> list[Prepared]:
         """The parts of all logs in turn, with their torque, and their positions on a grid."""
@@ -47,7 +62,7 @@ def make_ready(
     logs: Log | Sequence[Log],
     *,
     check: bool = True,
-    before_each: Callable[[], None] = lambda: None,
+    tolerated: Collection[str] = (),
 ) -> Recording:
     """Converts logs to joint torques, checks them, and takes what can be fitted.
 
@@ -56,7 +71,7 @@ def make_ready(
         logs: one or several; one that states another meaning of its torques is converted.
         check: whether each log passes the gate, which refuses what would be fitted wrongly, cuts at gaps, and leaves
             out logs that rest beside others that move.
-        before_each: is called before each log is checked.
+        tolerated: names of the gate's findings that refuse no log.
 
     Raises:
         InputError: no logs, logs of another robot, or one that the gate refuses.
@@ -69,6 +84,6 @@ def make_ready(
     joint_torques = tuple(as_joint_torque(robot, log, estimate=False) for log in given)
     if not check:
         return Recording(robot, joint_torques, (), tuple((log,) for log in joint_torques))
-    gates = check_logs(robot, joint_torques, before_each)
+    gates = check_logs(robot, joint_torques, tolerated)
     parts = tuple(gate.usable(log) for gate, log in zip(gates, joint_torques, strict=True))
     return Recording(robot, joint_torques, gates, parts)

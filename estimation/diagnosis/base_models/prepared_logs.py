@@ -1,27 +1,46 @@
-"""Preparation of logs: common clock, repair, recording, and base parameters."""
+"""Preparation of logs: common clock, notes of the gate, recording, and base parameters."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from estimation.diagnosis.base_models.baseline import base_parameters
 from estimation.diagnosis.base_models.payload_and_gravity import subtract_known_payload
 from estimation.diagnosis.recordings.log_reading import build_recording
-from estimation.diagnosis.recordings.log_repair import repair_log
 from estimation.diagnosis.recordings.recording import Recording
 from estimation.diagnosis.recordings.unusable_logs import find_unusable_logs
 from estimation.logs.clocks import put_on_clock
+from estimation.recordings import Recording as Ready
 from robots.base_parameters import BaseParameters
 from robots.common.errors import NotIdentifiableError
-from robots.common.forks import forked
-from robots.robot import Robot
 from robots.signals import Log
-from robots.terms import FINE_BENDS, BendingFriction
+from robots.terms import FINE_BENDS, BendingFriction, FrictionTerm
 from robots.terms.friction import USUAL
 
+# Findings of the gate that an effect of the robot may cause, or that the diagnosis reports itself.
+TOLERATED = frozenset(
+    {
+        "badly_excited",
+        "jump",
+        "moved_by_others",
+        "negative_friction",
+        "no_motion",
+        "other_robot",
+        "poorly_explained",
+        "position_sign",
+        "short",
+        "torque_sign",
+        "unit_of_torque",
+    }
+)
+# Warnings of the gate that the diagnosis examines more closely, and findings on logs without a fault.
+OWN = frozenset({"badly_excited", "clipped", "delay", "hardly_moves", "poorly_explained", "unit_of_torque"})
+NO_MOTION = frozenset({"no_motion", "short"})
+# Duration [s] below which a stretch between gaps is dropped: filters are inaccurate at its ends.
+SHORTEST = 2.0
 # Width of the friction sign [rad/s or m/s] before it is fitted to the logs.
 FIRST_VELOCITY_SCALE = 0.001
 
@@ -47,46 +66,43 @@ class PreparedLogs:
     notes: tuple[str, ...]
 
 
-def prepare_logs(
-    robot: Robot, logs: Sequence[Log], held_out: Sequence[Log], friction: str, *, check: bool
-) -> PreparedLogs:
-    """Puts logs on one clock, repairs them, and leaves out those that no base model explains.
+def prepare_logs(fit: Ready, unseen: Ready | None, friction: str | FrictionTerm) -> PreparedLogs:
+    """Puts logs on one clock, and leaves out those that no base model explains.
 
     Args:
-        robot: the robot.
-        logs: logs of the fit.
-        held_out: logs for validation.
-        friction: friction of the base model: `auto` (`BendingFriction`), `polynomial` or `coulomb-viscous`.
-        check: whether each log passes the gate, which refuses unusable logs and marks what needs repair.
+        fit: logs of the fit.
+        unseen: logs for validation; None without.
+        friction: of the base model: `auto` (`BendingFriction`), another name, or a term.
 
     Returns:
         The prepared logs.
 
     Raises:
-        InputError: logs of another robot, without torque, too short, given twice or refused by the gate.
+        InputError: logs that are too short, or given twice.
         NotIdentifiableError: no joint moves.
     """
-    clocked = put_on_clock(logs, held_out)
-    fit, other = sorted(clocked.logs, key=lambda log: float(log.t[0])), list(clocked.held_out)
-    notes = list(clocked.notes)
-    if check:
-        fit, fit_notes = _repaired(robot, fit, "Log")
-        other, other_notes = _repaired(robot, other, "Held out")
-        notes += [*fit_notes, *other_notes]
-    recording = subtract_known_payload(robot, build_recording(robot, fit))
+    robot = fit.robot
+    clocked = put_on_clock(fit.used, unseen.used if unseen else ())
+    notes = [*clocked.notes, *_notes(fit, "Log")]
+    logs = sorted(_on_clock(fit, clocked.logs), key=lambda log: float(log.t[0]))
+    other: list[Log] = []
+    if unseen:
+        notes += _notes(unseen, "Held out")
+        other = _on_clock(unseen, clocked.held_out)
+    recording = subtract_known_payload(robot, build_recording(robot, logs))
     if not (np.ptp(recording.q, axis=0) > 0).any():
         raise NotIdentifiableError("no joint moves", remedy="record a log in which the arm moves")
     # Held-out logs count too: a gravity that occurs only there needs the robot's description as a prior.
-    gravities = [log.gravity for log in (*fit, *other) if log.gravity is not None]
+    gravities = [log.gravity for log in (*logs, *other) if log.gravity is not None]
     speeds = np.quantile(np.abs(recording.dq), USUAL, axis=0)
     # A curve that the base model cannot follow would have a name.
     chosen = BendingFriction.within(speeds, FINE_BENDS) if friction == "auto" else friction
     base = base_parameters(robot, chosen, (FIRST_VELOCITY_SCALE,) * robot.n, gravities)
     if unusable := find_unusable_logs(base, recording):
         notes += [_UNUSABLE.format(k + 1, _in_brackets(recording.names[k]), 100 * s) for k, s in unusable.items()]
-        fit = [log for k, log in enumerate(fit) if k not in unusable]
-        recording = subtract_known_payload(robot, build_recording(robot, fit))
-    return PreparedLogs(tuple(fit), tuple(other), recording, base, clocked.dated, tuple(notes))
+        logs = [log for k, log in enumerate(logs) if k not in unusable]
+        recording = subtract_known_payload(robot, build_recording(robot, logs))
+    return PreparedLogs(tuple(logs), tuple(other), recording, base, clocked.dated, tuple(notes))
 
 
 _UNUSABLE = (
@@ -95,11 +111,32 @@ _UNUSABLE = (
 )
 
 
-def _repaired(robot: Robot, logs: Sequence[Log], kind: str) -> tuple[list[Log], list[str]]:
-    """Returns the usable stretches of logs, and notes about them."""
-    names = [f"{kind} {k}{_in_brackets(log.name)}" for k, log in enumerate(logs, start=1)]
-    repaired = forked(lambda named: repair_log(robot, *named), zip(logs, names, strict=True))
-    return [part for one in repaired for part in one.logs], [note for one in repaired for note in one.notes]
+def _on_clock(ready: Ready, clocked: Sequence[Log]) -> list[Log]:
+    """Gives the usable parts of logs, at the times that these logs have on one clock."""
+    found: list[Log] = []
+    for log, placed, repaired in zip(ready.used, clocked, ready.repaired(SHORTEST), strict=True):
+        shift = float(placed.t[0] - log.t[0])
+        parts = [replace(part, t=part.t + shift) if shift else part for part in repaired]
+        if len(parts) > 1 or parts[0].duration < 0.99 * log.duration:
+            name = log.name or "log"
+            parts = [replace(part, name=f"{name} from {part.t[0]:.4g} to {part.t[-1]:.4g} s") for part in parts]
+        found += parts
+    return found
+
+
+def _notes(ready: Ready, kind: str) -> list[str]:
+    """Says what the gate found and the diagnosis does not report itself."""
+    notes = []
+    for k, (log, gate) in enumerate(zip(ready.logs, ready.gates, strict=False), start=1):
+        for finding in gate.findings:
+            known = NO_MOTION if finding.severity == "refuse" else OWN
+            if finding.severity != "info" and finding.name not in known:
+                by_fit = _BY_FIT if finding.name in TOLERATED else ""
+                notes.append(f"{kind} {k}{_in_brackets(log.name)}{by_fit}: {finding}.")
+    return notes
+
+
+_BY_FIT = " (from a quick fit of rigid body and friction)"
 
 
 def _in_brackets(name: str) -> str:

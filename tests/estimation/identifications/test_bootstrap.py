@@ -75,13 +75,13 @@ def test_a_mean_has_its_textbook_error():
 
 def test_the_same_seed_gives_the_same_errors(arm, by_periods):
     """Draws follow from the seed alone."""
-    log, estimate, found = by_periods
+    _, estimate, found = by_periods
     np.testing.assert_array_equal(bootstrap(estimate).errors, found.errors)
 
 
 def test_what_cannot_be_resampled_is_refused(arm, by_periods):
     """A log that was read in pieces, and too few resamples, are refused."""
-    log, estimate, _ = by_periods
+    _, estimate, _ = by_periods
     with pytest.raises(InputError, match="resamples"):
         bootstrap(estimate, resamples=1)
     with pytest.raises(InputError, match="in pieces"):
