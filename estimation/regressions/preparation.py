@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from estimation.logs.known_setup import Load, load_of
-from estimation.preprocessing import LowPass, Resampled, Smoother, period_of, resample, rows_at_rest, smooth
+from estimation.preprocessing import Cycle, LowPass, Resampled, Smoother, find_cycle, resample, rows_at_rest, smooth
 from robots.common.errors import InputError
 from robots.common.parallel import threaded
 from robots.robot import Robot
@@ -80,9 +80,14 @@ class Prepared:
     silent: NDArray[np.bool_] | None = None
 
     @cached_property
+    def cycle(self) -> Cycle | None:
+        """Where the motion repeats itself, in rows of the grid; None where it does not."""
+        return find_cycle(self.positions.q, self.positions.period)
+
+    @property
     def period(self) -> float | None:
-        """The period with which the motion repeats itself [s], found in the log; None where it does not."""
-        return period_of(self.positions)
+        """The period with which the motion repeats itself all through the log [s]; None where it does not."""
+        return self.cycle.period if self.cycle is not None and self.cycle.whole else None
 
     @property
     def even(self) -> bool:

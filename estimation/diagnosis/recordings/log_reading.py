@@ -12,13 +12,14 @@ from scipy.interpolate import CubicSpline
 
 from estimation.diagnosis.recordings.constant_speed import remove_encoder_lines
 from estimation.diagnosis.recordings.directions import ALIKE, Directions, find_directions
-from estimation.diagnosis.recordings.periods import Cycle, find_cycle, project_on_harmonics
+from estimation.diagnosis.recordings.harmonic_projection import project_on_harmonics
 from estimation.diagnosis.recordings.position_cutoff import select_position_cutoff
 from estimation.diagnosis.recordings.position_spectra import Spectra, Spectrum
 from estimation.diagnosis.recordings.recording import Recording
 from estimation.diagnosis.recordings.smoothed_motion import smooth_motion
 from estimation.diagnosis.recordings.thinning import decimate_recording, keep_clipped_level, low_pass_rows
 from estimation.gate.measurements.resolution import lattice_step
+from estimation.preprocessing import Cycle
 from estimation.regressions.preparation import Prepared, prepare, still_joints
 from robots.common.errors import InputError
 from robots.common.forks import forked
@@ -180,7 +181,7 @@ def _part(log: Prepared, step: float, cap: float, spectra: Spectra, found: Seque
     positions = log.positions.q
     cutoffs = np.minimum([spectrum.cutoff() for spectrum in found], cap)
     q, dq, ddq = smooth_motion(positions, period, cutoffs)
-    cycle = find_cycle(positions, period)
+    cycle = log.cycle
     if cycle is not None:
         rows = slice(cycle.start, cycle.stop)
         exact, known, repeated = project_on_harmonics(positions, period, cycle)

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from scipy.ndimage import maximum_filter1d
 
 from estimation.diagnosis.calibration import REST_TIME, REVERSAL_MARGIN
-from estimation.diagnosis.recordings.periods import Cycle
+from estimation.preprocessing import Cycle
 from robots.common.stretches import spans
 
 Array = NDArray[np.float64]

@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 from scipy.ndimage import maximum_filter1d
 from scipy.signal import firwin, upfirdn
 
-from estimation.diagnosis.recordings.periods import Cycle
 from estimation.diagnosis.recordings.recording import Recording
+from estimation.preprocessing import Cycle
 from robots.common.stretches import spans
 
 Array = NDArray[np.float64]

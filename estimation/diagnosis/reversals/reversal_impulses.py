@@ -12,9 +12,9 @@ from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
-from estimation.diagnosis.recordings.periods import Cycle
 from estimation.diagnosis.recordings.recording import Recording
 from estimation.diagnosis.recordings.smoothed_motion import low_pass_gain
+from estimation.preprocessing import Cycle
 from robots.base_parameters import BaseParameters
 
 Array = NDArray[np.float64]

@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from estimation.preprocessing import Harmonics, LowPass, period_of, resample, smooth
+from estimation.preprocessing import Harmonics, LowPass, resample, smooth
 
 PERIOD = 2.0
 
@@ -20,21 +20,6 @@ def log():
     t = np.cumsum(rng.uniform(0.5, 1.5, 2100) * 0.004)
     q, ddq = motion(t)
     return t, q + 1e-4 * rng.normal(size=q.shape), ddq
-
-
-def test_the_period_is_found_in_the_log(log):
-    """A motion that repeats itself shows its period, to a part in ten thousand."""
-    t, q, _ = log
-    assert period_of(resample(t, q)) == pytest.approx(PERIOD, rel=1e-4)
-
-
-def test_a_motion_that_does_not_repeat_has_no_period():
-    """Tones without a common period, less than two periods, and a standing arm have none."""
-    t = 0.004 * np.arange(5000)
-    incommensurate = np.column_stack([np.sin(t) + np.sin(np.sqrt(2) * t), np.cos(np.sqrt(3) * t)])
-    assert period_of(resample(t, incommensurate)) is None
-    assert period_of(resample(t[:900], motion(t[:900])[0])) is None
-    assert period_of(resample(t, np.full((5000, 2), 0.3))) is None
 
 
 def test_projection_is_exact_on_its_harmonics(log):

@@ -17,8 +17,8 @@ from estimation.diagnosis.hypothesis_tests.scoring import accept, score
 from estimation.diagnosis.joint_fits.extended_fit import fit_extended
 from estimation.diagnosis.noise_models.frequency_bands import TRANSITION
 from estimation.diagnosis.recordings.log_reading import build_recording
-from estimation.diagnosis.recordings.periods import Cycle
 from estimation.diagnosis.recordings.recording import Recording, cut_recording, join_recordings
+from estimation.preprocessing import Cycle
 from robots.regressor import default_model
 from robots.robot import Robot
 from robots.signals import Log

@@ -13,9 +13,9 @@ from scipy.signal import lfilter
 from estimation.diagnosis.noise_models.masked_rows import find_masked_rows
 from estimation.diagnosis.noise_models.noise_estimate import estimate_whitening
 from estimation.diagnosis.noise_models.whitening import Whitening
-from estimation.diagnosis.recordings.periods import Cycle
 from estimation.diagnosis.validations.residual_shares import period_differences, period_mean, residual_shares
 from estimation.linear_algebra.orthonormal import orthonormal
+from estimation.preprocessing import Cycle
 from tests.estimation.diagnosis.noisy_logs import STEP, noise_of, recording_of
 
 

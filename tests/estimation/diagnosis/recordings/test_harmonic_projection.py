@@ -1,11 +1,12 @@
-"""Tests of the search for repeated motion, and of its projection on harmonics."""
+"""Tests of the projection of a periodic motion on its harmonics."""
 
 from __future__ import annotations
 
 import numpy as np
 import pytest
 
-from estimation.diagnosis.recordings.periods import find_cycle, project_on_harmonics
+from estimation.diagnosis.recordings.harmonic_projection import project_on_harmonics
+from estimation.preprocessing import find_cycle
 
 STEP = 0.004
 
@@ -21,32 +22,6 @@ def _motion(period: float, duration: float, seed: int = 0) -> tuple[np.ndarray, 
         c @ (a * w[:, None]) - s @ (b * w[:, None]),
         -(s @ (a * w[:, None] ** 2)) - c @ (b * w[:, None] ** 2),
     )
-
-
-@pytest.mark.parametrize("period", [10.0, 7.3219, 3.14159])
-def test_a_period_is_found_sharper_than_a_sample(period: float) -> None:
-    """The period is found to a hundredth of a sample, also if it is not a multiple of the sample period."""
-    q, _, _ = _motion(period, 42.0)
-    cycle = find_cycle(q, STEP)
-    assert cycle is not None
-    assert cycle.period == pytest.approx(period, abs=0.01 * STEP)
-    assert cycle.count == int(42.0 / period)
-
-
-def test_a_motion_that_never_returns_has_no_period() -> None:
-    """Harmonics with a period longer than the log are no repetition."""
-    q, _, _ = _motion(100.0, 60.0)
-    assert find_cycle(q, STEP) is None
-
-
-def test_a_period_is_found_behind_an_approach() -> None:
-    """An approach before the repetitions is left out of the cycle."""
-    q, _, _ = _motion(8.0, 32.0)
-    approach = np.linspace(0, 1, 1000)[:, None] ** 2 * (q[0] - 0.5) + 0.5 * np.linspace(0, 1, 1000)[:, None] ** 2
-    cycle = find_cycle(np.vstack([approach, q]), STEP)
-    assert cycle is not None
-    assert cycle.period == pytest.approx(8.0, abs=0.01 * STEP)
-    assert cycle.start >= 900
 
 
 def test_the_projection_is_free_of_encoder_noise() -> None:
