@@ -17,6 +17,8 @@ from robots.signals import Motion
 Array = NDArray[np.float64]
 
 ORDER = 3
+# Rows at each end by whose own differences the derivatives there are found.
+FREE_ENDS = 7
 
 
 def smooth(positions: Resampled, by: float | Smoother) -> Motion:
@@ -34,7 +36,7 @@ def smooth(positions: Resampled, by: float | Smoother) -> Motion:
 
 @dataclass(frozen=True)
 class LowPass(Smoother):
-    """Low-passes positions forward and backward, and differentiates them by fourth-order central differences.
+    """Low-passes positions forward and backward, and differentiates them by central differences.
 
     Attributes:
         cutoff: frequency at which the two passes together are 3 dB down [Hz].
@@ -46,7 +48,7 @@ class LowPass(Smoother):
     def smooth(self, positions: Resampled) -> Motion:
         """Gives the motion at the log's own times."""
         q = low_pass(positions.q, positions.period, self.cutoff)
-        dq, ddq = _differentiate(q, positions.period)
+        dq, ddq = differentiate(q, positions.period)
         t, grid = positions.original, positions.t
         if len(t) != len(grid) or not np.allclose(t, grid, rtol=0, atol=1e-6 * positions.period):
             at = np.clip(t, grid[0], grid[-1])
@@ -91,25 +93,35 @@ def low_pass(x: Array, period: float, cutoff: float) -> Array:
     return np.asarray(sosfiltfilt(sections, x, axis=0, padtype="odd", padlen=padding))
 
 
-def _differentiate(x: Array, period: float) -> tuple[Array, Array]:
+def differentiate(x: Array, period: float) -> tuple[Array, Array]:
+    """Computes first and second derivatives (N, n) by central differences of sixth order, lower at the ends.
+
+    Args:
+        x: values (N, n) on a uniform grid.
+        period: sample period of the grid [s].
+
+    Returns:
+        First and second derivative (N, n).
+    """
+    first, second = np.empty_like(x), np.empty_like(x)
+    ends = (slice(None), slice(None)) if len(x) < 2 * FREE_ENDS else (slice(FREE_ENDS), slice(-FREE_ENDS, None))
+    for end in ends:
+        first[end] = np.gradient(x[end], period, axis=0, edge_order=2)
+        second[end] = np.gradient(first[end], period, axis=0, edge_order=2)
+    if len(x) < 2 * FREE_ENDS:
+        return first, second
     # Written out in place: of millions of rows each temporary is as large as the log.
-    first = np.empty_like(x)
-    inner = first[2:-2]
-    np.subtract(x[3:-1], x[1:-3], out=inner)
-    inner *= 8
-    inner += x[:-4]
-    inner -= x[4:]
-    inner /= 12 * period
-    ends = np.gradient(x[:5], period, axis=0, edge_order=2)[:2], np.gradient(x[-5:], period, axis=0, edge_order=2)[-2:]
-    first[:2], first[-2:] = ends
-    second = np.empty_like(x)
-    inner = second[2:-2]
-    np.add(x[1:-3], x[3:-1], out=inner)
-    inner *= 16
-    inner -= 30 * x[2:-2]
-    inner -= x[:-4]
-    inner -= x[4:]
-    inner /= 12 * period**2
-    second[[1, -2]] = (x[[2, -1]] - 2 * x[[1, -2]] + x[[0, -3]]) / period**2
-    second[0], second[-1] = second[1], second[-2]
+    pairs = ((x[4:-2], x[2:-4]), (x[5:-1], x[1:-5]), (x[6:], x[:-6]))
+    inner, pair = first[3:-3], np.empty_like(x[6:])
+    inner[:] = 0.0
+    for (after, before), weight in zip(pairs, (45.0, -9.0, 1.0), strict=True):
+        np.subtract(after, before, out=pair)
+        pair *= weight / (60 * period)
+        inner += pair
+    inner = second[3:-3]
+    np.multiply(x[3:-3], -490.0 / (180 * period**2), out=inner)
+    for (after, before), weight in zip(pairs, (270.0, -27.0, 2.0), strict=True):
+        np.add(after, before, out=pair)
+        pair *= weight / (180 * period**2)
+        inner += pair
     return first, second

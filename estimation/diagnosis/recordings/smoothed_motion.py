@@ -8,9 +8,11 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import BSpline
 from scipy.linalg import cho_solve_banded, cholesky_banded
-from scipy.signal import butter, sosfiltfilt
+from scipy.signal import sosfiltfilt
 from scipy.sparse import csr_array, diags_array
 from scipy.special import binom
+
+from estimation.preprocessing.smoothing import butterworth, differentiate
 
 Array = NDArray[np.float64]
 
@@ -38,7 +40,7 @@ def smooth_motion(x: Array, period: float, cutoffs: Array) -> tuple[Array, Array
     for j, cutoff in enumerate(cutoffs):
         if cutoff <= 0:
             continue
-        sections = _sections(min(float(cutoff) * 2 * period, 0.99))
+        sections = butterworth(ORDER, min(float(cutoff) * 2 * period, 0.99))
         padding = min(len(x) - 1, round(12 / (cutoff * period)))
         q[:, j] = sosfiltfilt(sections, x[:, j], padtype="odd", padlen=padding)
     states = (q, *differentiate(q, period))
@@ -58,31 +60,6 @@ def smooth_motion(x: Array, period: float, cutoffs: Array) -> tuple[Array, Array
 def low_pass_gain(f: Array, cutoff: float) -> Array:
     """Returns the gain of the low-pass, applied forward and backward, at frequencies (F,) [Hz]."""
     return np.asarray(1.0 / (1.0 + (f / cutoff) ** (2 * ORDER)))
-
-
-def differentiate(x: Array, period: float) -> tuple[Array, Array]:
-    """Computes first and second derivatives (N, n) by central differences of sixth order, lower at the ends.
-
-    Args:
-        x: values (N, n) on a uniform grid.
-        period: sample period of the grid [s].
-
-    Returns:
-        First and second derivative (N, n).
-    """
-    first = np.gradient(x, period, axis=0, edge_order=2)
-    second = np.gradient(first, period, axis=0, edge_order=2)
-    if len(x) > 7:
-        a, b, c = x[4:-2] - x[2:-4], x[5:-1] - x[1:-5], x[6:] - x[:-6]
-        first[3:-3] = (45 * a - 9 * b + c) / (60 * period)
-        a, b, c = x[4:-2] + x[2:-4], x[5:-1] + x[1:-5], x[6:] + x[:-6]
-        second[3:-3] = (270 * a - 27 * b + 2 * c - 490 * x[3:-3]) / (180 * period**2)
-    return first, second
-
-
-@lru_cache(maxsize=64)
-def _sections(cutoff: float) -> Array:
-    return np.asarray(butter(ORDER, cutoff, output="sos"))
 
 
 def _free(x: Array, period: float, cutoff: float) -> tuple[Array, Array, Array]:

@@ -10,10 +10,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
-from scipy.signal import sosfiltfilt
 
 from estimation.preprocessing import rows_at_rest
-from estimation.preprocessing.smoothing import butterworth
+from estimation.preprocessing.smoothing import differentiate, low_pass
 from robots.signals import Log
 
 Array = NDArray[np.float64]
@@ -30,8 +29,8 @@ FEWEST_SAMPLES, FEWEST_KEPT = 24, 12
 UNEVEN = 0.02
 # Share of rows with a new position from which repeated positions are left out of the interpolation.
 FRESH = 0.5
-# Order of each pass of the smoothing, and length of its inaccurate ends in periods of the cut-off.
-ORDER, EDGE = 3, 0.35
+# Length of the smoothing's inaccurate ends in periods of the cut-off.
+EDGE = 0.35
 
 
 @dataclass(frozen=True, eq=False)
@@ -199,7 +198,7 @@ def excerpts_of(parts: Sequence[Stretch], period: float, cutoff: float) -> tuple
         # All signals of all stretches of one length are filtered at once: the set-up costs as much as a column.
         signals = [signal for part in parts if len(part.t) == length for signal in part.signals]
         widths = np.cumsum([signal.shape[1] for signal in signals])
-        smoothed[length] = iter(np.split(_low_pass(np.hstack(signals), period, cutoff), widths[:-1], axis=1))
+        smoothed[length] = iter(np.split(low_pass(np.hstack(signals), period, cutoff), widths[:-1], axis=1))
     found = (_excerpt(part, [next(smoothed[len(part.t)]) for _ in part.signals], period, cutoff) for part in parts)
     excerpts = [part for part in found if part is not None]
     rows = max(sum(len(part.t) for part in excerpts), 1)
@@ -216,17 +215,13 @@ def _excerpt(part: Stretch, smoothed: Sequence[Array], period: float, cutoff: fl
         return None
     smooth = iter(smoothed)
     q = next(smooth)
-
-    def slope(at: NDArray[np.intp]) -> Array:
-        return np.asarray((q[at + 1] - q[at - 1]) / (2 * period))
-
+    dq, ddq = differentiate(q, period)
     tau = None if part.torque is None else next(smooth)
     return Excerpt(
         grid[inside],
         q[inside],
-        slope(inside),
-        # The ends that are left out are much longer than a sample.
-        (slope(inside + 1) - slope(inside - 1)) / (2 * period),
+        dq[inside],
+        ddq[inside],
         np.zeros((len(inside), q.shape[1]), dtype=bool),
         None if part.torque is None else part.torque[inside],
         None if part.velocity is None else next(smooth)[inside],
@@ -238,10 +233,3 @@ def _excerpt(part: Stretch, smoothed: Sequence[Array], period: float, cutoff: fl
 
 def _at(grid: Array, t: Array, values: Array) -> Array:
     return np.column_stack([np.interp(grid, t, column) for column in values.T])
-
-
-def _low_pass(x: Array, period: float, cutoff: float) -> Array:
-    own = min(cutoff / (np.sqrt(2) - 1) ** (1 / (2 * ORDER)), 0.45 / period)
-    padding = int(min(len(x) - 1, max(3 * (2 * ORDER + 1), round(2 / (cutoff * period)))))
-    sections = butterworth(ORDER, 2 * own * period)
-    return np.asarray(sosfiltfilt(sections, x, axis=0, padtype="odd", padlen=padding))

@@ -33,8 +33,8 @@ def test_a_sinusoid_keeps_its_phase_and_loses_the_closed_form(frequency):
     cutoff, x = 5.0, 2 * np.pi * frequency * PERIOD
     motion = motion_of(np.cos(2 * np.pi * frequency * T), cutoff)
     gain = low_pass_gain(frequency, cutoff)
-    first = (8 * np.sin(x) - np.sin(2 * x)) / (6 * PERIOD)  # fourth-order central differences
-    second = (30 - 32 * np.cos(x) + 2 * np.cos(2 * x)) / (12 * PERIOD**2)
+    first = (45 * np.sin(x) - 9 * np.sin(2 * x) + np.sin(3 * x)) / (30 * PERIOD)  # sixth-order central differences
+    second = (245 - 270 * np.cos(x) + 27 * np.cos(2 * x) - 2 * np.cos(3 * x)) / (90 * PERIOD**2)
     expected = ((motion.q, gain, 0.0), (motion.dq, gain * first, np.pi / 2), (motion.ddq, gain * second, np.pi))
     for signal, amplitude, phase in expected:
         found, angle = component(motion.t, signal[:, 0], frequency)
@@ -55,7 +55,7 @@ def test_the_derivatives_are_those_of_the_motion():
     w = 2 * np.pi * 0.4
     motion = motion_of(np.sin(w * T), 20.0)
     inside = (T > 1) & (T < 19)
-    # The filter's own loss (0.4/20)^6 and the differences' (w h)^4 / 30 are below 1e-9; rounding over h^2 is 1e-10.
+    # The filter's own loss (0.4/20)^6 and the differences' (w h)^6 / 140 are below 1e-9; rounding over h^2 is 1e-10.
     np.testing.assert_allclose(motion.dq[inside, 0], w * np.cos(w * T[inside]), atol=1e-7 * w)
     np.testing.assert_allclose(motion.ddq[inside, 0], -(w**2) * np.sin(w * T[inside]), atol=1e-6 * w**2)
 
