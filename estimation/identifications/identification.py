@@ -9,14 +9,13 @@ from numpy.typing import NDArray
 
 from estimation.estimators import Estimator
 from estimation.estimators import estimator as choose_estimator
+from estimation.identifications.assembly import Figures, assemble, describe_logs_and_method, joint_fits
 from estimation.identifications.choices import Candidates, Choice, choose
-from estimation.identifications.estimate import Estimate, JointFit, colour_of
+from estimation.identifications.estimate import Estimate
 from estimation.identifications.fit import Fit, fit
 from estimation.identifications.model_forms import ModelForm
-from estimation.identifications.verdicts import determined_parameters, require_predictable
+from estimation.identifications.verdicts import require_predictable
 from estimation.logs.known_setup import gravities_of, require_plain
-from estimation.logs.provenance import describe_logs
-from estimation.models.model import Model
 from estimation.preprocessing import Harmonics
 from estimation.recordings import make_ready
 from estimation.regressions.preparation import Prepared
@@ -29,7 +28,6 @@ from robots.robot import Robot
 from robots.signals import Log
 from robots.terms import BendingFriction, FrictionTerm
 from robots.terms.friction import USUAL
-from robots.version import VERSION
 
 Array = NDArray[np.float64]
 
@@ -105,39 +103,16 @@ def identify(
     bar.update(2.0, "fitting")
     base = form.chosen(base, choice, by_position)
     found = fit(base, prepared, chosen, choice, seed)
-    joints = _joint_fits(found, predictable)
-    determined = determined_parameters(found, joints)
-    bar.finish()
-    colour = colour_of(np.sqrt(np.maximum(np.diag(found.covariance), 0.0)), found.white, determined)
-    base, rows = found.base, found.rows
-    provenance = {**describe_fit(data, chosen, found.choice, joints, seed), "colour": colour}
+    figures = _figures(found)
     motions = [part.motion for part in found.rows]
-    provenance["recorded"] = recorded_ranges(
+    recorded = recorded_ranges(
         *(np.concatenate([getattr(motion, name) for motion in motions]) for name in ("q", "dq", "ddq"))
     )
-    provenance |= {} if found.prior_share is None else {"prior_share": found.prior_share.tolist()}
-    provenance["gravities"] = [list(gravity) for gravity in base.gravities]
-    if "standard" in found.solution.extras:
-        provenance["standard_parameters"] = np.asarray(found.solution.extras["standard"], dtype=float).tolist()
-    if found.solution.extras.get("active"):
-        provenance["at_bounds"] = list(found.solution.extras["active"])
-    return Estimate(
-        model=Model(
-            torque_model=base.model,
-            columns=base.independent,
-            values=found.solution.values,
-            covariance=found.covariance,
-            determined=determined,
-            formulas=base.formulas(),
-            provenance=provenance,
-        ),
-        choice=found.choice,
-        joints=joints,
-        white_noise_errors=found.white,
-        t=np.concatenate([part.motion.t for part in rows]),
-        dq=np.concatenate([part.motion.dq for part in rows]),
-        measured=np.concatenate([part.tau for part in rows]),
-        predicted=found.torque,
+    bar.finish()
+    return assemble(
+        found,
+        joint_fits(found, figures, predictable),
+        {**describe_logs_and_method(data, chosen, seed), "recorded": recorded},
         dropped_rows=sum(log.positions.dropped for log in prepared),
         gates=recording.gates,
         recording=recording,
@@ -180,34 +155,20 @@ def _predictable(prepared: Sequence[Prepared], choice: Choice) -> NDArray[np.boo
     return require_predictable(moves, lowest, highest, choice)
 
 
-def _joint_fits(found: Fit, predictable: NDArray[np.bool_]) -> tuple[JointFit, ...]:
-    """Measures each joint's errors, beside what a constant and the robot's description would give."""
-    base, choice = found.base, found.choice
-    # On the rows on which the left-out errors are: friction holds a joint that stands with any torque.
+def _figures(found: Fit) -> Figures:
+    """Measures each joint's errors on the rows on which the left-out errors are: all but those at rest."""
     judged = np.concatenate([part.judged for part in found.rows])
     total = np.maximum(judged.sum(axis=0), 1)
     torque = np.concatenate([part.tau for part in found.rows])
-    rms = np.sqrt(np.einsum("tj,tj,tj->j", torque, torque, judged) / total)
-    spread = np.sqrt(np.maximum(rms**2 - (np.einsum("tj,tj->j", torque, judged) / total) ** 2, 0.0))
     error = torque - np.concatenate(list(found.predicted))
-    fitted = np.sqrt(np.einsum("tj,tj,tj->j", error, error, judged) / total)
-    band = band_of(np.abs(np.where(judged, error, np.nan)))
-    nominal = np.sqrt(found.nominal / total)
-    floor = _noise_floor(found)
-    return tuple(
-        JointFit(
-            joint=j + 1,
-            name=base.model.robot.joint_names[j],
-            torque_rms=float(rms[j]),
-            torque_spread=float(spread[j]),
-            residual_rms=float(fitted[j]),
-            held_out_rms=float(choice.held_out[j]),
-            nominal_rms=float(nominal[j]),
-            noise_floor=float(floor[j]),
-            band=float(band[j]),
-            identified=bool(predictable[j]),
-        )
-        for j in range(len(rms))
+    squares, residuals = (np.einsum("tj,tj,tj->j", x, x, judged) for x in (torque, error))
+    return Figures(
+        rows=total,
+        torque=squares,
+        sums=np.einsum("tj,tj->j", torque, judged),
+        residual=residuals,
+        floor=_noise_floor(found),
+        band=band_of(np.abs(np.where(judged, error, np.nan))),
     )
 
 
@@ -223,28 +184,3 @@ def _noise_floor(found: Fit) -> Array:
         if known:
             return np.asarray(np.sqrt(np.mean(known, axis=0)))
     return fast_noise(residuals)
-
-
-def describe_fit(
-    logs: Sequence[Log], method: Estimator, choice: Choice, joints: Sequence[JointFit], seed: int
-) -> dict[str, object]:
-    """Lists logs, method, choices and errors of a fit, for `model.json`."""
-    return {
-        "logs": describe_logs(logs),
-        "method": method.name,
-        "tool_version": VERSION,
-        "cutoff_hz": choice.low_pass,
-        "smoothing": choice.smoother.to_dict(),
-        "ridge": choice.ridge,
-        "velocity_scales": list(choice.velocity_scales),
-        "seed": seed,
-        "band95": [joint.band for joint in joints],
-        "band_growth": choice.band.growth.tolist(),
-        "band_covariance": choice.band.covariance.tolist(),
-        "band_reach": choice.band.reach.tolist(),
-        "noise_floor": [joint.noise_floor for joint in joints],
-        "residual_rms": [joint.residual_rms for joint in joints],
-        "held_out_rms": [joint.held_out_rms for joint in joints],
-        "torque_rms": [joint.torque_rms for joint in joints],
-        "joints_identified": [joint.identified for joint in joints],
-    }

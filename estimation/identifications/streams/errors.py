@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from estimation.identifications.assembly import Figures
 from estimation.identifications.fit import MOST_ROWS, STRETCHES
 from estimation.regressions.preparation import Rows
 from estimation.uncertainty.quantiles import BAND
@@ -74,6 +75,18 @@ class Errors:
             if self.rows <= begin < self.rows + len(error):
                 self._keep(part, predicted, begin - self.rows)
         self.rows += len(error)
+
+    @property
+    def figures(self) -> Figures:
+        """The sums over all rows."""
+        return Figures(
+            rows=np.maximum(self.judged, 1),
+            torque=self.torque,
+            sums=self.sums,
+            residual=self.squares,
+            floor=self.floor,
+            band=self.band,
+        )
 
     @property
     def band(self) -> Array:

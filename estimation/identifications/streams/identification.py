@@ -5,13 +5,13 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from estimation.estimators import Estimator, Solution
 from estimation.estimators import estimator as choose_estimator
+from estimation.identifications.assembly import assemble, describe_logs_and_method, joint_fits
 from estimation.identifications.choices import Candidates, Choice, choose
 from estimation.identifications.comparison import MOST_ROWS, STRETCHES
-from estimation.identifications.estimate import Estimate, JointFit, colour_of
+from estimation.identifications.estimate import Estimate
 from estimation.identifications.fit import (
     AVERAGED,
     Fit,
@@ -20,14 +20,12 @@ from estimation.identifications.fit import (
     second_pass,
     sum_moments,
 )
-from estimation.identifications.identification import describe_fit
 from estimation.identifications.model_forms import ModelForm
 from estimation.identifications.streams.errors import Errors
 from estimation.identifications.streams.pieces import Pieces
 from estimation.identifications.streams.survey import BLOCK, merged_report, survey
-from estimation.identifications.verdicts import determined_parameters, require_predictable
+from estimation.identifications.verdicts import require_predictable
 from estimation.logs.parquet_streams import LogStream
-from estimation.models.model import Model
 from estimation.preprocessing import LowPass
 from estimation.regressions.braking_friction import with_braking_friction
 from estimation.regressions.joint_regressor import JointRegressor
@@ -39,8 +37,6 @@ from robots.common.parallel import one_blas_thread
 from robots.common.progress import SILENT, Progress
 from robots.robot import Robot
 from robots.terms import BendingFriction, FrictionTerm
-
-Array = NDArray[np.float64]
 
 METHODS = ("wls", "ols")
 # How often the file is read: for the survey, the speeds, the moments and the errors.
@@ -120,36 +116,17 @@ def identify_stream(
     base = form.chosen(base, choice, by_position)
     period = float(np.median([part.period for part in found.segments]))
     fitted, errors = _fit(base, pieces, chosen, choice, seed, bar, period)
-    joints = _joints(fitted, errors, predictable)
-    determined = determined_parameters(fitted, joints)
     bar.finish()
-    colour = colour_of(np.sqrt(np.maximum(np.diag(fitted.covariance), 0.0)), fitted.white, determined)
     provenance = {
-        **describe_fit([], chosen, choice, joints, seed),
+        **describe_logs_and_method([], chosen, seed),
         "logs": stream.describe(),
-        "colour": colour,
         "recorded": errors.recorded,
-        "gravities": [list(gravity) for gravity in base.gravities],
         "read_in_pieces": {"rows": errors.rows, "kept": len(fitted.torque)},
     }
-    provenance |= {} if fitted.prior_share is None else {"prior_share": fitted.prior_share.tolist()}
-    return Estimate(
-        model=Model(
-            torque_model=base.model,
-            columns=base.independent,
-            values=fitted.solution.values,
-            covariance=fitted.covariance,
-            determined=determined,
-            formulas=base.formulas(),
-            provenance=provenance,
-        ),
-        choice=choice,
-        joints=joints,
-        white_noise_errors=fitted.white,
-        t=np.concatenate([part.motion.t for part in fitted.rows]),
-        dq=np.concatenate([part.motion.dq for part in fitted.rows]),
-        measured=np.concatenate([part.tau for part in fitted.rows]),
-        predicted=fitted.torque,
+    return assemble(
+        fitted,
+        joint_fits(fitted, errors.figures, predictable),
+        provenance,
         dropped_rows=0,
         gates=(report,),
         fitted_rows=errors.rows,
@@ -238,26 +215,4 @@ def _fit(
             prior_share=share,
         ),
         errors,
-    )
-
-
-def _joints(fitted: Fit, errors: Errors, predictable: NDArray[np.bool_]) -> tuple[JointFit, ...]:
-    total, choice = np.maximum(errors.judged, 1), fitted.choice
-    figures = np.sqrt([errors.torque / total, errors.squares / total, fitted.nominal / total])
-    spread = np.sqrt(np.maximum(figures[0] ** 2 - (errors.sums / total) ** 2, 0.0))
-    band, floor = errors.band, errors.floor
-    return tuple(
-        JointFit(
-            joint=j + 1,
-            name=name,
-            torque_rms=float(figures[0, j]),
-            torque_spread=float(spread[j]),
-            residual_rms=float(figures[1, j]),
-            held_out_rms=float(choice.held_out[j]),
-            nominal_rms=float(figures[2, j]),
-            noise_floor=float(floor[j]),
-            band=float(band[j]),
-            identified=bool(predictable[j]),
-        )
-        for j, name in enumerate(fitted.base.model.robot.joint_names)
     )
