@@ -18,7 +18,7 @@ from estimation.comparisons.friction_curves import FrictionCurves, common_speeds
 from estimation.comparisons.merging import merge
 from estimation.comparisons.payload_differences import PayloadDifference, find_payloads, without_payloads
 from estimation.comparisons.result import ModelComparison
-from estimation.comparisons.runs import Run, in_time_order, relabelled, run_of
+from estimation.comparisons.runs import Run, in_time_order, relabelled, run_of, with_position_torques
 from estimation.models.model import Model
 from robots.common.errors import InputError
 from robots.common.plain import percent
@@ -52,6 +52,7 @@ def compare(models: Sequence[Model | Run], *, alpha: float = FALSE_ALARMS) -> Mo
     given = [
         item if isinstance(item, Run) else run_of(item, f"run {number}") for number, item in enumerate(models, start=1)
     ]
+    given = with_position_torques(given)
     require_comparable(given)
     runs, hours, order = in_time_order(relabelled(given))
     speeds = common_speeds(runs)

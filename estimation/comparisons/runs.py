@@ -12,10 +12,12 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.linalg import block_diag
 
 from estimation.models.model import Model, load_model
 from robots.common.errors import InputError
 from robots.common.plain import all_finite, finite, number
+from robots.terms import PositionTorque
 
 Array = NDArray[np.float64]
 
@@ -91,6 +93,43 @@ def run_of(model: Model, label: str, file: str | Path = "") -> Run:
         temperature=temperature,
         ambient=float(_mean(outside, weights)[0]) if logs else np.nan,
         file=str(file),
+    )
+
+
+def with_position_torques(runs: Sequence[Run]) -> list[Run]:
+    """Gives every model a torque by position where some have one.
+
+    `identify` includes it where it predicts other motions better. A model without it states a torque of zero, which
+    is as uncertain as that of the model with it.
+    """
+    has = [[column.term == PositionTorque.name for column in run.model.parameters] for run in runs]
+    known = next((k for k, flags in enumerate(has) if any(flags)), None)
+    if known is None:
+        return list(runs)
+    return [
+        run if any(flags) else replace(run, model=_with_columns_of(run.model, runs[known].model, np.array(has[known])))
+        for run, flags in zip(runs, has, strict=True)
+    ]
+
+
+def _with_columns_of(model: Model, other: Model, chosen: NDArray[np.bool_]) -> Model:
+    """Gives a model that has some columns of another one (b,), with values of zero and its errors."""
+    torque = replace(model.torque_model, terms=(*model.torque_model.terms, PositionTorque()))
+    extra, provenance = np.flatnonzero(chosen), dict(model.provenance)
+    if (share := provenance.get("prior_share")) is not None:
+        shares = other.provenance.get("prior_share") or np.zeros(len(other.values))
+        provenance["prior_share"] = [*share, *(float(shares[i]) for i in extra)]
+    names = [*model.names, *(other.names[i] for i in extra)]
+    return replace(
+        model,
+        torque_model=torque,
+        columns=tuple(torque.names.index(name) for name in names),
+        values=np.concatenate([model.values, np.zeros(len(extra))]),
+        covariance=block_diag(model.covariance, other.covariance[np.ix_(extra, extra)]),
+        determined=np.concatenate([model.determined, other.determined[extra]]),
+        formulas=(*model.formulas, *(other.formulas[i] for i in extra)),
+        provenance=provenance,
+        felt=None if model.felt is None else np.concatenate([model.felt, np.zeros(len(extra))]),
     )
 
 

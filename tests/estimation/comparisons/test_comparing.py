@@ -12,6 +12,7 @@ from estimation.comparisons import compare, read_model_runs, run_of
 from robots.base_parameters import find_base_parameters
 from robots.common.errors import InputError
 from robots.regressor import default_model
+from robots.terms import PositionTorque
 
 PAIRS = 60
 
@@ -194,6 +195,30 @@ def test_other_columns_are_named(draw, upright):
     )
     with pytest.raises(InputError, match=r"run 1 lacks the parameters f3_1, f4_1, f3_2.*--friction"):
         compare([draw(2), other])
+
+
+@pytest.mark.parametrize("stated", [0.0, 0.5])
+def test_a_torque_by_position_that_one_model_lacks_is_zero_there(draw, upright, stated):
+    """A model without a torque by position compares with one that has it: it differs where that torque is not zero."""
+    plain, other = draw(60), draw(61)
+    terms = replace(other.torque_model, terms=(*other.torque_model.terms, PositionTorque()))
+    columns = tuple(terms.names.index(name) for name in (*other.names, "sin2_2", "cos2_2"))
+    size = len(columns)
+    covariance = 1e-4 * np.eye(size)
+    covariance[:-2, :-2] = other.covariance
+    with_torque = replace(
+        other,
+        torque_model=terms,
+        columns=columns,
+        values=np.concatenate([other.values, [stated, 0.0]]),
+        covariance=covariance,
+        determined=np.ones(size, dtype=bool),
+        formulas=tuple(terms.columns[i].name for i in columns),
+        provenance={**other.provenance, "prior_share": [0.0] * size},
+    )
+    for pair in ([plain, with_torque], [with_torque, plain]):
+        parts = {item.name for item in compare(pair).significant if item.level == "part"}
+        assert parts == ({"position torque of joint 2"} if stated else set())
 
 
 def test_another_robot_is_named(draw, arm, upright):
