@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
@@ -13,6 +14,7 @@ from estimation.diagnosis.findings import Finding, Gain, Parameter
 from estimation.diagnosis.hypothesis_tests.fitted_effects import FittedEffect
 from estimation.diagnosis.hypothesis_tests.problem import Problem
 from estimation.diagnosis.joint_fits.extended_fit import ExtendedFit
+from estimation.diagnosis.recordings.recording import Recording
 from estimation.diagnosis.searches.selection import SelectedEffect
 from estimation.uncertainty.quantiles import NORMAL_95
 from robots.robot import Robot
@@ -56,9 +58,10 @@ def word_finding(
     units = {}
     if joint is not None:
         units = {"force": force_unit(robot, joint - 1), "length": length_unit(robot, joint - 1)}
-    parameters = _parameters(robot, member, fitted, i, known)
+    parameters = _within_logs(problem.recording, _parameters(robot, member, fitted, i, known), hypothesis.effect)
     sentence = hypothesis.effect.describe(joint, extension.coefficients, extension.shape, **units)
-    sentence += _uncertain_times(parameters)
+    sentence, between = _between_logs(problem.recording, sentence, parameters)
+    sentence += "" if between else _uncertain_times(parameters)
     if hypothesis.effect.undetermined_text and not known[: len(extension.coefficients)].any():
         sentence = hypothesis.effect.undetermined_text.format(joint=joint)
     pattern = hypothesis.name if hypothesis.name.startswith(PREFIX) else ""
@@ -79,6 +82,29 @@ def word_finding(
         coordinate=hypothesis.effect.coordinate(problem.state_for(hypothesis.effect), joint, member.shape)[0],
         pattern=pattern,
     )
+
+
+def _within_logs(recording: Recording, parameters: Sequence[Parameter], effect: Effect) -> tuple[Parameter, ...]:
+    """Limits the intervals of moments to the time of the logs: nothing is known of others."""
+    moments = {shape.name for shape in effect.shapes if shape.moment}
+    first, last = float(recording.t[0]), float(recording.t[-1])
+    return tuple(
+        replace(own, ci95=(max(own.ci95[0], first), min(own.ci95[1], last)))
+        if own.name in moments and np.isfinite(own.ci95).all()
+        else own
+        for own in parameters
+    )
+
+
+def _between_logs(recording: Recording, sentence: str, parameters: Sequence[Parameter]) -> tuple[str, bool]:
+    """States a change in the pause between two logs by the names of these logs, and whether it is one."""
+    for own in parameters:
+        for k, start in enumerate(recording.starts[1:]):
+            # The first row of a log is as late as a change in the pause before it can be.
+            if own.name == "change_time" and recording.t[start - 1] < own.value <= recording.t[start]:
+                names = f"between {recording.names[k]} and {recording.names[k + 1]}"
+                return re.sub(rf"(at|from) t = {own.value:.2f} s( on)?", names, sentence), True
+    return sentence, False
 
 
 def _uncertain_times(parameters: Sequence[Parameter]) -> str:

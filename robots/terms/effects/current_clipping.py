@@ -44,8 +44,13 @@ class CurrentClipping(JointEffect):
         return ((LEAST, 1.0),)
 
     def is_plausible(self, robot: Robot, joint: Place, coefficients: Array, shape: tuple[float, ...] = ()) -> bool:
-        """Returns whether most of the torque is lost; its upper limit, one, is the expected value."""
-        return float(coefficients[0]) > LEAST
+        """Returns whether most of the torque is lost, at a level that a drive of the joint's rating may have.
+
+        The upper limit of the share, one, is the expected value.
+        """
+        rating = 0.0 if joint is None else float(robot.limits.torque[joint - 1])
+        weak = bool(shape) and np.isfinite(rating) and shape[0] < WEAKEST * rating
+        return float(coefficients[0]) > LEAST and not weak
 
     def grid(self, situation: Situation, joint: Place) -> tuple[tuple[float, ...], ...]:
         """Lists levels that 0.15 to 40 % of the samples exceed, or the largest torque alone if it is a flat top."""
@@ -54,14 +59,22 @@ class CurrentClipping(JointEffect):
             return ((flat,),)
         size = np.abs(situation.whole[:, joint - 1])
         levels = np.quantile(size, (0.6, 0.7, 0.8, 0.875, 0.925, 0.96, 0.98, 0.99, 0.996, 0.9985))
-        return tuple((float(level),) for level in np.unique(levels) if 1e-3 < level < size.max())
+        least = self._least(situation, joint)
+        return tuple((float(level),) for level in np.unique(levels) if least < level < size.max())
 
     def bounds(self, situation: Situation, joint: Place) -> tuple[tuple[float, float], ...]:
         """Bounds the level by the largest torque, or fixes it at the log's flat top."""
         assert joint is not None
         top = float(np.abs(situation.whole[:, joint - 1]).max(initial=0.0))
         flat = self._flat(situation, joint)
-        return ((flat, flat),) if flat else ((max(0.2 * top, 1e-3), max(top, 2e-3)),)
+        least = max(0.2 * top, self._least(situation, joint))
+        return ((flat, flat),) if flat else ((least, max(top, 2 * least)),)
+
+    def _least(self, situation: Situation, joint: int) -> float:
+        """Returns the lowest level that the logged torque allows: noise aside, a drive delivers no more than it."""
+        if situation.measured is None:
+            return 1e-3
+        return max(1e-3, float(np.quantile(np.abs(situation.measured[:, joint - 1]), DELIVERED)) / ABOVE)
 
     def _flat(self, situation: Situation, joint: int) -> float:
         """Returns the log's largest torque if it is a flat top that the modelled torque approaches, else zero."""
@@ -121,6 +134,10 @@ class CurrentClipping(JointEffect):
 
 LEAST = 0.5
 """Least fraction of the torque beyond the level that a limit removes; the true value is one."""
+WEAKEST = 0.05
+"""Least level as a share of the joint's rated torque."""
+DELIVERED, ABOVE = 0.98, 1.2
+"""Share of the logged torques that noise may not lift above the level by more than this factor."""
 FLAT = 1e-4
 """Relative distance from the largest torque within which a sample is at it."""
 FLAT_SAMPLES = 30

@@ -12,7 +12,15 @@ import pytest
 from estimation.diagnosis.findings import Finding, Gain, Parameter
 from estimation.diagnosis.hypothesis_tests.fitted_effects import FittedEffect
 from estimation.diagnosis.hypothesis_tests.hypotheses import Hypothesis
-from estimation.diagnosis.results.wording import _parameters, _roughly, _stopped, _uncertain_times, no_part
+from estimation.diagnosis.results.wording import (
+    _between_logs,
+    _parameters,
+    _roughly,
+    _stopped,
+    _uncertain_times,
+    _within_logs,
+    no_part,
+)
 from estimation.models.extension import Extension
 from robots.robot import Robot
 from robots.terms.effects import EFFECTS
@@ -162,3 +170,19 @@ def test_a_push_with_open_edges_may_have_lasted_longer() -> None:
     assert not _uncertain_times([start, duration])
     open_ = replace(start, ci95=(-np.inf, np.inf), determined=False)
     assert _uncertain_times([open_, duration]) == " It may have begun earlier or ended later."
+
+
+@pytest.mark.parametrize(("value", "between"), [(10.0, True), (12.0, True), (12.5, False), (5.0, False)])
+def test_a_change_between_two_logs_is_said_as_that(value: float, between: bool) -> None:
+    """A change in the pause between two logs has their names, and its time stays inside the logs."""
+    t = np.concatenate([np.arange(0.0, 8.0, 0.01), np.arange(12.0, 20.0, 0.01)])
+    recording: Any = SimpleNamespace(t=t, starts=(0, 800), names=("monday", "tuesday"))
+    own = Parameter(
+        name="change_time", value=value, unit="s", standard_error=300.0, ci95=(-590.0, 610.0), determined=False
+    )
+    (limited,) = _within_logs(recording, [own], EFFECTS["payload_change"])
+    assert limited.ci95 == (0.0, pytest.approx(19.99))
+    sentence = EFFECTS["payload_change"].describe(None, np.ones(10), (value, 1.0))
+    assert sentence == f"The payload increased by 1 kg at t = {value:.2f} s."
+    found = _between_logs(recording, sentence, [limited])
+    assert found == (("The payload increased by 1 kg between monday and tuesday." if between else sentence), between)
