@@ -20,7 +20,7 @@ from estimation.uncertainty.quantiles import normal_limit
 from robots.base_parameters import find_base_parameters
 from robots.common.plain import finite
 from robots.geometry.inertia import SIZE
-from robots.terms.situations.flange_body import FLANGE, last_link
+from robots.terms.situations.flange_body import FLANGE, link_columns
 from robots.terms.situations.sensitivities import moved_body
 
 Array = NDArray[np.float64]
@@ -102,7 +102,7 @@ def find_payloads(common: CommonParameters, model: Model, alpha: float) -> tuple
         model: the first run's.
         alpha: chance of a false alarm over all runs.
     """
-    if FLANGE in model.robot.assumed or not last_link(model.torque_model):
+    if FLANGE in model.robot.assumed or not link_columns(model.torque_model):
         return ()
     used = [i for i, column in enumerate(common.columns) if common.determined[i] and not column.friction]
     runs = [run for run in range(1, len(common.values)) if _differs(common, run, used, alpha)]
@@ -132,7 +132,7 @@ def _flange_columns(common: CommonParameters, model: Model) -> Array:
     """The change of the parameters (b, 10) by a body on the flange, in its frame."""
     terms = model.torque_model
     base = find_base_parameters(terms, gravities=model.gravities)
-    rows = dict(zip((column.name for column in base.columns), base.grouping[:, list(last_link(terms))], strict=True))
+    rows = dict(zip((column.name for column in base.columns), base.grouping[:, list(link_columns(terms))], strict=True))
     nothing = np.zeros(SIZE)
     return np.array([rows.get(column.name, nothing) for column in common.columns]) @ moved_body(terms.robot.chain.tip)
 

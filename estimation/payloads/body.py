@@ -118,7 +118,8 @@ def read_body(text: str) -> Body:
         The body in the flange frame.
 
     Raises:
-        InputError: a text of another form, a file that is no payload, or a body that cannot exist.
+        InputError: a text of another form, a file that is no payload or one on another link, or a body that cannot
+            exist.
     """
     parts = text.split(",")
     if len(parts) == 4:
@@ -130,7 +131,10 @@ def read_body(text: str) -> Body:
             raise InputError(f"the payload {text}", allowed="finite numbers")
         check_body(mass, np.zeros((3, 3)), f"the payload {text}")
         return Body(point_mass(mass, (x, y, z)))
-    return body_from_dict(read_payload_file(text), text)
+    data = read_payload_file(text)
+    if data.get("link") is not None:
+        raise InputError(f"a payload on link {data['link']}", file=text, allowed="a payload on the flange")
+    return body_from_dict(data, text)
 
 
 def read_payload_file(path: str | Path) -> dict[str, Any]:

@@ -8,13 +8,12 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from estimation.payloads.intervals import AXES, Quantity
+from estimation.payloads.mounts import Mount
 from estimation.uncertainty.quantiles import NORMAL_95
 from robots.common.errors import InputError, NotIdentifiableError
-from robots.geometry.chain import Chain
 from robots.regressor import TorqueModel
-from robots.robot import Robot
 from robots.terms import RigidBody
-from robots.terms.situations.flange_body import last_link, payload_part
+from robots.terms.situations.flange_body import payload_part
 from robots.terms.situations.sensitivities import moved_body
 
 Array = NDArray[np.float64]
@@ -54,7 +53,7 @@ def determined(found: Sequence[Quantity]) -> tuple[bool, ...]:
     return tuple(bool(item.half_width <= limits[item.unit]) for item in found)
 
 
-def is_nothing(free: float, error: float, robot: Robot, q: ArrayLike, gravity: Array | None) -> bool:
+def is_nothing(free: float, error: float, mount: Mount, q: ArrayLike, gravity: Array | None) -> bool:
     """Whether a log shows that there is no payload, within the error of the mass.
 
     A mass below zero may be what the arm's model misses. Only one beyond doubt is that of swapped logs.
@@ -62,22 +61,22 @@ def is_nothing(free: float, error: float, robot: Robot, q: ArrayLike, gravity: A
     Args:
         free: mass by least squares without constraints [kg].
         error: its standard error [kg].
-        robot: the robot.
+        mount: what carries the payload.
         q: positions (N, n) of the log with the payload [rad or m].
         gravity: in the base frame (3,) [m/s2]; None as described.
     """
     if not -SURE * error <= free <= NORMAL_95 * error:
         return False
     # Without the motion that shows it, a mass is open and not absent.
-    return "mass" not in never_shown(robot, gravity) and not missing_motion(robot, q, gravity)
+    return "mass" not in never_shown(mount, gravity) and not missing_motion(mount, q, gravity)
 
 
-def require_determined(found: Sequence[Quantity], robot: Robot, q: ArrayLike, gravity: Array | None) -> None:
+def require_determined(found: Sequence[Quantity], mount: Mount, q: ArrayLike, gravity: Array | None) -> None:
     """Refuses a payload whose mass or centre the log leaves open.
 
     Args:
         found: mass and centre with their intervals.
-        robot: the robot.
+        mount: what carries the payload.
         q: positions (N, n) of the log with the payload [rad or m].
         gravity: in the base frame (3,) [m/s2]; None as described.
 
@@ -97,76 +96,79 @@ def require_determined(found: Sequence[Quantity], robot: Robot, q: ArrayLike, gr
     if not open_:
         return
     shown = f"{free:.3g} ({free - mass.half_width:.3g} to {free + mass.half_width:.3g}) kg"
-    never = never_shown(robot, gravity)
-    missing = missing_motion(robot, q, gravity)
+    never = never_shown(mount, gravity)
+    missing = missing_motion(mount, q, gravity)
     if not known["mass"]:
         if "mass" in never:
-            missing = f"no motion of {robot.name} shows the mass of a payload"
+            missing = f"no motion of {mount.robot.name} shows the mass of a payload on its {mount.name}"
         raise NotIdentifiableError(
             f"the log does not determine the payload's mass: {shown}",
-            remedy=missing or f"check that the payload was on the flange; {LONGER}",
+            remedy=missing or f"check that the payload was on the {mount.name} (--link names another place); {LONGER}",
         )
     axes = [name[-1] for name in open_ if name not in never]
     if axes:
         raise NotIdentifiableError(
-            f"the log does not determine the payload's centre of mass along {', '.join(axes)} of the flange (the mass "
+            f"the log does not determine the payload's centre of mass along {', '.join(axes)} of the "
+            f"{mount.name} (the mass "
             f"is {shown})",
             remedy=missing or LONGER,
         )
 
 
-def never_shown(robot: Robot, gravity: Array | None) -> frozenset[str]:
+def never_shown(mount: Mount, gravity: Array | None) -> frozenset[str]:
     """Names what the torques of a robot show of no payload, whatever the motion.
 
     The height of the centre of mass on a SCARA is an example: the flange never tilts.
 
     Args:
-        robot: the robot.
+        mount: what carries the payload.
         gravity: in the base frame (3,) [m/s2]; None as described.
 
     Returns:
-        Of ``mass``, ``centre_x``, ``centre_y`` and ``centre_z`` in the flange frame, those that no motion shows.
+        Of ``mass``, ``centre_x``, ``centre_y`` and ``centre_z`` in the frame of the mount, those that no motion shows.
     """
-    model = TorqueModel(robot.under(gravity), (RigidBody(),))
-    grouping = payload_part(model).grouping[:, list(last_link(model))] @ moved_body(robot.chain.tip)
+    model = TorqueModel(mount.robot.under(gravity), (RigidBody(),))
+    grouping = payload_part(model, mount.link).grouping[:, list(mount.columns(model))] @ moved_body(mount.pose)
     space = np.linalg.qr(grouping.T)[0]
     parts = np.linalg.norm(space[:4], axis=1)  # of the unit vectors of mass and first moments
     return frozenset(name for name, part in zip(SHOWABLE, parts, strict=True) if part < 1 - SHOWN)
 
 
-def missing_motion(robot: Robot, q: ArrayLike, gravity: Array | None) -> str:
-    """Says which motion of the wrist a log lacks; empty if gravity acts along all axes of the flange that it can.
+def missing_motion(mount: Mount, q: ArrayLike, gravity: Array | None) -> str:
+    """Says which motion of the last joints before a payload a log lacks.
+
+    It is empty if gravity acts along all axes of the payload's frame that it can.
 
     Args:
-        robot: the robot.
+        mount: what carries the payload.
         q: positions (N, n) [rad or m].
         gravity: in the base frame (3,) [m/s2]; None as described.
     """
     positions = np.asarray(q, dtype=float)
     positions = positions[:: max(1, len(positions) // POSES)]
     ranges = np.ptp(positions, axis=0)
-    chain = robot.under(gravity).chain
+    robot = mount.robot
     anywhere = np.random.default_rng(0).uniform(-np.pi, np.pi, (POSES, robot.n))
-    turned, possible = (_gravity_spread(chain, poses) for poses in (positions, anywhere))
+    turned, possible = (_gravity_spread(mount, poses, gravity) for poses in (positions, anywhere))
     steady = [axis for k, axis in enumerate(AXES) if turned[k] < STEADY <= possible[k]]
     wrist = [
         joint
-        for joint in range(max(0, robot.n - WRIST), robot.n)
-        if chain.kinds[joint] == "revolute" and ranges[joint] < LITTLE
+        for joint in range(max(0, mount.joints - WRIST), mount.joints)
+        if robot.chain.kinds[joint] == "revolute" and ranges[joint] < LITTLE
     ]
     if not steady and not wrist:
         return ""
     names = " and ".join(
         f"joint {j + 1} ({robot.joint_names[j]}, moved {np.degrees(ranges[j]):.2g} deg)" for j in wrist
     )
-    move = f"move {names} by 90 deg or more" if wrist else "move the wrist joints farther"
-    goal = f", so that gravity turns along {', '.join(steady)} of the flange" if steady else ""
-    design = f"`oed design --robot {robot.stated or robot.name} --payload-only`"
-    return f"{move}{goal}; {design} designs such a motion"
+    move = f"move {names} by 90 deg or more" if wrist else "move the joints before it farther"
+    goal = f", so that gravity turns along {', '.join(steady)} of the {mount.name}" if steady else ""
+    design = f"; `oed design --robot {robot.stated or robot.name} --payload-only` designs such a motion"
+    return f"{move}{goal}{design if mount.link is None else ''}"
 
 
-def _gravity_spread(chain: Chain, positions: Array) -> Array:
-    """Standard deviation (3,) of gravity's direction in the flange frame over positions (N, n)."""
-    field = np.asarray(chain.gravity, dtype=float)
+def _gravity_spread(mount: Mount, positions: Array, gravity: Array | None) -> Array:
+    """Standard deviation (3,) of gravity's direction in the payload's frame over positions (N, n)."""
+    poses, field = mount.poses(positions, gravity)
     field = field / max(float(np.linalg.norm(field)), np.finfo(float).tiny)
-    return np.asarray(np.einsum("tij,i->tj", chain.flange(positions)[:, :3, :3], field).std(axis=0))
+    return np.asarray(np.einsum("tij,i->tj", poses[:, :3, :3], field).std(axis=0))

@@ -1,7 +1,7 @@
 """Linear equations of a payload and of the arm that carries it, from one log or from two.
 
 With the arm's parameters b = b0 + d, what a log's torque has beyond b0 is ``tau - Y b0 = Y d + Z p``: Y are the arm's
-columns, and Z the ten columns of a body on the flange, which are zero in a log without the payload.
+columns, and Z the ten columns of a body on its mount, which are zero in a log without the payload.
 """
 
 from __future__ import annotations
@@ -12,13 +12,13 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from estimation.payloads.mounts import Mount
 from estimation.payloads.paths import PathMatch
 from estimation.regressions.preparation import Rows
 from estimation.uncertainty import Played
 from robots.geometry.inertia import SIZE
 from robots.regressor import TorqueModel
 from robots.signals import Motion
-from robots.terms.situations.flange_body import last_link
 from robots.terms.situations.sensitivities import moved_body
 
 Array = NDArray[np.float64]
@@ -37,6 +37,7 @@ class Arm:
         values: the parameters b0 (b,).
         precision: of what is known of them without the logs (b, b), see `weight`.
         target: what that knowledge says of d (b,).
+        mount: what carries the payload.
         weight: by which the knowledge counts against rows whose noise is correlated: rows count as if they were
             independent, and carry that many times less information.
     """
@@ -47,6 +48,7 @@ class Arm:
     precision: Array
     target: Array
     weight: float
+    mount: Mount
 
     @property
     def size(self) -> int:
@@ -65,14 +67,14 @@ class Arm:
         if not carries:
             Y = model.regressor(*state, columns=self.columns)
             return np.concatenate([Y, np.zeros((*Y.shape[:2], SIZE))], axis=2)
-        Y = model.regressor(*state, columns=(*self.columns, *last_link(model)))
-        Y[:, :, -SIZE:] = Y[:, :, -SIZE:] @ moved_body(model.robot.chain.tip)
+        Y = model.regressor(*state, columns=(*self.columns, *self.mount.columns(model)))
+        Y[:, :, -SIZE:] = Y[:, :, -SIZE:] @ moved_body(self.mount.pose)
         return Y
 
 
 @dataclass(frozen=True, eq=False)
 class Source:
-    """The rows of one log, whether the payload is on the flange, and the period of its motion [s]; None for none."""
+    """The rows of one log, whether they are with the payload, and the period of its motion [s]; None for none."""
 
     rows: Rows
     beyond: Array

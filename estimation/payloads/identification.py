@@ -19,6 +19,7 @@ from estimation.payloads.determination import is_nothing, require_determined
 from estimation.payloads.equations import Arm, Equations, PairedEquations, Source
 from estimation.payloads.fit import PayloadFit, fit_payload
 from estimation.payloads.intervals import quantities
+from estimation.payloads.mounts import Mount
 from estimation.payloads.paths import PathMatch, match_paths
 from estimation.payloads.physical import PhysicalBody, physical_body
 from estimation.payloads.result import JointEvidence, PayloadEstimate
@@ -29,7 +30,6 @@ from robots.common.parallel import one_blas_thread
 from robots.common.progress import SILENT, Progress
 from robots.robot import Robot
 from robots.signals import Log
-from robots.terms.situations.flange_body import require_flange
 
 Array = NDArray[np.float64]
 
@@ -50,6 +50,7 @@ def identify_payload(
     robot: Robot | None = None,
     without: Log | Sequence[Log] = (),
     model: Model | Estimate | None = None,
+    link: int | None = None,
     seed: int = 0,
     progress: Progress | None = None,
 ) -> PayloadEstimate:
@@ -66,11 +67,12 @@ def identify_payload(
         without: logs without the payload.
         model: the robot without payload, instead of `without`; with `without`, an `Estimate` from those logs, which
             saves its fit.
+        link: the link that carries the payload, counted from 1 by the joint that moves it; None for the flange.
         seed: of the noise drawn to correct the standard errors.
         progress: hears how far it is.
 
     Returns:
-        The payload in the flange frame.
+        The payload in the frame of the flange, or of the link.
 
     Raises:
         InputError: neither `without` nor a model, logs of another robot or that the gate refuses, or a mass that is
@@ -94,13 +96,13 @@ def identify_payload(
         known, reference = estimate.model, estimate.recording or make_ready(machine, free)
         machine = reference.robot
     assert known is not None
-    require_flange(known.robot)
+    mount = Mount(known.robot, link)
     bar.start("fitting the payload", None)
     for log in loaded:
         if log.gravity is not None:
             require_known(known.torque_model, known.columns, known.gravities, log.gravity)
     cutoff = float(known.provenance.get("cutoff_hz", CUTOFF))
-    arm = _arm_of_logs(estimate) if estimate is not None and free else _arm_of_model(known)
+    arm = _arm_of_logs(estimate, mount) if estimate is not None and free else _arm_of_model(known, mount)
     prepared, carried = _prepared(make_ready(machine, loaded), reference, known)
     sources = [
         Source.of(arm, rows, k < carried, _extra(known, rows), log.period)
@@ -110,7 +112,7 @@ def identify_payload(
     period = float(np.median([log.positions.period for log in prepared]))
     found = fit_payload(arm, equations, period=period, seed=seed)
     bar.finish()
-    return _result(machine, known, sources, found, match, loaded, free)
+    return _result(mount, machine, known, sources, found, match, loaded, free)
 
 
 def _prepared(loaded: Recording, free: Recording | None, model: Model) -> tuple[list[Prepared], int]:
@@ -126,7 +128,7 @@ def _prepared(loaded: Recording, free: Recording | None, model: Model) -> tuple[
     return held, len(carried)
 
 
-def _arm_of_logs(estimate: Estimate) -> Arm:
+def _arm_of_logs(estimate: Estimate, mount: Mount) -> Arm:
     """The arm's parameters by the logs without payload, and the prior of their fit; the logs themselves are data."""
     model, choice = estimate.model, estimate.choice
     shares = [(joint.torque_rms / joint.residual_rms) ** 2 for joint in estimate.joints if joint.residual_rms]
@@ -137,10 +139,11 @@ def _arm_of_logs(estimate: Estimate) -> Arm:
         precision=choice.prior.precision,
         target=choice.prior.target - model.values,
         weight=choice.ridge * estimate.samples * float(np.sum(shares)),
+        mount=mount,
     )
 
 
-def _arm_of_model(model: Model) -> Arm:
+def _arm_of_model(model: Model, mount: Mount) -> Arm:
     """The arm's parameters by a model, its covariance widened by a drift of friction."""
     friction = np.array([column.friction for column in model.parameters])
     covariance = model.covariance + np.diag(np.where(friction, FRICTION_DRIFT * model.values, 0.0) ** 2)
@@ -151,6 +154,7 @@ def _arm_of_model(model: Model) -> Arm:
         precision=floored_inverse(covariance),
         target=np.zeros(len(model.values)),
         weight=max(float(model.provenance.get("colour", 1.0)), 1.0) ** 2,
+        mount=mount,
     )
 
 
@@ -174,6 +178,7 @@ def _equations(arm: Arm, sources: Sequence[Source], loaded: int) -> tuple[list[E
 
 
 def _result(
+    mount: Mount,
     robot: Robot,
     model: Model,
     sources: Sequence[Source],
@@ -194,10 +199,10 @@ def _result(
             remedy="check that the logs are of one robot, and that nothing touches the payload",
         )
     error = float(np.sqrt(found.covariance[0, 0]))
-    nothing = is_nothing(float(found.values[0]), error, robot, q, gravity)
+    nothing = is_nothing(float(found.values[0]), error, mount, q, gravity)
     body = NOTHING if nothing else _body(found)
     if not nothing:
-        require_determined(quantities(found.values, found.covariance, body.parameters), robot, q, gravity)
+        require_determined(quantities(found.values, found.covariance, body.parameters), mount, q, gravity)
     method = "model" if not free else "difference" if match is not None and match.same else "joint fit"
     return PayloadEstimate(
         robot=robot.name,
@@ -211,6 +216,7 @@ def _result(
             for j, (name, a, b) in enumerate(zip(robot.joint_names, without, residual, strict=True))
         ),
         rows=found.rows,
+        link=mount.link,
         warnings=tuple(_warnings(body, ratio, match)),
         provenance={
             "logs": describe_logs(loaded),

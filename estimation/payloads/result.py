@@ -55,17 +55,18 @@ class JointEvidence:
 
 @dataclass(frozen=True, kw_only=True)
 class PayloadEstimate:
-    """A payload, rigidly on the flange.
+    """A payload, rigidly on the flange or on another link.
 
     Attributes:
         robot: the robot's name.
         method: ``difference``, ``joint fit`` or ``model``.
-        body: the most plausible body, in the flange frame; one without mass if no payload was found.
+        body: the most plausible body, in the frame of what carries it; one without mass if no payload was found.
         nearest: parameters (10,) of the body that fits best.
         values: least squares without constraints (10,).
         covariance: of `values` (10, 10).
         joints: torque errors.
         rows: number of fitted rows.
+        link: the link that carries it, counted from 1; None for the flange.
         warnings: about the use of the results.
         provenance: logs, model, tool version.
         frame: pose (4, 4) of the frame that `quantities` refer to, in the flange frame.
@@ -79,6 +80,7 @@ class PayloadEstimate:
     covariance: Array
     joints: tuple[JointEvidence, ...]
     rows: int
+    link: int | None = None
     warnings: tuple[str, ...] = ()
     provenance: Mapping[str, Any] = field(default_factory=dict)
     frame: Array = field(default_factory=lambda: np.eye(4))
@@ -130,7 +132,8 @@ class PayloadEstimate:
 
     def summary(self) -> str:
         """Lists the quantities with their 95 % intervals, the torque errors, and warnings."""
-        where = "flange frame" if np.array_equal(self.frame, np.eye(4)) else "frame of --frame"
+        own = "flange frame" if self.link is None else f"on link {self.link}, in its frame"
+        where = own if np.array_equal(self.frame, np.eye(4)) else "frame of --frame"
         lines = [f"{self.robot}: payload by {METHODS[self.method]} ({self.rows} rows); {where}, 95 % intervals"]
         if not self.found:
             lines = [f"{self.robot}: no payload found: {self.limit}, by {METHODS[self.method]} ({self.rows} rows)"]
@@ -177,6 +180,7 @@ class PayloadEstimate:
             "format_version": FORMAT_VERSION,
             "robot": self.robot,
             "method": self.method,
+            "link": self.link,
             "found": self.found,
             "mass": seen.mass,
             "centre_of_mass": seen.centre.tolist(),
@@ -260,6 +264,7 @@ def load_payload(path: str | Path) -> PayloadEstimate:
             covariance=np.array(data["covariance"], dtype=float),
             joints=tuple(JointEvidence(**joint) for joint in data["joints"]),
             rows=data["rows"],
+            link=data.get("link"),
             warnings=tuple(data["warnings"]),
             provenance=data["provenance"],
             frame=np.array(data["frame"], dtype=float),

@@ -19,7 +19,7 @@ from estimation.thermal import ThermalTorqueModel, thermal_from_dict
 from robots.common.errors import InputError
 from robots.robot import Robot
 from robots.terms.effect_bases.capabilities import Persistence
-from robots.terms.situations.flange_body import FLANGE, last_link, with_body
+from robots.terms.situations.flange_body import FLANGE, link_columns, with_body
 from robots.terms.situations.sensitivities import moved_body
 
 Array = NDArray[np.float64]
@@ -102,7 +102,7 @@ class Baseline:
     @cached_property
     def _carries(self) -> tuple[int, ...]:
         known = FLANGE not in self.robot.assumed
-        return last_link(self.model.torque_model) if known else ()
+        return link_columns(self.model.torque_model) if known else ()
 
     @cached_property
     def _own(self) -> NDArray[np.bool_]:

@@ -79,6 +79,15 @@ def payload(
             show_default=False,
         ),
     ] = None,
+    link: Annotated[
+        int | None,
+        typer.Option(
+            "--link",
+            help="The payload is on this link, counted from 1 by the joint that moves it, and in its frame. Default: "
+            "on the flange.",
+            show_default=False,
+        ),
+    ] = None,
     seed: SeedOption = 0,
     out: OutOption = Path("payload"),
     tip: TipOption = None,
@@ -120,6 +129,8 @@ def payload(
                 "--payload without a number beside --without",
                 allowed="NUMBER=KG,X,Y,Z, because it is not clear whether logs without the payload carry it too",
             )
+        if link is not None and to:
+            raise InputError("--to and --link together", allowed="a payload on the flange for a controller")
         pose = _pose(frame)
         forms = list(dict.fromkeys(payload_export(name) for words in to or [] for name in words.split(",")))
         with ExitStack() as files:
@@ -157,6 +168,7 @@ def payload(
                 robot=None if known is not None else described,
                 without=logs[len(loaded) :],
                 model=known,
+                link=link,
                 seed=seed,
                 progress=progress,
             ).seen_from(pose)

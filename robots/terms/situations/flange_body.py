@@ -37,24 +37,34 @@ def with_body(model: TorqueModel, parameters: Array, body: Array) -> Array:
     result = np.array(parameters)
     if body.any():
         require_flange(model.robot)
-        last = last_link(model)
+        last = link_columns(model)
         if body.shape != (10,) or not last:
             raise InputError(f"a body of shape {body.shape}", allowed="(10,), on a model with rigid links")
         result[list(last)] += moved_body(model.robot.chain.tip) @ body
     return result
 
 
-def last_link(model: TorqueModel) -> tuple[int, ...]:
-    """Gives the indices of the last link's ten columns; none of a model without links."""
-    return tuple(i for i, column in enumerate(model.columns) if column.term == "rigid_body")[-10:]
+def link_columns(model: TorqueModel, link: int | None = None) -> tuple[int, ...]:
+    """Gives the indices of a link's ten columns; none of a model without links.
 
-
-def payload_part(model: TorqueModel) -> BaseParameters:
-    """Gives what the torques show of a body on the flange if all else is known: the last link's parameters.
-
-    A body on the flange and the last link move alike, so that their ten columns are the same but for the frame.
+    Args:
+        model: the torque model.
+        link: counted from 1; None for the last one.
     """
-    return find_base_parameters(model, columns=last_link(model))
+    rigid = tuple(i for i, column in enumerate(model.columns) if column.term == "rigid_body")
+    return rigid[-10:] if link is None else rigid[10 * (link - 1) : 10 * link]
+
+
+def payload_part(model: TorqueModel, link: int | None = None) -> BaseParameters:
+    """Gives what the torques show of a body on a link if all else is known: the parameters of that link.
+
+    A body on a link moves as the link does, so that their ten columns are the same but for the frame.
+
+    Args:
+        model: the torque model.
+        link: counted from 1; None for the last one, which carries the flange.
+    """
+    return find_base_parameters(model, columns=link_columns(model, link))
 
 
 def carrying(robot: Robot, body: ArrayLike | None) -> Robot:

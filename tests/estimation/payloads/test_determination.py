@@ -10,6 +10,7 @@ import pytest
 from estimation.payloads.body import Body
 from estimation.payloads.determination import determined, is_nothing, missing_motion, require_determined
 from estimation.payloads.intervals import quantities
+from estimation.payloads.mounts import Mount
 from robots import load_robot
 from robots.common.errors import InputError, NotIdentifiableError
 from robots.robot import Robot
@@ -33,14 +34,14 @@ def moving() -> np.ndarray:
 
 def test_a_motion_of_the_whole_wrist_lacks_nothing(ur10: Robot, moving: np.ndarray) -> None:
     """Gravity turns along all axes of the flange."""
-    assert missing_motion(ur10, moving, None) == ""
+    assert missing_motion(Mount(ur10), moving, None) == ""
 
 
 def test_a_wrist_joint_that_stands_is_named(ur10: Robot, moving: np.ndarray) -> None:
     """With its name, its range, and what to do."""
     still = moving.copy()
     still[:, [4, 5]] = 0.3
-    text = missing_motion(replace(ur10, stated="arm.urdf --tip tool0"), still, None)
+    text = missing_motion(Mount(replace(ur10, stated="arm.urdf --tip tool0")), still, None)
     assert "joint 5 (wrist_2_joint, moved 0 deg)" in text
     assert "joint 6 (wrist_3_joint" in text
     assert "joint 4" not in text
@@ -52,30 +53,30 @@ def test_an_axis_of_the_flange_along_which_gravity_does_not_turn_is_named(ur10: 
     """Only the vertical first joint moves: gravity is steady along all three axes."""
     still = np.zeros_like(moving)
     still[:, 0] = moving[:, 0]
-    assert "gravity turns along x, y, z of the flange" in missing_motion(ur10, still, None)
+    assert "gravity turns along x, y, z of the flange" in missing_motion(Mount(ur10), still, None)
 
 
 def test_good_intervals_pass_and_open_ones_are_refused_by_name(ur10: Robot, moving: np.ndarray) -> None:
     """A mass known to 70 %, and a centre known to 0.2 m along y, end with an error that says so."""
     fine = quantities(TRUTH, np.diag(SPREAD**2), TRUTH)
-    require_determined(fine, ur10, moving, None)
+    require_determined(fine, Mount(ur10), moving, None)
     assert all(determined(fine)[:4])
     heavy = SPREAD.copy()
     heavy[0] = 0.36
     with pytest.raises(NotIdentifiableError, match=r"payload's mass: 1 \(0\.29.* to 1\.7.*\) kg") as caught:
-        require_determined(quantities(TRUTH, np.diag(heavy**2), TRUTH), ur10, moving, None)
+        require_determined(quantities(TRUTH, np.diag(heavy**2), TRUTH), Mount(ur10), moving, None)
     assert caught.value.exit_code == 1
     wide = SPREAD.copy()
     wide[2] = 0.1
     with pytest.raises(NotIdentifiableError, match="centre of mass along y of the flange"):
-        require_determined(quantities(TRUTH, np.diag(wide**2), TRUTH), ur10, moving, None)
+        require_determined(quantities(TRUTH, np.diag(wide**2), TRUTH), Mount(ur10), moving, None)
 
 
 def test_a_mass_that_is_surely_negative_is_bad_input(ur10: Robot, moving: np.ndarray) -> None:
     """The logs are swapped, and the exit code is that of bad input."""
     values = -TRUTH
     with pytest.raises(InputError, match="swap --log and --without") as caught:
-        require_determined(quantities(values, np.diag(SPREAD**2), TRUTH), ur10, moving, None)
+        require_determined(quantities(values, np.diag(SPREAD**2), TRUTH), Mount(ur10), moving, None)
     assert caught.value.exit_code == 2
 
 
@@ -84,10 +85,10 @@ def test_a_mass_that_is_surely_negative_is_bad_input(ur10: Robot, moving: np.nda
 )
 def test_a_mass_within_its_error_is_nothing(ur10: Robot, moving: np.ndarray, mass: float, nothing: bool) -> None:
     """Up to 1.96 standard errors above zero, and to five below; but never where the motion does not show a mass."""
-    assert is_nothing(0.1 * mass, 0.1, ur10, moving, None) == nothing
+    assert is_nothing(0.1 * mass, 0.1, Mount(ur10), moving, None) == nothing
     still = np.zeros_like(moving)
     still[:, 0] = moving[:, 0]
-    assert not is_nothing(0.1 * mass, 0.1, ur10, still, None)
+    assert not is_nothing(0.1 * mass, 0.1, Mount(ur10), still, None)
 
 
 def test_small_moments_are_marked_as_open_not_refused(ur10: Robot, moving: np.ndarray) -> None:
@@ -95,6 +96,6 @@ def test_small_moments_are_marked_as_open_not_refused(ur10: Robot, moving: np.nd
     spread = SPREAD.copy()
     spread[4:] = 0.01
     found = quantities(TRUTH, np.diag(spread**2), TRUTH)
-    require_determined(found, ur10, moving, None)
+    require_determined(found, Mount(ur10), moving, None)
     assert determined(found)[:4] == (True,) * 4
     assert not any(determined(found)[4:])

@@ -12,6 +12,7 @@ from scipy.signal import lfilter
 
 from estimation.payloads import identify_payload
 from estimation.payloads.determination import missing_motion, never_shown
+from estimation.payloads.mounts import Mount
 from robots import load_robot
 from robots.robot import Robot
 from robots.signals import Log
@@ -70,18 +71,18 @@ def log(description: Path, body: pin.Inertia | None, seed: int) -> Log:
 
 def test_only_the_height_of_the_centre_is_hidden(scara: Robot) -> None:
     """An arm with a wrist shows all; a SCARA on a tilted base hides the height, too."""
-    assert never_shown(scara, None) == NEVER
-    assert never_shown(scara, np.array([0.0, 4.0, -9.0])) == NEVER
-    assert never_shown(load_robot("ur10"), None) == frozenset()
+    assert never_shown(Mount(scara), None) == NEVER
+    assert never_shown(Mount(scara), np.array([0.0, 4.0, -9.0])) == NEVER
+    assert never_shown(Mount(load_robot("ur10")), None) == frozenset()
 
 
 def test_no_advice_asks_for_what_the_arm_cannot_do(scara: Robot) -> None:
     """Gravity cannot turn along any axis of the flange; a wrist joint that stands is still named."""
     t = np.linspace(0, 20, 400)[:, None]
     q = np.sin(t * np.array([0.7, 0.9, 1.1, 1.3])) * np.array([1, 1, 0.1, 1])
-    assert missing_motion(scara, q, None) == ""
+    assert missing_motion(Mount(scara), q, None) == ""
     q[:, 3] = 0.1
-    text = missing_motion(scara, q, None)
+    text = missing_motion(Mount(scara), q, None)
     assert "joint 4 (j4" in text
     assert "gravity" not in text
 
