@@ -161,7 +161,7 @@ def test_urscript_has_the_period_of_its_controller(robots, tmp_path: Path) -> No
     for robot, period in ((cb, 0.008), (replace(cb, period=0.002), 0.002)):
         path = tmp_path / f"{period}.script"
         export_trajectory(path, motion_of(robot), robot, "urscript")
-        assert re.findall(r"0, 0, ([\d.]+), 0.1, 300\)", path.read_text()) == [str(period)] * (round(1.0 / period) + 1)
+        assert re.findall(r"0, 0, ([\d.]+), 0.1, 300\)", path.read_text()) == [str(period)] * (round(1.0 / period) + 2)
     with pytest.warns(AssumedValueWarning, match="4 ms, which is none of a UR controller: 2 ms of the e-series"):
         assert (
             export_trajectory(tmp_path / "a.script", motion_of(cb), replace(cb, period=0.004), "urscript").period
