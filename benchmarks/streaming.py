@@ -130,6 +130,8 @@ def with_drivers(robot: Robot) -> None:
     """Plays 2,000 points with each driver's profile, then has them stopped in the middle, refused, and played again."""
     motion = swing(robot, 2000)
     for name, driver in DRIVERS.items():
+        if driver.protocol != "simple_message":
+            continue
         played = motion if driver.most is None else at_period(motion, motion.duration / (driver.most - 1))
         options = StreamOptions.of(driver, patience=5.0)
         for title, settings in (
