@@ -23,6 +23,7 @@ from robots.limits import Limits
 from robots.mujoco_models import robot_from_mjcf
 from robots.per_joint import PerJoint
 from robots.robot import Robot
+from robots.velocity_ramps import NO_RAMP, VelocityRamp
 
 Array = NDArray[np.float64]
 
@@ -240,7 +241,14 @@ def _limits(text: RobotDescription, entries: PerJoint, known: Limits | None) -> 
         else:
             scale = entries.scale(stated.unit, f"limits.{quantity}.unit", quantity.removesuffix("_rms"))
             bounds[quantity] = entries.place(stated.values, f"limits.{quantity}.values", default(quantity), scale)
+    ramp = text.limits.velocity_ramp
     try:
+        if ramp is not None:
+            values: dict[str, Any] = {
+                name: entries.place(getattr(ramp, name), f"limits.velocity_ramp.{name}", none)
+                for name, none in NO_RAMP.items()
+            }
+            bounds["ramp"] = VelocityRamp(**values)
         return Limits(**bounds)
     except InputError as error:
         raise InputError(

@@ -81,6 +81,19 @@ class Range(Sourced):
     unit: str | list[str]
 
 
+class Ramp(Sourced):
+    """Velocity limits that fall towards the ends of the joints: sqrt(2 deceleration distance) - offset - reserve.
+
+    The distance is that from ``lower`` or ``upper``; all in rad and s, or m and s.
+    """
+
+    lower: Finites
+    upper: Finites
+    offset: Finites
+    deceleration: Finites
+    reserve: Finites = Field(default=Same([0.0]))
+
+
 class LimitsDescription(Config):
     """Limits of the joints; a quantity left out is unlimited, or as the URDF states it.
 
@@ -89,6 +102,7 @@ class LimitsDescription(Config):
 
     position: Range | None = None
     velocity: Bounds | None = None
+    velocity_ramp: Ramp | None = None
     acceleration: Bounds | None = None
     jerk: Bounds | None = None
     torque: Bounds | None = None
