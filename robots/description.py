@@ -231,6 +231,23 @@ class CollisionDescription(Config):
     ignore: list[Annotated[list[int | str], Field(min_length=2, max_length=2)]] = Field(default=[])
 
 
+class CouplingDescription(Config):
+    """What of a joint's position an axis of the controller contains besides its own; both are counted from 1."""
+
+    axis: Annotated[int, Field(ge=1)]
+    joint: Annotated[int, Field(ge=1)]
+    factor: Finite
+
+
+class ControllerAxesDescription(Sourced):
+    """How the controller counts the joints: axis = sign (joint + factor other joint) + zero."""
+
+    sign: Finites = Field(default=Same([1.0]))
+    zero: Finites = Field(default=Same([0.0]))
+    unit: str | list[str] = "deg"
+    couplings: list[CouplingDescription] = Field(default=[])
+
+
 class RobotDescription(Config):
     """A robot's YAML file: a Denavit-Hartenberg table, a URDF or an MJCF, then limits and nominal dynamics."""
 
@@ -253,6 +270,7 @@ class RobotDescription(Config):
     mass: Rating | None = None
     ambient: Ambient | None = None
     collision: CollisionDescription | None = None
+    controller_axes: ControllerAxesDescription | None = None
     period: Positive = 0.004
 
     @model_validator(mode="after")
