@@ -51,5 +51,5 @@ class ControllerAxes:
     def joints(self, axes: ArrayLike) -> Array:
         """Gives the joint positions at axes (N, n)."""
         turned = self.sign * (np.asarray(axes, dtype=np.float64) - self.zero)
-        solved: Array = np.linalg.solve(np.eye(len(self.sign)) + self.coupling, turned.T).T
-        return solved
+        solved = np.linalg.inv(np.eye(len(self.sign)) + self.coupling) @ turned.T
+        return np.asarray(solved.T, dtype=np.float64)

@@ -60,6 +60,7 @@ def export_trajectory(
             allowed=" or ".join(chosen.suffixes),
             remedy="rename it",
         )
+    check_trajectory(motion, robot, metadata, file)
     choices = options or ExportOptions()
     if chosen.named and path.stem.lower() != choices.name.lower():
         raise InputError(
@@ -68,7 +69,6 @@ def export_trajectory(
             allowed="the name of its file",
             remedy=f"name the file {choices.name}{suffix}, or state --name {path.stem}",
         )
-    check_trajectory(motion, robot, metadata, file)
     step = period if period is not None else chosen.period_of(robot)
     step = motion.period if step is None else step
     if step is None:
