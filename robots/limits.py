@@ -184,11 +184,11 @@ class Limits:
         return replace(self, **scaled, ramp=ramp, torque_rms=self.torque_rms * torque)
 
     def speed_limit(self, q: NDArray[np.floating], dq: NDArray[np.floating]) -> NDArray[np.float64]:
-        """Gives the velocity limits in the directions of motion at states (N, n), or (n,), as they depend on positions.
+        """Gives the velocity limits in the directions of motion, as they depend on positions (N, n) [rad/s or m/s].
 
         Args:
-            q: positions [rad or m].
-            dq: velocities, whose signs count.
+            q: positions (N, n), or (n,) of one state [rad or m].
+            dq: velocities (N, n), or (n,), of which the signs count [rad/s or m/s].
         """
         return self.velocity if self.ramp is None else self.ramp.allowed(q, dq, self.velocity)
 
