@@ -102,7 +102,7 @@ def run(driver: str, folder: Path) -> None:
         diagnosis = json.loads((folder / "loop" / "diagnosis.json").read_text())
         ended = f"experiments: {len(loop['experiments'])}, {loop['ended']}; {named(diagnosis)}"
         print(f"{driver}: loop {seconds:.0f} s, exit code {code}, {ended}", flush=True)
-    words = ["campaign", "--robot", robot, "--design", "design", "--cycles", 2, "--cycle-time", 150, "--warm-up", 30]
+    words = ["campaign", "--robot", robot, "--design", "design", "--cycles", 2, "--cycle-time", 240, "--warm-up", 60]
     code, _, seconds = oed(*words, folder=folder)
     print(f"{driver}: campaign planned in {seconds:.0f} s, exit code {code}", flush=True)
     stages = json.loads((folder / "campaign" / "campaign.json").read_text())["stages"]

@@ -39,6 +39,9 @@ STOPS = 3.0
 ENDED = 0.5
 """A program that is reported as ended for so long has ended [s]."""
 
+AHEAD = 0.2
+"""Points are sent so long before they are executed [s]: later a network may be, and sooner a robot stops by itself."""
+
 TURN = 0.002
 
 DECELERATION = 5.0
@@ -181,7 +184,7 @@ class ProgramPlayer:
         advance: Callable[[int], None],
         longest_step: float,
     ) -> None:
-        """Sends points, as many before those that are executed as the driver's buffer holds.
+        """Sends points, each `AHEAD` of its time.
 
         Args:
             points: in order.
@@ -201,7 +204,7 @@ class ProgramPlayer:
         total = len(data) + int(np.ceil(SETTLES / self._period))
         data.extend([data[-1]] * (total - len(data)))
         data.append(struct.pack(">7i", 0, *[0] * 6))
-        ahead = self._options.driver.capacity if self._options.driver is not None else 1
+        ahead = int(np.ceil(AHEAD / self._period))
         sent, rest, last, changed, ended = 0, b"", 0, time.monotonic(), None
         while True:
             watch()

@@ -16,8 +16,6 @@ UR = Driver(
     state_port=30004,
     byte_order="big",
     points="full",
-    # Points that our program may have before it.
-    capacity=100,
     pings="unknown",
     feedback="full",
     feedback_period=0.002,

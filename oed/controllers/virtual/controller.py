@@ -120,6 +120,11 @@ class VirtualController(Service):
         return self._player.played_trajectories
 
     @property
+    def moving(self) -> bool:
+        """Whether a trajectory is played."""
+        return self._player.moving
+
+    @property
     def error(self) -> int:
         """The error that it reports; 0 for none."""
         return self._player.error

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import socket
+import subprocess
+import sys
 import threading
 import time
 from collections.abc import Iterator
@@ -51,7 +53,8 @@ def ur10() -> Robot:
 def playing(robot: Robot, pose: Any = None, **settings: Any) -> Iterator[tuple[VirtualUr, Endpoint]]:
     """Start a controller on free ports."""
     faults = Faults(**{name: settings.pop(name) for name in list(settings) if name in Faults.__dataclass_fields__})
-    options = ControllerOptions.of(UR, motion_port=0, state_port=0, wait_for_points=True, faults=faults, **settings)
+    settings = {"motion_port": 0, "state_port": 0, "wait_for_points": True} | settings
+    options = ControllerOptions.of(UR, faults=faults, **settings)
     controller = virtual_controller(robot, options=options, pose=pose)
     assert isinstance(controller, VirtualUr)
     with controller:
@@ -201,3 +204,36 @@ def test_robots_without_six_joints() -> None:
     """The controller to test against has six joints."""
     with pytest.raises(InputError, match="allowed: 6"):
         virtual_controller(load_robot("panda"), options=ControllerOptions.of(UR, motion_port=0, state_port=0))
+
+
+KILLED = """
+import os, sys, threading, time
+from oed.controllers import Endpoint, StreamOptions, driver_of, stream
+from robots.loading import load_robot
+from tests.oed.controllers.conftest import swing
+
+driver, robot = driver_of("ur"), load_robot("ur10")
+threading.Timer(1.5, os._exit, [9]).start()
+ports = dict(zip(("motion_port", "state_port"), map(int, sys.argv[2:])))
+place = Endpoint.of(driver, "127.0.0.1", **ports)
+stream(swing(robot, 1500), robot, place, log=sys.argv[1], options=StreamOptions.of(driver))
+"""
+
+
+@pytest.mark.slow
+def test_a_killed_client_leaves_a_robot_that_stops(ur10: Robot, log: Path) -> None:
+    """The program on the controller stops the robot once no point comes, within the points that it has and 0.1 s."""
+    with playing(ur10, wait_for_points=False) as (controller, place):
+        words = ["-W", "ignore", "-c", KILLED, str(log), str(place.motion_port), str(place.state_port)]
+        client = subprocess.Popen([sys.executable, *words])
+        while not controller.points:
+            assert client.poll() is None
+            time.sleep(0.01)
+        assert client.wait(timeout=60) == 9
+        killed = time.monotonic()
+        while controller.moving or np.abs(controller._arm.speed).max() > 0:
+            assert time.monotonic() - killed < 2.0
+            time.sleep(0.01)
+        # Points of 0.2 s, 0.1 s without any, and the way to rest.
+        assert time.monotonic() - killed < 0.8
+        assert 0 < controller.points < 750
