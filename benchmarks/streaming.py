@@ -25,7 +25,15 @@ import numpy as np
 
 from benchmarks.memory import peak_memory
 from estimation import read_log
-from oed.controllers import ControllerOptions, Endpoint, Faults, StreamOptions, VirtualController, stream
+from oed.controllers import (
+    ControllerOptions,
+    Endpoint,
+    Faults,
+    StreamOptions,
+    VirtualController,
+    stream,
+    virtual_controller,
+)
 from oed.controllers.clients.requests import Requests
 from oed.controllers.clients.watching import RADIANS
 from oed.controllers.drivers import DRIVERS
@@ -128,8 +136,10 @@ def watch_paths(robot: Robot, runs: int) -> None:
 
 def with_drivers(robot: Robot) -> None:
     """Plays 2,000 points with each driver's profile, then has them stopped in the middle, refused, and played again."""
-    motion = swing(robot, 2000)
     for name, driver in DRIVERS.items():
+        # A UR controller has six joints of its own kind.
+        robot = load_robot("ur10") if driver.protocol == "rtde" else robot
+        motion = swing(robot, 2000)
         played = motion if driver.most is None else at_period(motion, motion.duration / (driver.most - 1))
         options = StreamOptions.of(driver, patience=5.0)
         for title, settings in (
@@ -139,7 +149,7 @@ def with_drivers(robot: Robot) -> None:
             ("emergency stop before", {"state": "e-stop"}),
         ):
             choices = ControllerOptions.of(driver, motion_port=0, state_port=0, **settings)  # type: ignore[arg-type]
-            with tempfile.TemporaryDirectory() as folder, VirtualController(robot, options=choices) as controller:
+            with tempfile.TemporaryDirectory() as folder, virtual_controller(robot, options=choices) as controller:
                 ports = {"motion_port": controller.motion_port, "state_port": controller.state_port}
                 place = Endpoint.of(driver, "127.0.0.1", handshake_interval=0.1, **ports)
                 text = ""
@@ -151,7 +161,7 @@ def with_drivers(robot: Robot) -> None:
                     except OedError as error:
                         confirmed = "did not confirm" not in str(error)
                         text += f"{error.problem}; stop confirmed: {confirmed}; {controller.points} points came; "
-                print(f"  {name}, {title}: {text}moves: {controller.player.moving}", flush=True)
+                print(f"  {name}, {title}: {text}moves: {controller.moving}", flush=True)
 
 
 def stop_delay(log: Log, motion: Motion) -> float:

@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from robots.common.config import read_config
 from robots.common.errors import InputError
+from robots.controller_axes import ControllerAxes
 from robots.description import MOTOR_UNITS, Bounds, Pose, Range, RobotDescription, Values
 from robots.description_notes import assumed_in_urdf, assumed_limits, require_stops, unknown_masses, urdf_notes
 from robots.geometry.chain import Chain, LinkPlace, homogeneous, rotation_from_rpy
@@ -23,6 +24,7 @@ from robots.limits import Limits
 from robots.mujoco_models import robot_from_mjcf
 from robots.per_joint import PerJoint
 from robots.robot import Robot
+from robots.velocity_ramps import NO_RAMP, VelocityRamp
 
 Array = NDArray[np.float64]
 
@@ -164,6 +166,7 @@ def robot_from_yaml(
         links=links,
         digest=digest,
         payload=None if text.payload is None else text.payload.value,
+        axes=_controller_axes(text, entries),
         ambient=None if text.ambient is None else (text.ambient.lowest, text.ambient.highest),
     )
 
@@ -240,7 +243,14 @@ def _limits(text: RobotDescription, entries: PerJoint, known: Limits | None) -> 
         else:
             scale = entries.scale(stated.unit, f"limits.{quantity}.unit", quantity.removesuffix("_rms"))
             bounds[quantity] = entries.place(stated.values, f"limits.{quantity}.values", default(quantity), scale)
+    ramp = text.limits.velocity_ramp
     try:
+        if ramp is not None:
+            values: dict[str, Any] = {
+                name: entries.place(getattr(ramp, name), f"limits.velocity_ramp.{name}", none)
+                for name, none in NO_RAMP.items()
+            }
+            bounds["ramp"] = VelocityRamp(**values)
         return Limits(**bounds)
     except InputError as error:
         raise InputError(
@@ -250,6 +260,37 @@ def _limits(text: RobotDescription, entries: PerJoint, known: Limits | None) -> 
             joint=error.joint,
             allowed=error.allowed,
             remedy=error.remedy,
+        ) from error
+
+
+def _controller_axes(text: RobotDescription, entries: PerJoint) -> ControllerAxes | None:
+    stated, n = text.controller_axes, entries.chain.n
+    if stated is None:
+        return None
+    scale = entries.scale(stated.unit, "controller_axes.unit", "position")
+    coupling = np.zeros((n, n))
+    for item in stated.couplings:
+        if max(item.axis, item.joint) > n or item.axis == item.joint:
+            raise InputError(
+                f"axis {item.axis} and joint {item.joint}",
+                file=entries.file,
+                column="controller_axes.couplings",
+                allowed=f"two of {n} joints",
+            )
+        coupling[item.axis - 1, item.joint - 1] = item.factor
+    try:
+        return ControllerAxes(
+            sign=entries.place(stated.sign, "controller_axes.sign", 1.0),
+            zero=entries.place(stated.zero, "controller_axes.zero", 0.0, scale),
+            coupling=coupling,
+        )
+    except InputError as error:
+        raise InputError(
+            error.problem,
+            file=entries.file,
+            column=f"controller_axes.{error.column}",
+            joint=error.joint,
+            allowed=error.allowed,
         ) from error
 
 

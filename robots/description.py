@@ -81,6 +81,19 @@ class Range(Sourced):
     unit: str | list[str]
 
 
+class Ramp(Sourced):
+    """Velocity limits that fall towards the ends of the joints: sqrt(2 deceleration distance) - offset - reserve.
+
+    The distance is that from ``lower`` or ``upper``; all in rad and s, or m and s.
+    """
+
+    lower: Finites
+    upper: Finites
+    offset: Finites
+    deceleration: Finites
+    reserve: Finites = Field(default=Same([0.0]))
+
+
 class LimitsDescription(Config):
     """Limits of the joints; a quantity left out is unlimited, or as the URDF states it.
 
@@ -89,6 +102,7 @@ class LimitsDescription(Config):
 
     position: Range | None = None
     velocity: Bounds | None = None
+    velocity_ramp: Ramp | None = None
     acceleration: Bounds | None = None
     jerk: Bounds | None = None
     torque: Bounds | None = None
@@ -217,6 +231,23 @@ class CollisionDescription(Config):
     ignore: list[Annotated[list[int | str], Field(min_length=2, max_length=2)]] = Field(default=[])
 
 
+class CouplingDescription(Config):
+    """What of a joint's position an axis of the controller contains besides its own; both are counted from 1."""
+
+    axis: Annotated[int, Field(ge=1)]
+    joint: Annotated[int, Field(ge=1)]
+    factor: Finite
+
+
+class ControllerAxesDescription(Sourced):
+    """How the controller counts the joints: axis = sign (joint + factor other joint) + zero."""
+
+    sign: Finites = Field(default=Same([1.0]))
+    zero: Finites = Field(default=Same([0.0]))
+    unit: str | list[str] = "deg"
+    couplings: list[CouplingDescription] = Field(default=[])
+
+
 class RobotDescription(Config):
     """A robot's YAML file: a Denavit-Hartenberg table, a URDF or an MJCF, then limits and nominal dynamics."""
 
@@ -239,6 +270,7 @@ class RobotDescription(Config):
     mass: Rating | None = None
     ambient: Ambient | None = None
     collision: CollisionDescription | None = None
+    controller_axes: ControllerAxesDescription | None = None
     period: Positive = 0.004
 
     @model_validator(mode="after")

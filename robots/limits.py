@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from robots.common.errors import InputError
 from robots.signals import FloatArray, Motion
+from robots.velocity_ramps import VelocityRamp
 
 ACCELERATION_PER_VELOCITY = 4.0
 """Default acceleration limit over the velocity limit [1/s]: full speed in a quarter of a second, as small arms do."""
@@ -81,6 +82,7 @@ class Limits:
         jerk: highest jerks [rad/s^3], (n,).
         torque: highest joint torques [N m], (n,).
         torque_rms: highest root mean square of the joint torques over a motion [N m], (n,); infinite by default.
+        ramp: velocity limits that fall towards the ends of the joints; None where they don't.
         kinds: "revolute" or "prismatic" of each joint, for messages; all revolute by default. The bounds of a prismatic
             joint are in m and N.
 
@@ -95,6 +97,7 @@ class Limits:
     jerk: FloatArray
     torque: FloatArray
     torque_rms: FloatArray = field(default_factory=lambda: np.array(np.inf))
+    ramp: VelocityRamp | None = None
     kinds: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
@@ -113,6 +116,8 @@ class Limits:
             object.__setattr__(self, name, array)
         if len(self.kinds) != self.n or not set(self.kinds) <= {"revolute", "prismatic"}:
             raise InputError(f"found the kinds {self.kinds}", allowed=f"{self.n} of revolute and prismatic")
+        if self.ramp is not None and len(self.ramp.lower) != self.n:
+            raise InputError(f"{len(self.ramp.lower)} values, but lower has {self.n}", column="velocity_ramp")
         wrong = np.flatnonzero(self.lower >= self.upper)
         if len(wrong):
             joint = int(wrong[0])
@@ -175,7 +180,17 @@ class Limits:
             if not (np.isfinite(factor) and factor > 0.0):
                 raise InputError(f"a factor of {factor}", column=name, allowed="a positive number")
         scaled = {name: getattr(self, name) * factor for name, factor in factors.items()}
-        return replace(self, **scaled, torque_rms=self.torque_rms * torque)
+        ramp = None if self.ramp is None else self.ramp.scaled(velocity)
+        return replace(self, **scaled, ramp=ramp, torque_rms=self.torque_rms * torque)
+
+    def speed_limit(self, q: NDArray[np.floating], dq: NDArray[np.floating]) -> NDArray[np.float64]:
+        """Gives the velocity limits in the directions of motion, as they depend on positions (N, n) [rad/s or m/s].
+
+        Args:
+            q: positions (N, n), or (n,) of one state [rad or m].
+            dq: velocities (N, n), or (n,), of which the signs count [rad/s or m/s].
+        """
+        return self.velocity if self.ramp is None else self.ramp.allowed(q, dq, self.velocity)
 
     def margins(self, motion: Motion) -> list[Margin]:
         """Returns the smallest margin of each quantity and joint, quantity by quantity.
@@ -192,11 +207,30 @@ class Limits:
         if motion.n != self.n:
             raise InputError(f"the motion has {motion.n} joints, the limits are for {self.n}")
         margins = self._position_margins(motion)
-        margins += symmetric_margins("velocity", motion.t, motion.dq, self.velocity)
+        margins += self._velocity_margins(motion)
         margins += symmetric_margins("acceleration", motion.t, motion.ddq, self.acceleration)
         if len(motion) > 1:
             middle, jerk = finite_jerk(motion)
             margins += symmetric_margins("jerk", middle, jerk, self.jerk)
+        return margins
+
+    def _velocity_margins(self, motion: Motion) -> list[Margin]:
+        if self.ramp is None:
+            return symmetric_margins("velocity", motion.t, motion.dq, self.velocity)
+        allowed = self.speed_limit(motion.q, motion.dq)
+        slack = allowed - np.abs(motion.dq)
+        margins = []
+        for joint, row in enumerate(slack.argmin(axis=0)):
+            margins.append(
+                Margin(
+                    quantity="velocity",
+                    joint=joint + 1,
+                    value=float(motion.dq[row, joint]),
+                    limit=float(allowed[row, joint]),
+                    time=float(motion.t[row]),
+                    slack_fraction=float(slack[row, joint] / self.velocity[joint]),
+                )
+            )
         return margins
 
     def _position_margins(self, motion: Motion) -> list[Margin]:

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from robots.common.errors import InputError
+from robots.controller_axes import ControllerAxes
 from robots.geometry.chain import Chain, LinkPlace
 from robots.limits import Limits
 
@@ -48,6 +49,7 @@ class Robot:
         title: full name, for reports.
         payload: rated payload [kg].
         ambient: (lowest, highest) ambient temperature of operation [degC].
+        axes: how the controller counts the joints; None where that is not stated.
 
     Raises:
         InputError: naming the joint and the quantity that is of a wrong shape or not possible.
@@ -75,6 +77,7 @@ class Robot:
     title: str = ""
     payload: float | None = None
     ambient: tuple[float, float] | None = None
+    axes: ControllerAxes | None = None
 
     def __post_init__(self) -> None:
         n = self.n
@@ -105,6 +108,8 @@ class Robot:
             object.__setattr__(self, "limits", replace(self.limits, velocity=lowered))
         if self.limits.kinds != self.chain.kinds:
             object.__setattr__(self, "limits", replace(self.limits, kinds=self.chain.kinds))
+        if self.axes is not None and len(self.axes.sign) != n:
+            raise InputError(f"{self.name}: {len(self.axes.sign)} controller axes", allowed=f"{n}, as in the chain")
         object.__setattr__(self, "assumed", tuple(self.assumed))
         object.__setattr__(self, "notes", tuple(self.notes))
 

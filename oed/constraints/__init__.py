@@ -16,6 +16,7 @@ from oed.constraints.pointwise import PointwiseLimit
 from oed.constraints.state import StateLimit, StateLimits
 from oed.constraints.torque import TorqueLimit
 from oed.constraints.torque_rms import TorqueRms
+from oed.constraints.velocity_ramp import VelocityRampLimit
 
 __all__ = [
     "QUANTITIES",
@@ -27,6 +28,7 @@ __all__ = [
     "TorqueLimit",
     "TorqueRms",
     "TrigonometricPolynomial",
+    "VelocityRampLimit",
     "certified_extremes",
     "exact_extremes",
     "kinematic_rows",

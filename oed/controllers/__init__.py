@@ -10,7 +10,7 @@ from oed.controllers.errors import ControllerError, LinkError
 from oed.controllers.links import Endpoint
 from oed.controllers.recording.pose import read_pose
 from oed.controllers.recording.recording import Recording, record
-from oed.controllers.virtual import ControllerOptions, Faults, VirtualController
+from oed.controllers.virtual import ControllerOptions, Faults, VirtualController, virtual_controller
 
 __all__ = [
     "ControllerError",
@@ -27,4 +27,5 @@ __all__ = [
     "read_pose",
     "record",
     "stream",
+    "virtual_controller",
 ]

@@ -61,13 +61,19 @@ def export_trajectory(
             remedy="rename it",
         )
     check_trajectory(motion, robot, metadata, file)
+    choices = options or ExportOptions()
+    if chosen.named and path.stem.lower() != choices.name.lower():
+        raise InputError(
+            f"the name {choices.name!r} of the program",
+            file=path,
+            allowed="the name of its file",
+            remedy=f"name the file {choices.name}{suffix}, or state --name {path.stem}",
+        )
     step = period if period is not None else chosen.period_of(robot)
     step = motion.period if step is None else step
     if step is None:
         raise InputError("the motion is not uniform in time", remedy="give a period (--period)")
     sampled = at_period(motion, step)
     remark, _ = stated_collisions(metadata or {})
-    write_atomic(
-        path, chosen.content(sampled, robot, replace(options or ExportOptions(), remark=remark), suffix), force=force
-    )
+    write_atomic(path, chosen.content(sampled, robot, replace(choices, remark=remark), suffix), force=force)
     return sampled

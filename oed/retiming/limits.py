@@ -65,7 +65,7 @@ def limit_usage(motion: Motion, limits: Limits, torque: Array | None = None) -> 
         Peak over limit of velocity, acceleration, jerk and, if given, torque, (n,) each; 1 is at the limit.
     """
     peaks = {
-        "velocity": (np.abs(motion.dq).max(axis=0), limits.velocity),
+        "velocity": (_speed_usage(motion, limits), np.ones(motion.n)),
         "acceleration": (np.abs(motion.ddq).max(axis=0), limits.acceleration),
     }
     if len(motion) > 1:
@@ -76,6 +76,12 @@ def limit_usage(motion: Motion, limits: Limits, torque: Array | None = None) -> 
         name: np.divide(peak, limit, out=np.where(peak > 0.0, np.inf, 0.0), where=limit > 0.0)
         for name, (peak, limit) in peaks.items()
     }
+
+
+def _speed_usage(motion: Motion, limits: Limits) -> Array:
+    """Peak of the speed over its limit, of each joint (n,)."""
+    speed, limit = np.abs(motion.dq), np.broadcast_to(limits.speed_limit(motion.q, motion.dq), motion.dq.shape)
+    return np.divide(speed, limit, out=np.where(speed > 0.0, np.inf, 0.0), where=limit > 0.0).max(axis=0)
 
 
 def require_inside(q: Array, limits: Limits, tolerance: float = 1e-9, remedy: str | None = None) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import logging
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 import toppra
@@ -13,6 +14,7 @@ from toppra.constraint import (
     DiscretizationType,
     JointAccelerationConstraint,
     JointVelocityConstraint,
+    JointVelocityConstraintVarying,
     LinearConstraint,
     canlinear_colloc_to_interpolate,
 )
@@ -116,9 +118,22 @@ def path_speed(piece: PathPiece, limits: Limits, torque: TorqueConstraint | None
     raise failure
 
 
+def _speed_constraint(path: _SplinePath, limits: Limits) -> Any:
+    """Gives the velocity limits along a path, also those that depend on the position."""
+    if limits.ramp is None:
+        return JointVelocityConstraint(limits.velocity)
+
+    def bounds(place: float) -> Array:
+        q = path(place)
+        upper, lower = (limits.speed_limit(q, np.full_like(q, sign)) for sign in (1.0, -1.0))
+        return np.column_stack([-lower, upper])
+
+    return JointVelocityConstraintVarying(bounds)
+
+
 def _with_friction(piece: PathPiece, limits: Limits, torque: TorqueConstraint | None, grid: Array) -> Array:
     path = _SplinePath(piece)
-    constraints = [JointVelocityConstraint(limits.velocity), JointAccelerationConstraint(limits.acceleration)]
+    constraints = [_speed_constraint(path, limits), JointAccelerationConstraint(limits.acceleration)]
     if torque is None:
         return _solve(path, constraints, grid, None, limits)
     torque.speed = None

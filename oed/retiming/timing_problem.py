@@ -68,7 +68,7 @@ class TimingProblem:
         slope, bend = d1(self.s), d2(self.s)
         third = np.diff(d2(edges), axis=0) / self.width
         with np.errstate(divide="ignore"):
-            fastest = (limits.velocity / np.maximum(np.abs(slope), 1e-150)) ** 2
+            fastest = (limits.speed_limit(curve(self.s), slope) / np.maximum(np.abs(slope), 1e-150)) ** 2
         self.ceiling = np.minimum(fastest.min(axis=1), FASTEST)  # (M,), of x
         self.linear = _rows(bend, self.b0) + _rows(slope / 2, self.b1)  # acceleration
         self.linear /= limits.acceleration[None, :, None]

@@ -130,7 +130,7 @@ def controller(
     with console.working():
         import numpy as np
 
-        from oed.controllers import Faults, VirtualController
+        from oed.controllers import Faults, virtual_controller
         from oed.controllers.interrupts import terminate_as_interrupt
         from oed.exports import read_trajectory
         from robots.common.errors import InputError
@@ -163,7 +163,7 @@ def controller(
             given = numbers("--pose", pose)
             stands = None if given is None else np.array(given)
         played = load_plant(plant, described) if plant else None
-        virtual = VirtualController(described, played, options=options, pose=stands, seed=seed)
+        virtual = virtual_controller(described, played, options=options, pose=stands, seed=seed)
         ports = f"motion port {virtual.motion_port}, state port {virtual.state_port}"
         if not quiet:
             print(
@@ -176,9 +176,9 @@ def controller(
     data = {
         "robot": described.name,
         "points": virtual.points,
-        "trajectories": virtual.player.played_trajectories,
+        "trajectories": virtual.played,
         "malformed": virtual.malformed,
-        "error": virtual.player.error,
+        "error": virtual.error,
         "stalled": round(virtual.stalled, 3),
     }
     console.result(

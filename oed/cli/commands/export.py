@@ -28,8 +28,8 @@ def export(
         typer.Option(
             "--to",
             help=(
-                "Format: csv, ros, ros-goal, rosbag, mcap, moveit-limits, simple-message, urscript, kuka, abb or "
-                "franka."
+                "Format: csv, ros, ros-goal, rosbag, mcap, moveit-limits, simple-message, urscript, kuka, abb, "
+                "franka or franka-player."
             ),
         ),
     ] = "csv",
@@ -54,11 +54,18 @@ def export(
         ),
     ] = None,
     start_tolerance: Annotated[
-        float, typer.Option("--start-tolerance", help="urscript, ros-goal: tolerance of the pose [rad or m].")
+        float,
+        typer.Option("--start-tolerance", help="Tolerance of the start pose in programs and ros-goal [rad or m]."),
     ] = 0.01,
     name: Annotated[
-        str, typer.Option("--name", help="urscript, kuka, abb: name of the program or module.")
-    ] = "trajectory",
+        str | None,
+        typer.Option(
+            "--name",
+            help="urscript, kuka, abb: name of the program or module. Default: that of the file for kuka and abb, else "
+            "trajectory.",
+            show_default=False,
+        ),
+    ] = None,
     degrees: Annotated[
         bool, typer.Option("--degrees", help="csv: angles in degrees; linear axes stay in metres.")
     ] = False,
@@ -94,7 +101,10 @@ def export(
         if to != "csv" and (degrees or positions_only or bare):
             raise InputError(f"--degrees, --positions-only or --bare with --to {to}", allowed="them with csv only")
         suffix = ".csv" if to == "csv" else CONTROLLER_FORMS[to].suffixes[0]
-        target = out or trajectory.with_name(f"{trajectory.stem}-{to}{suffix}")
+        named = to != "csv" and CONTROLLER_FORMS[to].named
+        program = name or (out.stem if named and out is not None else "trajectory")
+        # Controllers look for a program in the file of its name.
+        target = out or trajectory.with_name(f"{program if named else f'{trajectory.stem}-{to}'}{suffix}")
         motion, metadata = read_trajectory(trajectory)
         collisions, proved = stated_collisions(metadata)
         if not proved:
@@ -130,7 +140,7 @@ def export(
                 force=force,
             )
         else:
-            options = ExportOptions(start_tolerance=start_tolerance, name=name)
+            options = ExportOptions(start_tolerance=start_tolerance, name=program)
             motion = export_trajectory(
                 target,
                 motion,
@@ -151,5 +161,6 @@ def export(
         "period": motion.period if has_samples else None,
         "collisions": collisions,
     }
-    content = f"{len(motion)} samples" if has_samples else "limits of velocity, acceleration and jerk"
+    limits = "limits of velocity, acceleration and jerk" if to == "moveit-limits" else "a program for trajectories"
+    content = f"{len(motion)} samples" if has_samples else limits
     console.result(f"{content} of {motion.n} joints written to {target}", data)

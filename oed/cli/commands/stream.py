@@ -98,7 +98,7 @@ def stream(
     json: JsonOption = False,
     quiet: QuietOption = False,
 ) -> None:
-    """Plays a trajectory on a robot controller by simple_message.
+    """Plays a trajectory on a robot controller by simple_message or RTDE.
 
     Records the feedback into a log.
     """

@@ -40,7 +40,7 @@ def status_problem(status: Status | None) -> str | None:
     if status.e_stopped == 1:
         return "an emergency stop"
     if status.in_error == 1 or status.error_code:
-        return f"the error {status.error_code}"
+        return getattr(status, "error", "") or f"the error {status.error_code}"
     if status.mode == MANUAL:
         return "manual mode"
     if status.drives_powered == 0:

@@ -74,8 +74,8 @@ class StreamOptions:
         """
         driver = self.driver
         if driver is not None and self.ping and driver.pings != "answered":
-            does = "takes pings for points" if driver.pings == "point" else "ends at a ping"
-            raise InputError(f"{driver.title} {does}", remedy="leave out --ping")
+            does = {"point": "takes pings for points", "end": "ends at a ping", "unknown": "knows no pings"}
+            raise InputError(f"{driver.title} {does[driver.pings]}", remedy="leave out --ping")
         if driver is not None and driver.points != self.points and driver.one_form:
             raise InputError(
                 f"{driver.title} misreads points of type {self.points}",

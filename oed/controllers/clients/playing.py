@@ -10,23 +10,29 @@ from os import PathLike, fspath
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from oed.controllers.clients.checks import check_start, check_status, require_known_form, status_problem
 from oed.controllers.clients.ending import Ending
 from oed.controllers.clients.options import StreamOptions
+from oed.controllers.clients.program import ProgramPlayer
 from oed.controllers.clients.requests import Requests
 from oed.controllers.clients.result import StreamResult
 from oed.controllers.clients.traffic import Traffic
 from oed.controllers.clients.watching import tolerances, watch_of
 from oed.controllers.errors import ControllerError, NoReplyError, PointRefusedError
 from oed.controllers.interrupts import signals_held
-from oed.controllers.links import Endpoint, open_link
+from oed.controllers.links import Endpoint, Link, open_link
 from oed.controllers.recording.clock import ClockAnchor
 from oed.controllers.recording.log_file import check_log_path
 from oed.controllers.recording.pose import require_torque
 from oed.controllers.recording.recorder import Recorder
 from oed.controllers.recording.recording import with_rows
 from oed.controllers.recording.reported_joints import require_no_further_joints, warn_of_other_robot
+from oed.controllers.rtde.link import RtdeLink, ScriptLink
+from oed.controllers.rtde.packages import JOINTS as UR_JOINTS
+from oed.exports.forms.base import require_joints
+from oed.exports.forms.sampling import at_cycle
 from oed.exports.simple_message import JointPosition, trajectory_points
 from oed.exports.simple_message.kinds import JOINTS
 from oed.exports.trajectory_checks import check_trajectory
@@ -35,6 +41,8 @@ from robots.common.progress import SILENT, Progress
 from robots.robot import Robot
 from robots.signals import Motion
 from robots.version import VERSION
+
+Array = NDArray[np.float64]
 
 CLEAR = "clear it at the controller, move the robot to the start of the trajectory, and play it again"
 
@@ -111,8 +119,13 @@ def stream(
         if log is None:
             raise InputError("no log file for the feedback", remedy="give one")
         check_log_path(log, force)
+    if endpoint.protocol == "rtde":
+        require_joints(robot, UR_JOINTS, UR_JOINTS, "a UR controller")
+    state = open_link(endpoint, endpoint.state_port)
+    if isinstance(state, RtdeLink):
+        motion = at_cycle(motion, state.cycle)
     recorder = Recorder(
-        open_link(endpoint, endpoint.state_port),
+        state,
         robot,
         endpoint.form,
         options.patience,
@@ -122,6 +135,7 @@ def stream(
     source = f"feedback of {endpoint.place(endpoint.state_port)}"
     known = {"robot": robot.name, "source": source, "tool": VERSION, **(header or {})}
     traffic = Traffic()
+    requests: Requests | ProgramPlayer | None = None
     begin, ended = time.monotonic(), "interrupted"
     failure: OedError | None = None
     try:
@@ -137,13 +151,12 @@ def stream(
             require_torque(recorder.layout, endpoint)
         require_known_form(options, endpoint, recorder.layout.kind is JointPosition)
         with ExitStack() as links:
-            requests = None
             # A motion port may belong to a driver that moves on what it does not know, or drops its client.
             if options.ping or not dry_run:
                 link = links.enter_context(open_link(endpoint, endpoint.motion_port))
                 # A port that serves another client closes the link, or says something.
                 link.receive(CLOSES)
-                requests = Requests(link, endpoint.form, options, traffic)
+                requests = _sender(link, state, motion, robot, endpoint, options, recorder, traffic)
                 for number in range(PINGS if options.ping else 0):
                     requests.ping(None if number else max(options.patience, endpoint.connect_time))
             if not options.ignore_status and status_problem(recorder.status) is not None:
@@ -171,6 +184,7 @@ def stream(
             "sent_points": traffic.sent,
             "resent_points": traffic.resent,
             "message_delay": traffic.delay,
+            **({"command_lag": requests.lag.lags()} if isinstance(requests, ProgramPlayer) else {}),
         }
         with signals_held():
             try:
@@ -199,13 +213,43 @@ def stream(
         feedback=recorder.statistics.summary(),
         status={} if recorder.status is None else asdict(recorder.status),
         dry_run=dry_run,
-        note=recorder.note,
+        note="\n".join(filter(None, [recorder.note, _lag_in_words(requests)])),
         anchor=None if dry_run else recorder.anchor(),
     )
 
 
+def _sender(
+    link: Link,
+    state: Link,
+    motion: Motion,
+    robot: Robot,
+    endpoint: Endpoint,
+    options: StreamOptions,
+    recorder: Recorder,
+    traffic: Traffic,
+) -> Requests | ProgramPlayer:
+    """Gives what sends points over a link, by the protocol of the controller."""
+    if isinstance(link, ScriptLink) and isinstance(state, RtdeLink):
+        return ProgramPlayer(link, state.own_address, motion, robot, options, recorder, traffic)
+    return Requests(link, endpoint.wire_form, options, traffic)
+
+
+def _lag_in_words(requests: Requests | ProgramPlayer | None) -> str:
+    """Says how far the joints follow behind their commands, where that is measured."""
+    lags = requests.lag.lags() if isinstance(requests, ProgramPlayer) else []
+    known = [lag for lag in lags if lag is not None]
+    if not known:
+        return ""
+    return f"the joints follow {1e3 * min(known):.0f} to {1e3 * max(known):.0f} ms behind the commands (servoj)"
+
+
 def _play(
-    motion: Motion, robot: Robot, requests: Requests, recorder: Recorder, options: StreamOptions, progress: Progress
+    motion: Motion,
+    robot: Robot,
+    requests: Requests | ProgramPlayer,
+    recorder: Recorder,
+    options: StreamOptions,
+    progress: Progress,
 ) -> None:
     """Sends all points and waits for the end of the motion."""
     # Zero is a place to go to, for an axis that there is.
@@ -221,7 +265,13 @@ def _play(
     )
     ending = Ending(motion, recorder, options.start_tolerance, options.patience)
     path = watch_of(motion, robot, options.tolerance, options.timed, 1.0 if recorder.layout.stamped else options.speed)
-    recorder.watch = None if path is None else path.see
+    watched = [each.see for each in (path, requests if isinstance(requests, ProgramPlayer) else None) if each]
+
+    def see(s: float, q: Array) -> None:
+        for each in watched:
+            each(s, q)
+
+    recorder.watch = see
 
     def watch() -> None:
         recorder.check()

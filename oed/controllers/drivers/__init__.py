@@ -8,9 +8,10 @@ from oed.controllers.drivers.efort import EFORT
 from oed.controllers.drivers.fanuc import FANUC
 from oed.controllers.drivers.generic import GENERIC
 from oed.controllers.drivers.motoman import MOTOMAN
+from oed.controllers.drivers.ur import UR
 from robots.common.errors import InputError
 
-DRIVERS = {driver.name: driver for driver in (EFORT, FANUC, MOTOMAN, ABB, GENERIC)}
+DRIVERS = {driver.name: driver for driver in (EFORT, FANUC, MOTOMAN, ABB, UR, GENERIC)}
 
 __all__ = ["DRIVERS", "Driver", "driver_of"]
 

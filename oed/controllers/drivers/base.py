@@ -8,7 +8,8 @@ from typing import Literal
 from oed.exports.simple_message.kinds import MOTION_PORT, STATE_PORT
 from oed.exports.simple_message.points import PointType
 
-Pings = Literal["answered", "point", "end"]
+Protocol = Literal["simple_message", "rtde"]
+Pings = Literal["answered", "point", "end", "unknown"]
 Replies = Literal["bare", "echo", "position", "motoman"]
 
 
@@ -20,6 +21,7 @@ class Driver:
         name: as ``--driver`` takes it.
         title: its name in messages.
         source: where its behaviour is written down.
+        protocol: ``simple_message``, or ``rtde`` of UR.
         transport: udp or tcp.
         motion_port: takes points.
         state_port: gives feedback.
@@ -31,7 +33,7 @@ class Driver:
         most: points of a trajectory, at most; None for any number.
         replies: ``bare`` without a body, ``echo`` with the point, ``position`` as JOINT_POSITION, ``motoman`` as
             MOTION_REPLY.
-        pings: whether a ping is answered, is taken for a point, or ends the program.
+        pings: whether a ping is answered, is taken for a point, ends the program, or is unknown.
         commands: whether start and stop are MOTION_CONTROL messages. A point with the number of a stop is refused.
         resting_velocity: share of the speed in short points at rest; 0.1 in ROS-Industrial's client.
         timed: whether it plays in time. Otherwise each move has a speed of its own.
@@ -45,6 +47,7 @@ class Driver:
     name: str
     title: str
     source: str
+    protocol: Protocol = "simple_message"
     transport: Literal["udp", "tcp"] = "tcp"
     motion_port: int = MOTION_PORT
     state_port: int = STATE_PORT

@@ -7,6 +7,8 @@ from dataclasses import dataclass
 from typing import Any, Literal
 
 from oed.controllers.drivers import Driver
+from oed.controllers.drivers.base import Protocol
+from oed.controllers.rtde.state import RtdeForm
 from oed.exports.simple_message import DEFAULT, WireFormat
 from oed.exports.simple_message.kinds import MOTION_PORT, STATE_PORT
 from robots.common.errors import InputError
@@ -21,6 +23,7 @@ class Endpoint:
 
     Attributes:
         host: name or address.
+        protocol: ``simple_message``, or ``rtde`` of UR.
         transport: udp or tcp.
         motion_port: takes points.
         state_port: gives feedback.
@@ -33,10 +36,11 @@ class Endpoint:
     """
 
     host: str
+    protocol: Protocol = "simple_message"
     transport: Literal["udp", "tcp"] = "udp"
     motion_port: int = MOTION_PORT
     state_port: int = STATE_PORT
-    form: WireFormat = DEFAULT
+    form: WireFormat | RtdeForm = DEFAULT
     handshake: int = HANDSHAKE
     connect_time: float = 5.0
     handshake_interval: float = 1.0
@@ -55,10 +59,11 @@ class Endpoint:
             InputError: see `Endpoint`.
         """
         usual = {
+            "protocol": driver.protocol,
             "transport": driver.transport,
             "motion_port": driver.motion_port,
             "state_port": driver.state_port,
-            "form": WireFormat(byte_order=driver.byte_order),
+            "form": RtdeForm() if driver.protocol == "rtde" else WireFormat(byte_order=driver.byte_order),
             "one_address": driver.one_handshake,
         }
         return cls(host=host, **(usual | changes))
@@ -76,10 +81,26 @@ class Endpoint:
         for name in ("motion_port", "state_port"):
             if not 0 < getattr(self, name) < 65536:
                 raise InputError(f"{name} {getattr(self, name)}", allowed="1 to 65535")
+        if (self.protocol == "rtde") != isinstance(self.form, RtdeForm):
+            raise InputError(
+                "a byte order or size of reals for a UR controller, whose numbers are big-endian with 8 bytes",
+                remedy="leave out --byte-order and --real-bytes",
+            )
         if not 0 <= self.handshake < 256:
             raise InputError(f"handshake {self.handshake}", allowed="one byte, 0 to 255")
         if not (self.connect_time > 0 and self.handshake_interval > 0):
             raise InputError("a time to connect that is not positive", allowed="seconds above zero")
+
+    @property
+    def wire_form(self) -> WireFormat:
+        """Form of the messages of simple_message.
+
+        Raises:
+            InputError: a controller of another protocol.
+        """
+        if isinstance(self.form, RtdeForm):
+            raise InputError("a UR controller speaks no simple_message", remedy="correct --driver")
+        return self.form
 
     def place(self, port: int) -> str:
         """Names a port for messages."""

@@ -5,6 +5,7 @@ from __future__ import annotations
 from oed.controllers.links.base import Endpoint, Link
 from oed.controllers.links.tcp import TcpLink
 from oed.controllers.links.udp import UdpLink
+from oed.controllers.rtde.link import RtdeLink, ScriptLink
 
 
 def open_link(endpoint: Endpoint, port: int) -> Link:
@@ -18,4 +19,6 @@ def open_link(endpoint: Endpoint, port: int) -> Link:
         InputError: a host that has no address.
         LinkError: nothing answers within the time, or the connection is refused.
     """
+    if endpoint.protocol == "rtde":
+        return (RtdeLink if port == endpoint.state_port else ScriptLink)(endpoint, port)
     return (UdpLink if endpoint.transport == "udp" else TcpLink)(endpoint, port)

@@ -6,11 +6,20 @@ import select
 import socket
 import time
 from collections import deque
+from typing import Protocol
 
 from oed.controllers.errors import LinkError
 from oed.controllers.links.base import Endpoint, Link
 from oed.controllers.links.udp import unknown_host
 from oed.exports.simple_message import Splitter
+
+
+class StreamSplitter(Protocol):
+    """Cuts a stream of bytes into messages."""
+
+    def feed(self, data: bytes) -> list[bytes]:
+        """Takes bytes as they come, and gives the messages that are whole."""
+        ...
 
 
 class TcpLink(Link):
@@ -19,13 +28,14 @@ class TcpLink(Link):
     Args:
         endpoint: the controller.
         port: which of its ports.
+        splitter: cuts the stream into messages; into those of simple_message by default.
     """
 
     reliable = True
 
-    def __init__(self, endpoint: Endpoint, port: int) -> None:
+    def __init__(self, endpoint: Endpoint, port: int, splitter: StreamSplitter | None = None) -> None:
         self.place = endpoint.place(port)
-        self._splitter = Splitter(endpoint.form)
+        self._splitter = splitter or Splitter(endpoint.wire_form)
         self._frames: deque[bytes] = deque()
         self._patience = endpoint.connect_time
         try:

@@ -70,7 +70,7 @@ class UdpLink(Link):
                 data = self._wait(left)
                 if data == self._byte:
                     return
-                if data and self._is_message(endpoint.form, data):
+                if data and self._is_message(endpoint.wire_form, data):
                     # A server that answers one handshake only goes on with what it does.
                     self._first = data
                     return

@@ -7,8 +7,8 @@ import math
 import numpy as np
 
 from oed.controllers.errors import ControllerError
-from oed.controllers.recording.feedback import RANKS, Layout, layout_of, missing_in, stamp_of
-from oed.exports.simple_message import Message, WireFormat
+from oed.controllers.recording.feedback import RANKS, Layout, MessageForm, layout_of, missing_in, stamp_of
+from oed.exports.simple_message import Message
 
 BACKWARD = 0.5
 """If only messages older than the newest come for so long [s], the clock restarted. Late ones come between others."""
@@ -22,7 +22,7 @@ class Feed:
         form: of the messages.
     """
 
-    def __init__(self, n: int, form: WireFormat) -> None:
+    def __init__(self, n: int, form: MessageForm) -> None:
         self._n, self._form = n, form
         self._last = -math.inf
         self._behind_since = math.inf

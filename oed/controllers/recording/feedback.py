@@ -2,26 +2,46 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Protocol
 
 import numpy as np
 
+from oed.controllers.rtde.feedback import StateFeedback
 from oed.exports.simple_message import (
+    Frame,
     JointFeedback,
     JointPosition,
     Message,
     TorqueFeedback,
     Valid,
-    WireFormat,
     shortest,
 )
 
 COARSE = 0.002
 """Step of a clock [s] above which rows have the times of their arrival. Reals of 4 bytes reach it after 9 hours."""
 
-RANKS = {JointPosition: 1, JointFeedback: 2, TorqueFeedback: 3}
+
+RANKS = {JointPosition: 1, JointFeedback: 2, TorqueFeedback: 3, StateFeedback: 4}
 """A controller may send several kinds; the one that says most is recorded."""
+
+
+class MessageForm(Protocol):
+    """How messages are bytes: a `WireFormat`, or RTDE's."""
+
+    @property
+    def real_bytes(self) -> int:
+        """Bytes of a real number."""
+        ...
+
+    def decode(self, data: bytes) -> Frame:
+        """Reads a message."""
+        ...
+
+    def encode(self, frame: Frame) -> bytes:
+        """Writes a message."""
+        ...
 
 
 EFFORTS = {"tau": {Valid.TORQUE: "torque"}, "i": {Valid.CURRENT: "current"}}
@@ -38,6 +58,7 @@ class Layout:
         velocity: whether they carry velocities.
         effort: ``tau``, ``i`` or nothing.
         digits: significant digits of the reals.
+        further: other quantities, with their units.
     """
 
     kind: type
@@ -46,11 +67,12 @@ class Layout:
     velocity: bool
     effort: str
     digits: int
+    further: Mapping[str, str] = field(default_factory=dict)
 
     @property
     def columns(self) -> list[str]:
         """Names of the columns, the time first."""
-        prefixes = ["q", *(["dq"] if self.velocity else []), *([self.effort] if self.effort else [])]
+        prefixes = ["q", *(["dq"] if self.velocity else []), *([self.effort] if self.effort else []), *self.further]
         return ["t", *(f"{prefix}{joint + 1}" for prefix in prefixes for joint in range(self.n))]
 
     def units(self, position: Sequence[str]) -> dict[str, str]:
@@ -68,6 +90,7 @@ class Layout:
                 units[f"tau{joint}"] = "N m" if unit == "rad" else "N"
             elif self.effort:
                 units[f"i{joint}"] = "A"
+            units |= {f"{name}{joint}": unit for name, unit in self.further.items()}
         return units
 
     def row(self, message: JointPosition | JointFeedback | TorqueFeedback) -> list[float]:
@@ -77,10 +100,13 @@ class Layout:
             values += message.velocities[: self.n]
         if self.effort and isinstance(message, TorqueFeedback):
             values += message.efforts[: self.n]
+        if isinstance(message, StateFeedback):
+            for _, further in message.further.values():
+                values += further[: self.n]
         return values
 
 
-def layout_of(message: Message, n: int, form: WireFormat) -> Layout | None:
+def layout_of(message: Message, n: int, form: MessageForm) -> Layout | None:
     """Gives the layout of a feedback message; None for another message, or one without valid positions."""
     digits = 9 if form.real_bytes == 4 else 17
     if isinstance(message, JointPosition):
@@ -97,11 +123,12 @@ def layout_of(message: Message, n: int, form: WireFormat) -> Layout | None:
             velocity=Valid.VELOCITY in valid,
             effort=effort,
             digits=digits,
+            further={name: unit for name, (unit, _) in getattr(message, "further", {}).items()},
         )
     return None
 
 
-def stamp_of(message: Message, layout: Layout, form: WireFormat) -> float | None:
+def stamp_of(message: Message, layout: Layout, form: MessageForm) -> float | None:
     """Gives the controller's time [s] of a message; None where it carries none."""
     if not layout.stamped or isinstance(message, JointPosition):
         return None
@@ -122,7 +149,7 @@ def missing_in(message: Message, layout: Layout | None) -> str:
     return " and ".join(name for bit, name in needed.items() if bit not in valid)
 
 
-def coarse_clock(message: Message, form: WireFormat) -> str:
+def coarse_clock(message: Message, form: MessageForm) -> str:
     """Says why rows have no times of the controller though its messages carry them; empty if they have."""
     if isinstance(message, JointPosition) or Valid.TIME not in message.valid:  # type: ignore[union-attr]
         return ""
@@ -136,6 +163,6 @@ def coarse_clock(message: Message, form: WireFormat) -> str:
     )
 
 
-def _step(time: float, form: WireFormat) -> float:
+def _step(time: float, form: MessageForm) -> float:
     """Gives the distance of a time from the next one that a message can carry [s]."""
     return float(np.spacing(np.float32(abs(time)))) if form.real_bytes == 4 else 0.0

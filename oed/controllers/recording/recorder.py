@@ -15,9 +15,10 @@ from oed.controllers.errors import LinkError, ProtocolError, RecordingError
 from oed.controllers.links import Link
 from oed.controllers.recording.clock import ClockAnchor
 from oed.controllers.recording.feed import Feed
-from oed.controllers.recording.feedback import Layout, coarse_clock
+from oed.controllers.recording.feedback import Layout, MessageForm, coarse_clock
 from oed.controllers.recording.log_file import FeedbackLog
 from oed.controllers.recording.statistics import Statistics
+from oed.controllers.rtde.feedback import StateFeedback
 from oed.exports.simple_message import (
     Comm,
     Frame,
@@ -26,7 +27,6 @@ from oed.exports.simple_message import (
     Ping,
     Reply,
     Status,
-    WireFormat,
 )
 from robots.common.errors import OedError
 from robots.robot import Robot
@@ -56,7 +56,7 @@ class Recorder:
     """
 
     def __init__(
-        self, link: Link, robot: Robot, form: WireFormat, patience: float, connect_time: float, answers: bool = True
+        self, link: Link, robot: Robot, form: MessageForm, patience: float, connect_time: float, answers: bool = True
     ) -> None:
         self._link, self._robot, self._form, self._answers = link, robot, form, answers
         self._patience, self._connect_time = patience, connect_time
@@ -69,6 +69,8 @@ class Recorder:
         self.statistics = Statistics(link.reliable)
         self.status: Status | None = None
         self._status_count = 0
+        self.played = 0
+        """Counter of the program on the controller, where feedback has one."""
         self.positions: Array | None = None
         """All ten reals of the last feedback."""
         self.lowest: Array | None = None
@@ -267,6 +269,9 @@ class Recorder:
         self.statistics.late = self._feed.late
         if stamp is None:
             return
+        if isinstance(message, StateFeedback):
+            self.status, self.played = message.status, message.played
+            self._status_count += 1
         layout = self._feed.layout
         assert layout is not None
         self._feed.problem, self._last_row = "", now

@@ -2,5 +2,6 @@
 
 from oed.controllers.virtual.controller import VirtualController
 from oed.controllers.virtual.options import ControllerOptions, Faults
+from oed.controllers.virtual.starting import virtual_controller
 
-__all__ = ["ControllerOptions", "Faults", "VirtualController"]
+__all__ = ["ControllerOptions", "Faults", "VirtualController", "virtual_controller"]

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import select
-import threading
 import time
 from functools import partial
 
@@ -19,6 +18,7 @@ from oed.controllers.virtual.options import ControllerOptions
 from oed.controllers.virtual.player import REPORTED, Outcome, Player
 from oed.controllers.virtual.ports import Client, Port
 from oed.controllers.virtual.robot import VirtualRobot
+from oed.controllers.virtual.service import Service
 from oed.exports.simple_message import (
     Comm,
     Frame,
@@ -48,7 +48,7 @@ STALL = 0.15
 """A delay of this program beyond this [s] is no time of the controller: its clock stands still for so long."""
 
 
-class VirtualController:
+class VirtualController(Service):
     """Behaves as the thesis' program for the controller does, on this computer.
 
     Args:
@@ -84,8 +84,7 @@ class VirtualController:
         self._motion, self._state = open_ports(self.options)
         self._network = Network(self.options.faults)
         self._start_over(pose)
-        self._stopping = threading.Event()
-        self._thread: threading.Thread | None = None
+        super().__init__()
         self.received = self.malformed = self.refused = self.restarts = self.points = 0
         self.stalled = 0.0
 
@@ -116,45 +115,28 @@ class VirtualController:
         return self._player
 
     @property
+    def played(self) -> int:
+        """Trajectories that were played to their end."""
+        return self._player.played_trajectories
+
+    @property
+    def moving(self) -> bool:
+        """Whether a trajectory is played."""
+        return self._player.moving
+
+    @property
+    def error(self) -> int:
+        """The error that it reports; 0 for none."""
+        return self._player.error
+
+    @property
     def time(self) -> float:
         """Its clock, which feedback carries [s]."""
         return self._clock_ticks * self.options.feedback_period
 
-    def run(self) -> None:
-        """Runs until `stop`."""
-        while not self._stopping.is_set():
-            self._turn()
-
-    def serve(self, duration: float | None = None) -> None:
-        """Runs until Ctrl-C, or for a time [s], and closes the ports."""
-        end = None if duration is None else time.monotonic() + duration
-        try:
-            while end is None or time.monotonic() < end:
-                self._turn()
-        except KeyboardInterrupt:
-            pass
-        finally:
-            self.stop()
-
-    def start(self) -> None:
-        """Runs in a thread."""
-        self._thread = threading.Thread(target=self.run, name="virtual controller", daemon=True)
-        self._thread.start()
-
-    def stop(self) -> None:
-        """Ends `run`, and closes the ports."""
-        self._stopping.set()
-        if self._thread is not None:
-            self._thread.join()
+    def _close(self) -> None:
         self._motion.close()
         self._state.close()
-
-    def __enter__(self) -> VirtualController:
-        self.start()
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self.stop()
 
     def _turn(self) -> None:
         now = time.monotonic()

@@ -8,8 +8,8 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable, Hashable
 from contextlib import suppress
 
-from oed.controllers.virtual.fixed_packets import FixedPackets
-from oed.exports.simple_message import MessageError, Splitter
+from oed.controllers.links.tcp import StreamSplitter
+from oed.exports.simple_message import MessageError
 from robots.common.errors import InputError
 
 Client = Hashable
@@ -150,12 +150,12 @@ class TcpPort(Port):
         most: clients at once.
     """
 
-    def __init__(self, host: str, number: int, splitter: Callable[[], Splitter | FixedPackets], most: int) -> None:
+    def __init__(self, host: str, number: int, splitter: Callable[[], StreamSplitter], most: int) -> None:
         super().__init__(most)
         self._listener = listening(host, number, socket.SOCK_STREAM)
         self._listener.listen(8)
         self._splitter = splitter
-        self._open: dict[Client, tuple[socket.socket, Splitter | FixedPackets]] = {}
+        self._open: dict[Client, tuple[socket.socket, StreamSplitter]] = {}
         self._unsent: dict[Client, bytearray] = {}
         self.number = self._listener.getsockname()[1]
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from oed.constraints import PointwiseLimit, StateLimits, TorqueLimit, TorqueRms
+from oed.constraints import PointwiseLimit, StateLimits, TorqueLimit, TorqueRms, VelocityRampLimit
 from oed.constraints.feasibility import check_feasible, roomy_pose
 from oed.constraints.geometric import CollisionLimit, GeometricLimits
 from oed.experiments.assembly import assemble
@@ -182,7 +182,9 @@ def choose_safety(robot: Robot, base: BaseParameters, home: Array, limits: Limit
     space = tuple(limits.space)
     spatial = GeometricLimits(robot=robot, limits=(*bodies, *space))
     torque, torque_rms = _torque_limits(robot, base, limits)
-    motion = StateLimits(robot=robot, limits=tuple(limits.motion)) if limits.motion else None
+    ramp = () if robot.limits.ramp is None else (VelocityRampLimit(limits=robot.limits),)
+    own = (*ramp, *limits.motion)
+    motion = StateLimits(robot=robot, limits=own) if own else None
 
     def check(pose: Array) -> None:
         check_feasible(robot, spatial, pose)

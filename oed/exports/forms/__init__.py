@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from oed.exports.forms.abb import Abb
 from oed.exports.forms.base import ExportOptions, Form
-from oed.exports.forms.franka import Franka
+from oed.exports.forms.franka import Franka, FrankaPlayer
 from oed.exports.forms.kuka import Kuka
 from oed.exports.forms.moveit_limits import MoveItLimits
 from oed.exports.forms.ros import Ros, RosGoal
@@ -25,6 +25,7 @@ FORMS: dict[str, Form] = {
         Kuka(),
         Abb(),
         Franka(),
+        FrankaPlayer(),
     )
 }
 """All forms but the trajectory file itself, by name."""

@@ -1,4 +1,4 @@
-"""ABB: a RAPID module with an array of joint targets in degrees."""
+"""ABB: a RAPID module that moves through joint targets in degrees, each with its time."""
 
 from __future__ import annotations
 
@@ -9,41 +9,76 @@ from typing import ClassVar
 import numpy as np
 
 from oed.exports.forms.base import Array, ExportOptions, Form, number, require_joints
+from oed.exports.forms.controller_programs import (
+    axes_in_degrees,
+    joints_from_degrees,
+    pieces,
+    require_name,
+    reserved_words,
+    spline_points,
+)
 from robots.common.errors import InputError
 from robots.robot import Robot
 from robots.signals import Motion
 
 AXES = 6
+
+PLAY = "_play"
+"""What follows the module's name in that of its procedure."""
+
+NAME = 32
+"""Characters of a name, at most."""
+
+RESERVED = reserved_words("rapid_words.txt")
+"""Words of the language, and names that a controller has already."""
+
 _TARGET = re.compile(r"^ +\[\[([^]]*)\],\[9E9", re.MULTILINE)
 _PERIOD = re.compile(r"CONST num period:=([\d.]+);")
 
 
 class Abb(Form):
-    """A .mod file with the points, for a program that moves from point to point at a fixed period."""
+    """A .mod file: a start check, a slow MoveAbsJ to the start, then one MoveAbsJ a point with its time.
+
+    The targets are far enough from each other for the motion planner, whose corners are rounded: the module plays the
+    path, not each sample.
+    """
 
     name: ClassVar[str] = "abb"
     suffixes: ClassVar[tuple[str, ...]] = (".mod",)
     comment: ClassVar[Mapping[str, str]] = {".mod": "!"}
+    named: ClassVar[bool] = True
 
     def write(self, motion: Motion, robot: Robot, options: ExportOptions, suffix: str) -> bytes:
         """See `Form.write`."""
         require_joints(robot, 1, AXES, "jointtarget")
+        require_name(options.name, NAME - len(PLAY), RESERVED, "RAPID")
+        points, _ = spline_points(motion)
+        axes = np.pad(axes_in_degrees(points.q, robot), ((0, 0), (0, AXES - robot.n)))
         external = ",".join(["9E9"] * 6)
-        targets = []
-        for row in np.rad2deg(motion.q).tolist():
-            axes = ",".join(number(value, 7) for value in row + [0.0] * (AXES - robot.n))
-            targets.append(f"    [[{axes}],[{external}]]")
+        parts = pieces(len(points))
+        names = ["points", *(f"points_{number}" for number in range(2, len(parts) + 1))]
         lines = [
             f"MODULE {options.name}",
-            f"  CONST num period:={number(motion.period or 0.0)};",
-            f"  CONST num count:={len(motion)};",
-            f"  CONST jointtarget points{{{len(motion)}}}:=[",
-            ",\n".join(targets),
-            "  ];",
-            "ENDMODULE",
-            "",
+            f"  CONST num period:={number(points.period or 0.0)};",
+            f"  CONST num count:={len(points)};",
         ]
-        return "\n".join(lines).encode()
+        for name, part in zip(names, parts, strict=True):
+            rows = [
+                f"    [[{','.join(number(value, 7) for value in row)}],[{external}]]" for row in axes[part].tolist()
+            ]
+            lines += [f"  CONST jointtarget {name}{{{len(rows)}}}:=[", ",\n".join(rows), "  ];"]
+        lines += [f"  PROC {options.name}{PLAY}()", *_start(robot.n, options)]
+        for name, part in zip(names, parts, strict=True):
+            first, last = 2 if part.start == 0 else 1, part.stop - part.start
+            end = part.stop == len(points)
+            lines += [
+                f"    FOR i FROM {first} TO {last - int(end)} DO",
+                f"      MoveAbsJ {name}{{i}}\\NoEOffs,vmax\\T:=period,z50,tool0;",
+                "    ENDFOR",
+            ]
+            if end:
+                lines.append(f"    MoveAbsJ {name}{{{last}}}\\NoEOffs,vmax\\T:=period,fine,tool0;")
+        return "\n".join([*lines, "  ENDPROC", "ENDMODULE", ""]).encode()
 
     def read(self, content: bytes, robot: Robot, suffix: str) -> tuple[Array, Array]:
         """See `Form.read`."""
@@ -51,5 +86,21 @@ class Abb(Form):
         period, rows = _PERIOD.search(text), _TARGET.findall(text)
         if period is None or not rows:
             raise InputError("no joint targets", allowed="a module of this form")
-        q = np.array([[float(value) for value in row.split(",")][: robot.n] for row in rows])
-        return float(period[1]) * np.arange(len(q), dtype=np.float64), np.deg2rad(q)
+        axes = np.array([[float(value) for value in row.split(",")][: robot.n] for row in rows])
+        return float(period[1]) * np.arange(len(axes), dtype=np.float64), joints_from_degrees(axes, robot)
+
+
+def _start(n: int, options: ExportOptions) -> list[str]:
+    """Gives the lines that check the start, and move there slowly."""
+    lines = ["    VAR jointtarget here;", "    VAR num far:=0;", "    here:=CJointT();"]
+    for axis in range(1, n + 1):
+        distance = f"Abs(here.robax.rax_{axis}-points{{1}}.robax.rax_{axis})"
+        lines += [f"    IF {distance}>far THEN", f"      far:={distance};", "    ENDIF"]
+    return [
+        *lines,
+        f"    IF far>{number(float(np.rad2deg(options.start_tolerance)), 4)} THEN",
+        '      TPWrite "The robot is not at the start; a continued program moves it there."\\Num:=far;',
+        "      Stop;",
+        "    ENDIF",
+        "    MoveAbsJ points{1}\\NoEOffs,v50,fine,tool0;",
+    ]

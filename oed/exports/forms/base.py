@@ -51,6 +51,7 @@ class Form(ABC):
         suffixes: of the file, the usual one first.
         period: sample period that the controller needs [s]; None for that of the trajectory.
         has_samples: whether the file holds the trajectory, and not only limits of its robot.
+        named: whether the file must have the name of its program or module.
         comment: what begins a comment in files of each suffix that has comments.
     """
 
@@ -58,6 +59,7 @@ class Form(ABC):
     suffixes: ClassVar[tuple[str, ...]]
     period: ClassVar[float | None] = None
     has_samples: ClassVar[bool] = True
+    named: ClassVar[bool] = False
     comment: ClassVar[Mapping[str, str]] = {}
 
     def content(self, motion: Motion, robot: Robot, options: ExportOptions, suffix: str) -> bytes:

@@ -1,12 +1,13 @@
-"""Franka: a CSV of joint positions and velocities at 1 kHz, for a motion generator of libfranka."""
+"""Franka: a CSV of joint positions and velocities at 1 kHz, and a program for libfranka that plays it and logs."""
 
 from __future__ import annotations
 
+from importlib.resources import files
 from typing import ClassVar
 
 import numpy as np
 
-from oed.exports.forms.base import Array, ExportOptions, Form, require_joints
+from oed.exports.forms.base import Array, ExportOptions, Form, number, require_joints
 from robots.common.errors import InputError
 from robots.robot import Robot
 from robots.signals import Motion
@@ -34,3 +35,17 @@ class Franka(Form):
             return rows[:, 0], rows[:, 1 : 1 + robot.n]
         except (ValueError, IndexError) as error:
             raise InputError(f"no rows of numbers ({error})", allowed="a file of this form") from error
+
+
+class FrankaPlayer(Form):
+    """The source of a C++ program that plays any such CSV on an arm, and logs what the arm does."""
+
+    name: ClassVar[str] = "franka-player"
+    suffixes: ClassVar[tuple[str, ...]] = (".cpp",)
+    has_samples: ClassVar[bool] = False
+
+    def write(self, motion: Motion, robot: Robot, options: ExportOptions, suffix: str) -> bytes:
+        """See `Form.write`."""
+        require_joints(robot, 7, 7, "a Franka arm")
+        source = (files("oed.exports.forms.programs") / "franka_player.cpp").read_text("utf-8")
+        return source.replace("@START_TOLERANCE@", number(options.start_tolerance)).encode()

@@ -1,4 +1,4 @@
-"""KUKA: a KRL data list of axis positions in degrees."""
+"""KUKA: a KRL program that moves through a timed spline, or a data list of axis positions in degrees."""
 
 from __future__ import annotations
 
@@ -9,40 +9,125 @@ from typing import ClassVar
 import numpy as np
 
 from oed.exports.forms.base import Array, ExportOptions, Form, number, require_joints
+from oed.exports.forms.controller_programs import (
+    axes_in_degrees,
+    joints_from_degrees,
+    pieces,
+    require_name,
+    reserved_words,
+    spline_points,
+)
 from robots.common.errors import InputError
 from robots.robot import Robot
 from robots.signals import Motion
 
-_POINT = re.compile(r"^POINT\[\d+\]=\{(.*)\}$", re.MULTILINE)
+NAME = 24
+"""Characters of a name, at most."""
+
+SLOW = 10
+"""Speed and acceleration of the move to the start [%]."""
+
+RESERVED = reserved_words("krl_words.txt")
+"""Words of the language, and names in the program."""
+
+_LISTED = re.compile(r"^POINT(?:_\d+)?\[\d+\]=\{(.*)\}$", re.MULTILINE)
+_SPLINE = re.compile(r"^  SPTP \{(.*)\}$", re.MULTILINE)
+_START = re.compile(r"^START=\{(.*)\}$", re.MULTILINE)
 _PERIOD = re.compile(r"^DECL REAL PERIOD=([\d.]+)$", re.MULTILINE)
+_TIME = re.compile(r"^  TIME_BLOCK END=([\d.]+)$", re.MULTILINE)
 
 
 class Kuka(Form):
-    """A .dat file with an array of E6AXIS, for a program that moves from point to point at a fixed period."""
+    """A .src file: a start check, a slow PTP to the start, then a PTP spline whose points have their times.
+
+    A .dat file is a list of all samples, an array of E6AXIS, for a program of one's own.
+    """
 
     name: ClassVar[str] = "kuka"
-    suffixes: ClassVar[tuple[str, ...]] = (".dat",)
-    comment: ClassVar[Mapping[str, str]] = {".dat": ";"}
+    suffixes: ClassVar[tuple[str, ...]] = (".src", ".dat")
+    comment: ClassVar[Mapping[str, str]] = {".src": ";", ".dat": ";"}
+    named: ClassVar[bool] = True
 
     def write(self, motion: Motion, robot: Robot, options: ExportOptions, suffix: str) -> bytes:
         """See `Form.write`."""
         require_joints(robot, 1, 6, "E6AXIS")
-        lines = [
-            f"DEFDAT {options.name} PUBLIC",
-            f"DECL INT COUNT={len(motion)}",
-            f"DECL REAL PERIOD={number(motion.period or 0.0)}",
-            f"DECL E6AXIS POINT[{len(motion)}]",
-        ]
-        for k, row in enumerate(np.rad2deg(motion.q).tolist(), start=1):
-            axes = ",".join(f"A{joint} {number(value, 7)}" for joint, value in enumerate(row, start=1))
-            lines.append(f"POINT[{k}]={{{axes}}}")
-        return "\n".join([*lines, "ENDDAT", ""]).encode()
+        require_name(options.name, NAME, RESERVED, "KRL")
+        lines = _program(motion, robot, options) if suffix == ".src" else _data_list(motion, robot, options)
+        return "\n".join([*lines, ""]).encode()
 
     def read(self, content: bytes, robot: Robot, suffix: str) -> tuple[Array, Array]:
-        """See `Form.read`."""
+        """See `Form.read`; of a program the points of its spline."""
         text = content.decode("utf-8", errors="replace")
-        period, rows = _PERIOD.search(text), _POINT.findall(text)
+        if suffix == ".src":
+            total, start, rows = _TIME.search(text), _START.search(text), _SPLINE.findall(text)
+            if total is None or start is None or not rows:
+                raise InputError("no timed spline", allowed="a program of this form")
+            q = _positions([start[1], *rows], robot)
+            return np.linspace(0.0, float(total[1]), len(q)), q
+        period, rows = _PERIOD.search(text), _LISTED.findall(text)
         if period is None or not rows:
             raise InputError("no list of points", allowed="a data list of this form")
-        q = np.array([[float(axis.split()[1]) for axis in row.split(",")] for row in rows])
-        return float(period[1]) * np.arange(len(q), dtype=np.float64), np.deg2rad(q)
+        q = _positions(rows, robot)
+        return float(period[1]) * np.arange(len(q), dtype=np.float64), q
+
+
+def _program(motion: Motion, robot: Robot, options: ExportOptions) -> list[str]:
+    points, error = spline_points(motion)
+    axes = axes_in_degrees(points.q, robot)
+    farthest = [f"ABS($AXIS_ACT.A{joint}-START.A{joint})" for joint in range(1, robot.n + 1)]
+    check = [f"FAR={farthest[0]}"]
+    for distance in farthest[1:]:
+        check += [f"IF {distance}>FAR THEN", f"  FAR={distance}", "ENDIF"]
+    timed = []
+    for row in axes[1:]:
+        timed += [f"  SPTP {_aggregate(row)}", "  TIME_BLOCK PART=1"]
+    return [
+        f"DEF {options.name}( )",
+        f"; {len(points)} points; a cubic spline through them is within {np.rad2deg(error):.2g} deg of the trajectory",
+        "; The time that the controller needs may be longer: log what it does",
+        "DECL E6AXIS START",
+        "DECL REAL FAR",
+        "GLOBAL INTERRUPT DECL 3 WHEN $STOPMESS==TRUE DO IR_STOPM( )",
+        "INTERRUPT ON 3",
+        "BAS(#INITMOV,0)",
+        f"START={_aggregate(axes[0])}",
+        "WAIT SEC 0",
+        *check,
+        f"IF FAR>{number(float(np.rad2deg(options.start_tolerance)), 4)} THEN",
+        "  ; The robot is not at the start: a continued program moves it there, slowly and straight",
+        "  HALT",
+        "ENDIF",
+        f"BAS(#VEL_PTP,{SLOW})",
+        f"BAS(#ACC_PTP,{SLOW})",
+        "PTP START",
+        "BAS(#VEL_PTP,100)",
+        "BAS(#ACC_PTP,100)",
+        "PTP_SPLINE",
+        "  TIME_BLOCK START",
+        *timed,
+        f"  TIME_BLOCK END={number(points.duration)}",
+        "ENDSPLINE",
+        "END",
+    ]
+
+
+def _data_list(motion: Motion, robot: Robot, options: ExportOptions) -> list[str]:
+    axes, parts = axes_in_degrees(motion.q, robot), pieces(len(motion))
+    names = ["POINT", *(f"POINT_{number}" for number in range(2, len(parts) + 1))]
+    lines = [
+        f"DEFDAT {options.name} PUBLIC",
+        f"DECL INT COUNT={len(motion)}",
+        f"DECL REAL PERIOD={number(motion.period or 0.0)}",
+    ]
+    for name, part in zip(names, parts, strict=True):
+        lines.append(f"DECL E6AXIS {name}[{part.stop - part.start}]")
+        lines += [f"{name}[{k}]={_aggregate(row)}" for k, row in enumerate(axes[part], start=1)]
+    return [*lines, "ENDDAT"]
+
+
+def _aggregate(row: Array) -> str:
+    return "{" + ",".join(f"A{axis} {number(value, 7)}" for axis, value in enumerate(row.tolist(), start=1)) + "}"
+
+
+def _positions(rows: list[str], robot: Robot) -> Array:
+    return joints_from_degrees(np.array([[float(axis.split()[1]) for axis in row.split(",")] for row in rows]), robot)

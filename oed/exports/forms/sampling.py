@@ -13,6 +13,22 @@ MOST = 5_000_000
 """Samples of an exported trajectory, at most."""
 
 
+def at_cycle(motion: Motion, cycle: float) -> Motion:
+    """Samples a motion at the cycle of a controller, unless its period is a multiple of it.
+
+    Args:
+        motion: the trajectory.
+        cycle: of the controller [s].
+
+    Raises:
+        InputError: see `at_period`.
+    """
+    period = motion.period
+    whole = 0.0 if period is None else round(period / cycle)
+    fits = period is not None and whole >= 1 and abs(period - whole * cycle) < 1e-6 * cycle
+    return motion if fits else at_period(motion, cycle)
+
+
 def at_period(motion: Motion, period: float) -> Motion:
     """Samples a motion at another period.
 

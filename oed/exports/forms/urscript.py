@@ -18,7 +18,16 @@ CYCLES = {0.008: "CB", 0.002: "e-series"}
 """Cycle of the controllers [s]: a servoj takes at least one, so shorter ones play the motion too slowly."""
 
 LOOKAHEAD, GAIN = 0.1, 300
-_POINT = re.compile(r"^ +servoj\(\[([^]]*)\], 0, 0, ([\d.]+)", re.MULTILINE)
+SETTLES = 0.4
+"""How long the last point is held, so that the robot reaches it [s]: servoj follows 0.1 s later or more."""
+
+MOST = 1000
+"""Points of a program that all controllers have taken.
+
+The maker states no limit. Users report that programs end without a word beyond 1,000 to 2,500 moves.
+"""
+
+_POINT = re.compile(r"^  servoj\(\[([^]]*)\], 0, 0, ([\d.]+)", re.MULTILINE)
 
 
 class UrScript(Form):
@@ -51,21 +60,24 @@ class UrScript(Form):
                 "--period, or state the period of another controller in the robot's description"
             )
             warnings.warn(AssumedValueWarning(text), stacklevel=4)
+        if len(motion) > MOST:
+            text = (
+                f"a program of {len(motion)} points: controllers have refused programs of more than {MOST} to 2,500 "
+                "moves. If yours does, use `oed stream --driver ur`, which has no limit, or a longer --period"
+            )
+            warnings.warn(AssumedValueWarning(text), stacklevel=4)
         # The two zeros are an acceleration and a speed that the command does not use.
         tail = f"0, 0, {number(period)}, {number(LOOKAHEAD)}, {GAIN})"
         lines = [
             f"def {options.name}():",
-            f"  start = {_list(motion.q[0])}",
-            "  actual = get_actual_joint_positions()",
-            "  joint = 0",
-            "  while joint < 6:",
-            f"    if norm(actual[joint] - start[joint]) > {number(options.start_tolerance)}:",
-            '      popup("The robot is not at the start of the trajectory.", error=True, blocking=True)',
-            "      halt",
-            "    end",
-            "    joint = joint + 1",
-            "  end",
+            *start_check(motion.q[0], options.start_tolerance),
             *(f"  servoj({_list(row)}, {tail}" for row in motion.q),
+            # The robot follows later: the end is held until it is there.
+            "  waited = 0",
+            f"  while waited < {int(np.ceil(SETTLES / period))}:",
+            f"    servoj({_list(motion.q[-1])}, {tail}",
+            "    waited = waited + 1",
+            "  end",
             "  stopj(2.0)",
             "end",
             "",
@@ -79,6 +91,27 @@ class UrScript(Form):
             raise InputError("no servoj commands", allowed="a program of this form")
         q = np.array([[float(value) for value in row.split(",")] for row, _ in found])
         return float(found[0][1]) * np.arange(len(q), dtype=np.float64), q
+
+
+def start_check(pose: Array, tolerance: float) -> list[str]:
+    """Gives the lines of a program that end it if the robot stands elsewhere.
+
+    Args:
+        pose: where it has to stand (6,) [rad].
+        tolerance: farthest distance of a joint [rad].
+    """
+    return [
+        f"  start = {_list(pose)}",
+        "  actual = get_actual_joint_positions()",
+        "  joint = 0",
+        "  while joint < 6:",
+        f"    if norm(actual[joint] - start[joint]) > {number(tolerance)}:",
+        '      popup("The robot is not at the start of the trajectory.", error=True, blocking=True)',
+        "      halt",
+        "    end",
+        "    joint = joint + 1",
+        "  end",
+    ]
 
 
 def _list(row: Array) -> str:

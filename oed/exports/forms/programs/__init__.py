@@ -1,0 +1,1 @@
+"""Sources of programs that are exported as they are."""
