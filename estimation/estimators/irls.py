@@ -22,7 +22,7 @@ ROUNDS = 50
 SETTLED = 1e-4
 # A scale below this share of a joint's torque is rounding.
 EXACT = 1e-9
-# Mean slope of the influence below which the residual has no middle to speak of.
+# Mean slope of the influence below which the residual has no middle.
 LEAST_SLOPE = 0.1
 
 

@@ -1,4 +1,4 @@
-"""Instrumental variables: the inverse dynamic model, freed of the bias that noise in the motion brings."""
+"""Instrumental variables: the inverse dynamic model, without the bias by noise in the motion."""
 
 from __future__ import annotations
 

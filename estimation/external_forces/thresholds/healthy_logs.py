@@ -54,7 +54,7 @@ def calibrate_signals(
         bandwidth: of the observer [Hz].
         velocity: what velocities the signals have.
         false_alarms: an hour.
-        own: whether the logs may contain contacts: those are left out, until nothing changes any more.
+        own: whether the logs may contain contacts: those are left out, until nothing changes.
         in_fit: whether the model was fitted to these logs, so that they say nothing new about its parameters.
 
     Raises:

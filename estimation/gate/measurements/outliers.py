@@ -24,7 +24,7 @@ SHARE_OF_POSITION, SHARE_OF_SIGNAL = 0.01, 0.1
 BACK = 0.5
 # Steps of a coarse sensor by which its value flickers.
 FLICKER = 3.0
-# Share of rows above which outliers are not isolated: in a torque they are noise, in a position they spoil it.
+# Share of rows above which outliers are not isolated: in a torque they are noise, in a position they make it useless.
 MANY = 0.03
 # Peaks of torque within so many rows of a reversal of any joint are real if more than MOST of all peaks are there:
 # friction that changes its direction shakes the arm, and a sharp fall of it makes a peak.
