@@ -73,7 +73,7 @@ def inertial_from_pseudo(pseudo: ArrayLike) -> Array:
 
 
 def normalised_eigenvalues(parameters: ArrayLike) -> Array:
-    """Gives the eigenvalues of each body's pseudo-inertia, freed of units.
+    """Gives the eigenvalues of each body's pseudo-inertia, without units.
 
     A congruence by the body's own mass and radius of gyration scales P to a unit mass and a unit trace of Sigma; it
     keeps the signs. A body with a mass that is not positive gets the eigenvalues of P as it is.

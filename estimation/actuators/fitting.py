@@ -51,7 +51,7 @@ class Fit:
         errors: of the simulated motion, with derivatives.
         weights: of the joints (n,) [1/rad2 or 1/m2].
         cost: the weighted sum of squares.
-        settled: whether the last steps changed nothing any more.
+        settled: whether the last steps changed nothing.
         start: the scaled values that the prior is about (K,).
     """
 
@@ -92,7 +92,7 @@ def fit_drives(
         start: values to start from, chain by chain.
         runs: what was recorded.
         options: settings.
-        progress: is told of each step.
+        progress: receives each step.
         weights: of the joints (n,) [1/rad2 or 1/m2] in the first round; by default alike.
 
     Raises:

@@ -80,7 +80,7 @@ def search_effects(
         fit: of the drives without them.
         runs: that were fitted.
         held_out: the same runs with the samples that were not fitted, see `Run.blocks`.
-        progress: is told of each finding.
+        progress: receives each finding.
 
     Returns:
         What is free with the effects, values to start a fit of all from, and the findings, strongest first.

@@ -13,7 +13,7 @@ LARGEST, SMALLEST = 30.0, 1e-3
 """Bounds of the size of a kind, in the usual sizes of its parameters: 150 mrad and 5 urad of joint zeros."""
 
 QUIETEST = 1e-6  # variance of rows in standard deviations of the noise; less is rounding of exact poses
-ROUNDS = 40
+ITERATIONS = 40
 CONVERGED = 0.01
 
 
@@ -78,7 +78,7 @@ def estimate_sizes(
     sizes = np.clip(np.array(sizes, dtype=float), SMALLEST, LARGEST)
     free = kinds >= 0
     x = np.zeros(len(kinds))
-    for _ in range(ROUNDS):
+    for _ in range(ITERATIONS):
         prior = np.where(free, 1.0 / sizes[kinds] ** 2, 0.0) if len(sizes) else np.zeros(len(kinds))
         scale = np.sqrt(np.maximum(np.diag(normal.gram) / noise + prior, np.finfo(float).tiny))
         inverse = np.linalg.pinv((normal.gram / noise + np.diag(prior)) / np.outer(scale, scale), hermitian=True)

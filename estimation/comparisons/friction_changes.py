@@ -21,7 +21,7 @@ Kind = Literal["unchanged", "common", "own", "unequal", "changed"]
 HEAT_SCATTER = 0.3
 # A split needs a majority of joints that share a change.
 FEWEST_JOINTS = 3
-ROUNDS = 20
+ITERATIONS = 20
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -225,7 +225,7 @@ def _against(change: Array, S: Array, j: int, rest: Sequence[int]) -> tuple[floa
     among = list(rest)
     shared = float(np.median(change[among]))
     weights = np.full(len(among), 1 / len(among))
-    for _ in range(ROUNDS):
+    for _ in range(ITERATIONS):
         V = S[np.ix_(among, among)] + (HEAT_SCATTER * shared) ** 2 * np.eye(len(among))
         solved = np.linalg.solve(V, np.ones(len(among)))
         weights, before = solved / solved.sum(), shared

@@ -16,7 +16,7 @@ NEARLY_EXPLAINED_SHARE = 0.9
 """Nor do those that explain less than this share and have a worse BIC: formulas are true to some per cent."""
 
 MIN_RETAINED_CHI2 = 0.75
-"""A name must explain this share of its chi-square beside free functions elsewhere, or it borrowed it from them."""
+"""A name must explain this share of its chi-square beside free functions elsewhere; else these explain it."""
 
 # Which logs and rows count.
 
@@ -48,7 +48,7 @@ MIN_PUSH_TIME = 0.05
 """Time [s] for which rows must be outside together to be no outliers."""
 
 IMPACT_TIME = 0.15
-"""Time [s] about a reversal in which they are outliers all the same."""
+"""Time [s] about a reversal in which they still count as outliers."""
 
 MAX_REVERSAL_ERROR = 1.0
 """Error of the torque at reversals over the noise up to which those rows count."""

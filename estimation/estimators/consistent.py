@@ -98,9 +98,9 @@ class PhysicallyConsistent(WeightedLeastSquares):
     Constraints: each link's pseudo-inertia is positive definite; its centre of mass lies in its box, where a box is
     known; rotor inertias, Coulomb and viscous friction are not negative, and friction brakes at every speed seen. D is
     the entropic (log det Bregman) distance to the robot's description, or its second-order, Euclidean form; links
-    without a description lean on a plausible body. S is the misfit of weighted least squares, and the weight of the
-    pull is the largest that predicts left-out blocks as well as the best (Wensing et al. 2018; Lee et al. 2020). The
-    data enter as normal equations: a longer log costs no more.
+    without a description are regularised towards a plausible body. S is the misfit of weighted least squares. The
+    weight of the regularisation is the largest that predicts left-out blocks as well as the best (Wensing et al. 2018;
+    Lee et al. 2020). The data enter as normal equations: a longer log costs no more.
 
     The solution's extras: ``standard`` (p,), ``pull``, ``eigenvalues`` (n, 4) of the normalised pseudo-inertias, and
     ``active``, the parameters and bodies at their bounds.

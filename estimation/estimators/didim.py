@@ -11,7 +11,7 @@ from estimation.regressions.regression_data import RegressionData
 from estimation.regressions.regularisation import torque_change
 from robots.signals import Motion
 
-ROUNDS = 12
+ITERATIONS = 12
 
 
 class DirectAndInverse(SimulatingEstimator):
@@ -41,7 +41,7 @@ class DirectAndInverse(SimulatingEstimator):
         level = data.moments.level(values)
         motions: list[Motion] = []
         rounds, settled = 0, False
-        while not settled and rounds < ROUNDS:
+        while not settled and rounds < ITERATIONS:
             rounds += 1
             motions = instruments.simulate(values)
             parts = zip(data.parts, motions, instruments.masks(motions), strict=True)

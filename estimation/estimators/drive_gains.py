@@ -16,7 +16,7 @@ from robots.common.errors import InputError, NotIdentifiableError
 from robots.geometry.inertia import SIZE
 from robots.signals import Motion
 
-ROUNDS = 8
+ITERATIONS = 8
 # Gains have settled when none moves by more than this share.
 SETTLED = 1e-6
 # Ratio of smallest to largest eigenvalue of the scaled normal equations, below which a gain is undetermined.
@@ -115,7 +115,7 @@ def _fit(total: Array, count: Array, size: int, n: int) -> DriveGains:
     gains_at = size + np.arange(n)
     weights, noise = np.ones(n), np.zeros(n)
     gains = np.zeros(n)
-    for _ in range(ROUNDS):
+    for _ in range(ITERATIONS):
         matrix = np.tensordot(weights, total, axes=1)
         gram, right = matrix[:-1, :-1].copy(), matrix[:-1, -1]
         # The currents' own noise, in their mean square: least squares would shrink the gains by it.

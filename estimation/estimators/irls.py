@@ -17,12 +17,12 @@ from estimation.regressions.regularisation import torque_change
 from estimation.uncertainty.quantiles import robust_deviation
 from robots.common.errors import InputError
 
-ROUNDS = 50
+REWEIGHTINGS = 50
 # Parameters have settled when no joint's torque moves by more than this share of its residual level.
 SETTLED = 1e-4
 # A scale below this share of a joint's torque is rounding.
 EXACT = 1e-9
-# Mean slope of the influence below which the residual has no middle to speak of.
+# Mean slope of the influence below which the residual has no middle.
 LEAST_SLOPE = 0.1
 
 
@@ -87,7 +87,7 @@ class ReweightedLeastSquares(WeightedLeastSquares):
 
     def _settle(self, data: RegressionData, values: Array) -> tuple[Array, Array]:
         scale = _scale(data, values)
-        for _ in range(ROUNDS):
+        for _ in range(REWEIGHTINGS):
             total = _reweighted(data, values, partial(_row_weights, self.factors, self.tuning * scale))
             new = total.pulled(data.moments.pull).solve(_joint_weights(scale, self.temper), data.ridge)
             moved = torque_change(data.moments, new - values)

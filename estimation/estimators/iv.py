@@ -1,4 +1,4 @@
-"""Instrumental variables: the inverse dynamic model, freed of the bias that noise in the motion brings."""
+"""Instrumental variables: the inverse dynamic model, without the bias by noise in the motion."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from estimation.regressions.regularisation import regularisation, solve_scaled, 
 from robots.common.errors import SolverError
 from robots.signals import Motion
 
-ROUNDS = 10
+ITERATIONS = 10
 
 
 class InstrumentalVariables(SimulatingEstimator):
@@ -41,7 +41,7 @@ class InstrumentalVariables(SimulatingEstimator):
         level = data.moments.level(values)
         motions: list[Motion] = []
         rounds, settled = 0, False
-        while not settled and rounds < ROUNDS:
+        while not settled and rounds < ITERATIONS:
             rounds += 1
             motions = instruments.simulate(values)
             gram, cross = np.zeros_like(data.moments.gram), np.zeros_like(data.moments.cross)

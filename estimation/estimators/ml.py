@@ -13,7 +13,7 @@ from estimation.regressions.covariances import Equations, regressor_rows, robust
 from estimation.regressions.regression_data import CHUNK, FittedRows, RegressionData
 from estimation.regressions.regularisation import regularisation, solve_scaled
 
-ROUNDS = 20
+REWEIGHTINGS = 20
 # The likelihood has settled when no standardised residual level moves by more.
 SETTLED = 1e-6
 # Share of a joint's torque below which a residual is rounding, and of the correlations' size that keeps them regular.
@@ -39,7 +39,7 @@ class MaximumLikelihood(WeightedLeastSquares):
     def refine(self, data: RegressionData, values: Array, weights: Array) -> Solution:
         """Alternates until the likelihood settles."""
         noise = _noise(data, values)
-        for _ in range(ROUNDS):
+        for _ in range(REWEIGHTINGS):
             precision = inverse(noise)
             values = _generalised(data, precision)
             before, noise = noise, _noise(data, values)

@@ -19,7 +19,7 @@ from robots.common.errors import InputError, SolverError
 
 # Rows on which the regressor's noise is worked out: more don't know its mean square better.
 MOST_ROWS = 6000
-ROUNDS = 5
+ITERATIONS = 5
 # A direction of the parameters of which more than this share is noise is corrected as if it were this share: what is
 # left of its signal is too little to divide by.
 MOST_NOISE = 0.8
@@ -76,7 +76,7 @@ class TotalLeastSquares(WeightedLeastSquares):
         mu = 0.0
         if errors.any():
             problem = _Problem(data.moments, weights, errors, data.ridge)
-            for _ in range(ROUNDS):
+            for _ in range(ITERATIONS):
                 values, mu = problem.solve(values)
         return Solution(values=values, weights=weights, extras={"noise_share": share, "mu": mu})
 

@@ -8,7 +8,7 @@ from estimation.estimators.base import Array, Estimator
 from estimation.regressions.moments import Moments
 from robots.common.errors import InputError
 
-ROUNDS = 2
+REWEIGHTINGS = 2
 # A joint's mean square torque counts as this share of the largest one's at least.
 SMALLEST = 1e-12
 
@@ -37,6 +37,6 @@ class WeightedLeastSquares(Estimator):
         """Gives the inverse residual level to the power of twice the temper (n,)."""
         torque = moments.square / np.maximum(moments.count, 1)
         weights = np.maximum(torque, SMALLEST * float(torque.max()) + np.finfo(float).tiny) ** -self.temper
-        for _ in range(ROUNDS):
+        for _ in range(REWEIGHTINGS):
             weights = moments.level(moments.solve(weights, ridge)) ** (-2 * self.temper)
         return weights

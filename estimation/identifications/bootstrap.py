@@ -35,7 +35,7 @@ CELLS, MOVING = 120, 4
 # Keeps a resample invertible that has lost a direction.
 FAINT = 1e-12
 # Quantiles one standard deviation from the middle of a normal distribution: a resample that has lost a direction does
-# not spoil them.
+# not distort them.
 SPREAD = (0.158655, 0.841345)
 METHODS = ("wls", "ols")
 

@@ -37,8 +37,8 @@ class Choice:
         velocity_scales: of each joint's Coulomb column (n,) [rad/s or m/s].
         prior: of the base parameters.
         position: whether the model has a torque by each joint's position.
-        held_out: RMS of the torque error on blocks left out of the fit (n,) [N m or N], joints at rest and the logs'
-            ends left out: what a prediction is judged on.
+        held_out: RMS of the torque error on blocks left out of the fit (n,) [N m or N], on all rows in which the joint
+            is not at rest: those of a prediction.
         spread: standard deviation of the torque (n,): the error of a constant.
         band: of the prediction of other motions.
         contradiction: a log that one model does not fit together with the others; None where they agree.

@@ -59,8 +59,8 @@ def identify(
 
     Args:
         robot: the robot.
-        logs: one log or several, of t, q and tau or current. One that states a payload or a gravity counts as such: the
-            parameters are the arm's own, and all that bases which stand unlike show together.
+        logs: one log or several, of t, q and tau or current. One may state a payload or a gravity: the parameters
+            are those of the arm alone, and those that all these gravities together determine.
         method: ``wls``, ``ols``, or an estimator of one's own.
         friction: ``auto`` (`BendingFriction`, which a log of slow motions does not let explode at high speed),
             ``polynomial`` (thesis eq. 35), ``coulomb-viscous``, or a term of one's own.

@@ -56,7 +56,7 @@ def read_log(
 
     Returns:
         The log in SI units. ``metadata`` holds what the file says of itself, ``file`` (its path),
-        ``ignored_columns`` (the names of columns that are no part of a log) and, where rows were mended, ``repairs``.
+        ``ignored_columns`` (the names of columns that are not read) and, where rows were repaired, ``repairs``.
 
     Raises:
         InputError: anything that keeps the file from being a log, with column and row: the line of a CSV file, the

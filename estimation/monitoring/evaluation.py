@@ -32,7 +32,7 @@ COLOUR_WINDOWS = 30
 UNSURE = 0.25
 # Windows between tests for steps, where no pause comes before.
 STEP_TESTS = 30
-# Windows in a row with a short force that are no short force any more.
+# Windows in a row with a short force, from which the force is a lasting one.
 LASTING = 3
 # Longest time [s] that a short force goes on after its middle.
 LONGEST = 1.0

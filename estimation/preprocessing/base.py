@@ -31,7 +31,7 @@ class Smoother(ABC):
 
     @abstractmethod
     def edge(self, duration: float) -> float:
-        """Time at each end of a log of that duration [s] at which the motion is not to be trusted [s]."""
+        """Time at each end of a log of that duration [s] at which the motion is not reliable [s]."""
 
     @property
     def text(self) -> str:

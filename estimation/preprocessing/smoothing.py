@@ -56,12 +56,12 @@ class LowPass(Smoother):
         return Motion(t=t, q=q, dq=dq, ddq=ddq)
 
     def edge(self, duration: float) -> float:
-        """Time at each end [s] at which the smoothing has nothing to lean on."""
+        """Time at each end [s] at which the smoothing has data on one side only."""
         return transient(duration, self.cutoff)
 
 
 def transient(duration: float, cutoff: float) -> float:
-    """Time at each end of a log [s] at which the smoothing is not to be trusted."""
+    """Time at each end of a log [s] at which the smoothing is not reliable."""
     return min(0.25 / cutoff, 0.05 * duration)
 
 

@@ -68,7 +68,7 @@ class SmoothingSpline(Smoother):
         return Motion(positions.original, *derivatives)
 
     def edge(self, duration: float) -> float:
-        """Time at each end [s]: half of what a filter needs, which has only a mirror image to lean on."""
+        """Time at each end [s]: half of what a filter needs, which continues with a mirror image."""
         return min(0.125 / self.cutoff, 0.05 * duration)
 
 

@@ -133,7 +133,7 @@ class Sides:
 
     Attributes:
         fitted: of the rows that count.
-        judged: of all rows, those at rest and at the logs' ends besides.
+        judged: of all rows in which the joint is not at rest, also those at the logs' ends.
     """
 
     fitted: Blocks

@@ -95,7 +95,7 @@ class Prepared:
         return self.positions.q is self.positions.fresh_q
 
     def rows(self, by: float | Smoother, *, ends: bool = False) -> Rows:
-        """Smooths the log and leaves out its ends, where the smoothing has nothing to lean on.
+        """Smooths the log and leaves out its ends, where the smoothing has data on one side only.
 
         Args:
             by: the smoothing; a number is the cut-off of a low-pass [Hz].

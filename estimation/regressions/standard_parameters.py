@@ -1,4 +1,4 @@
-"""Standard parameters under constraints: what physics says of each of them, and a description to lean on."""
+"""Standard parameters under constraints: physical bounds, and a description as reference."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ class Scaling:
     """Units in which every parameter is of the order of one.
 
     Attributes:
-        reference: per link a body that can exist, to lean on (n, 10).
+        reference: per link a body that can exist, towards which the fit is regularised (n, 10).
         described: per link, whether the reference is the description's (n,).
         scale: of all standard parameters (p,): a parameter is its scale times a number.
         bodies: column indices of each link's ten parameters (n, 10); empty (0, 10) without a rigid body.

@@ -1,4 +1,4 @@
-"""The colour of a residual: autoregressive models, freed of what the fit has eaten."""
+"""The colour of a residual: autoregressive models, corrected for the noise that the fit has absorbed."""
 
 from __future__ import annotations
 

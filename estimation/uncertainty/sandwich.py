@@ -17,7 +17,7 @@ Array = NDArray[np.float64]
 
 # Rows whose regressor is held at a time.
 CHUNK = 4096
-# Above so many rows the fit eats too little of the noise to matter.
+# Above so many rows the fit absorbs too little of the noise to matter.
 MOST_CORRECTED = 30_000
 DRAWS, ROUNDS = 8, 2
 # So many times Akaike's order: standard errors hang on the noise's density at rest, where that order stops short.
@@ -115,7 +115,7 @@ def spread_of(meat: Array, inverse: Array) -> Array:
     """Multiplies inverse meat inverse (p, p), positive definite whatever rounding leaves of it.
 
     Along directions that the data hardly determine the inverse is of the order of 1e13, and its products with a meat of
-    sixteen digits are rounding of either sign. As R'R, R = root(meat) inverse, they are a variance all the same; and an
+    sixteen digits are rounding of either sign. As R'R, R = root(meat) inverse, they are still a variance; and an
     eigenvalue of the meat is not known below its last digit, so that a direction without data comes out as one of which
     nothing is known, not as one without error.
 

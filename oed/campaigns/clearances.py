@@ -25,7 +25,7 @@ TRIM = 0.025
 """Part of the way from the end of a range to home by which it is trimmed at least."""
 
 MOST_CUTS = 200
-"""More cuts than this leave no room to speak of."""
+"""More cuts than this leave hardly any room."""
 
 STRETCH_STEPS = 181
 """Positions of a joint at which a stretch is looked at."""

@@ -181,7 +181,7 @@ def exact_extremes(polynomial: TrigonometricPolynomial) -> Extremes:
             mean=polynomial.mean[[number]], cosine=polynomial.cosine[[number]], sine=polynomial.sine[[number]]
         )
         half = (slope.cosine[number] - 1j * slope.sine[number]) / 2.0
-        # Rounding dust in front would ruin the companion matrix; what is left out, Newton's method makes up for.
+        # Rounding errors in front would make the companion matrix useless. Newton's method corrects what is left out.
         half[np.abs(half) < 1e-14 * np.abs(half).max()] = 0.0
         roots = np.roots(np.concatenate([half[::-1], [0.0], half.conj()]))
         x = _polished(one, np.concatenate([[0.0], np.angle(roots)]))

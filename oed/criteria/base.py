@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 
-# Below this share of the largest eigenvalue rounding has eaten the smallest ones: the motion excites too little.
+# Below this share of the largest eigenvalue the smallest ones are rounding errors: the motion excites too little.
 FLOOR = 1e-15
 
 

@@ -115,7 +115,7 @@ def move_with_stops(robot: Robot, waypoints: ArrayLike) -> Motion:
 
     Raises:
         InputError: waypoints that are not two or more finite points of the robot's joints.
-        InfeasibleError: a waypoint outside the position limits, a zero limit, or waypoints that are all the same.
+        InfeasibleError: a waypoint outside the position limits, a zero limit, or waypoints that are all equal.
     """
     return _with_stops(robot, shorter_way(robot, waypoints)).motion
 

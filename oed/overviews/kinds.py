@@ -153,7 +153,7 @@ def _diagnosis(data: Data) -> Reading:
             "effects found": len(findings),
             "NRMSE, base model [%]": _pooled(data["baseline"]["nrmse"]),
             "NRMSE, held-out data [%]": _pooled(data["extended"]["nrmse"]),
-            # Of an unexplained residual the share that has names says nothing of the rest.
+            # The share of a residual that has names does not describe the unexplained rest.
             "explained [%]": None
             if verdict == "unexplained" or data.get("explained") is None
             else 100.0 * data["explained"],

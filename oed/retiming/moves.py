@@ -148,7 +148,7 @@ def _profile(bounds: Array, stretch: Array, period: float, minimum_duration: flo
     met = np.array([abs(p.p[-1] - s) <= FOLLOWER * abs(s) for p, s in zip(profiles, stretch, strict=True)])
     if not met[leader]:
         raise SolverError(f"ruckig misses the target by {profiles[leader].p[-1] - stretch[leader]:.3g} rad or m")
-    # Ruckig is not to be trusted with strokes of the size of its own tolerances.
+    # Ruckig is not reliable for strokes of the size of its own tolerances.
     met &= np.abs(stretch) > FOLLOWER * abs(stretch[leader])
     sources = np.where(met, np.arange(n), leader)
     # The division makes exact what ruckig meets to some 1e-12.

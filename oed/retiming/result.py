@@ -58,7 +58,7 @@ class Retimed:
         return bool(self.duration_after > self.duration_before + 1e-9)
 
     def verdict(self) -> str:
-        """Says plainly how the new timing compares with the given one; empty for waypoints without times."""
+        """Says how the new timing compares with the given one; empty for waypoints without times."""
         if self.usage_before is None:
             return ""
         change = abs(self.duration_after - self.duration_before)

@@ -1,4 +1,4 @@
-"""Memory that is not needed any more."""
+"""Memory that is no longer needed."""
 
 from __future__ import annotations
 

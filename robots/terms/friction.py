@@ -142,7 +142,7 @@ class BendingFriction(FrictionTerm):
     """tau_f = f1 sign(dq) + f2 dq + f3 tanh(dq / (b1 v)) + f4 tanh(dq / (b2 v)) + ..., on each joint.
 
     v is the highest speed of the data. Within it the curve bends as measured ones do: it falls after the start
-    (Stribeck) or flattens at high speed. Beyond it grows like f2 dq, and a log says nothing that could make it explode.
+    (Stribeck) or flattens at high speed. Beyond it grows like f2 dq, so that no log can make it explode.
 
     Attributes:
         speed: v [rad/s or m/s], one value for all joints or one per joint.
@@ -173,7 +173,7 @@ class BendingFriction(FrictionTerm):
     @classmethod
     def within(cls, speeds: NDArray[np.float64], bends: tuple[float, ...] = BENDS) -> BendingFriction:
         """Builds the friction of motions with these highest speeds (n,) [rad/s or m/s], rounded to two digits."""
-        # A joint that stands says nothing of its speed.
+        # The speed of a joint at rest is not known.
         return cls(speed=tuple(float(f"{speed:.2g}") if speed > SLOWEST else 1.0 for speed in speeds), bends=bends)
 
     def units(self, force: str, length: str) -> dict[str, str]:

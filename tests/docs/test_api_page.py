@@ -1,4 +1,4 @@
-"""The page on Python lists what the packages offer."""
+"""The pages on Python list what the packages offer."""
 
 from __future__ import annotations
 
@@ -8,13 +8,14 @@ from pathlib import Path
 
 import pytest
 
-PAGE = (Path(__file__).parents[2] / "docs" / "api.md").read_text(encoding="utf-8")
+DOCS = Path(__file__).parents[2] / "docs"
 
 
 @pytest.mark.parametrize("package", ["oed", "estimation", "robots"])
 def test_public_names_are_documented(package):
-    """Every public name of a package is on the page, and nothing else but public names of its own packages."""
-    documented = re.findall(rf"^\.\. auto\w+:: ({package}(?:\.\w+)*)\.(\w+)$", PAGE, flags=re.MULTILINE)
+    """Every public name of a package is on its page, and nothing else but public names of its own packages."""
+    page = (DOCS / f"api_{package}.md").read_text(encoding="utf-8")
+    documented = re.findall(rf"^\.\. auto\w+:: ({package}(?:\.\w+)*)\.(\w+)$", page, flags=re.MULTILINE)
     public = importlib.import_module(package).__all__
     assert set(public) <= {name for _, name in documented}
     for module, name in documented:

@@ -21,6 +21,17 @@ def test_targets_exist(path):
     assert missing == []
 
 
+def test_no_line_is_a_comment():
+    """No line of a page begins with a percent sign: the documentation takes it for a comment, and leaves it out."""
+    left_out = [
+        f"{path.name}: {line}"
+        for path in pages()
+        for line in FENCE.sub("", path.read_text(encoding="utf-8")).splitlines()
+        if line.lstrip().startswith("%")
+    ]
+    assert left_out == []
+
+
 def test_every_page_is_in_the_contents():
     """Every page of the documentation is listed on its first page."""
     index = (ROOT / "docs" / "index.md").read_text(encoding="utf-8")

@@ -13,6 +13,11 @@ DIALECT = re.compile(
     r"spoke against|nameless|thriftier|believable|all the same|is no part of|pulled towards|held by a prior)\b",
     re.IGNORECASE,
 )
+# The same in the sources, where more of these words have another meaning.
+RIDDLES = re.compile(
+    r"\b(?:freed of|eats|eaten|stand unlike|(?:is|are|be) told of|lean on|not to be trusted|any more|to speak of|"
+    r"all the same)\b"
+)
 PROSE = [*pages(), ROOT / "CHANGELOG.md", ROOT / "benchmarks" / "README.md"]
 
 
@@ -29,6 +34,17 @@ def test_sentences_are_short(path):
 def test_words_are_the_fields(path):
     """No page uses the words of the project's former dialect, outside code and printed output."""
     assert DIALECT.findall(FENCE.sub("", path.read_text(encoding="utf-8"))) == []
+
+
+@pytest.mark.parametrize("package", ["robots", "estimation", "oed"])
+def test_sources_have_no_riddles(package):
+    """No docstring, comment or message says in a figure of speech what a word of the field says."""
+    found = [
+        f"{path.relative_to(ROOT)}: {riddle}"
+        for path in sorted((ROOT / package).rglob("*.py"))
+        for riddle in RIDDLES.findall(path.read_text(encoding="utf-8"))
+    ]
+    assert found == []
 
 
 def test_splitting():

@@ -21,20 +21,20 @@ def isaac_lab_text(result: Actuators) -> str:
     Args:
         result: identified drives.
     """
-    told = expressible(result)
-    late = round(float(np.max(told.delay)) / STEP)
+    known = expressible(result)
+    late = round(float(np.max(known.delay)) / STEP)
     entries = {
-        "stiffness": told.kp,
-        "damping": told.kd,
-        "armature": told.armature,
-        "friction": told.friction,
-        "dynamic_friction": told.friction,
-        "viscous_friction": told.damping,
+        "stiffness": known.kp,
+        "damping": known.kd,
+        "armature": known.armature,
+        "friction": known.friction,
+        "dynamic_friction": known.friction,
+        "viscous_friction": known.damping,
     }
     lines = [
         f'"""Drives of {result.robot}, identified by robot-oed {VERSION}."""',
         "",
-        *(f"# Not expressed: {text}" for text in _left_out(told)),
+        *(f"# Not expressed: {text}" for text in _left_out(known)),
         "from isaaclab.actuators import DelayedPDActuatorCfg",
         "",
         "DRIVES = DelayedPDActuatorCfg(",
@@ -42,10 +42,10 @@ def isaac_lab_text(result: Actuators) -> str:
     ]
     for key, values in entries.items():
         lines.append(f"    {key}={_by_name(result, values)},")
-    if np.isfinite(told.limit).all():
-        lines.append(f"    effort_limit={_by_name(result, told.limit)},")
+    if np.isfinite(known.limit).all():
+        lines.append(f"    effort_limit={_by_name(result, known.limit)},")
     lines += [
-        f"    # {1e3 * float(np.max(told.delay)):.3g} ms in physics steps of {1e3 * STEP:g} ms: scale it to yours.",
+        f"    # {1e3 * float(np.max(known.delay)):.3g} ms in physics steps of {1e3 * STEP:g} ms: scale it to yours.",
         f"    min_delay={late},",
         f"    max_delay={late},",
         ")",
@@ -60,24 +60,24 @@ def newton_text(result: Actuators) -> str:
     Args:
         result: identified drives.
     """
-    told = expressible(result)
+    known = expressible(result)
     joints = [
         {
             "joint": name,
-            "delay": {"seconds": float(told.delay[j])},
+            "delay": {"seconds": float(known.delay[j])},
             "drive": {
                 "type": "pd",
-                "kp": float(told.kp[j]),
-                "kd": float(told.kd[j]),
-                "const_effort": -float(told.offset[j]),
+                "kp": float(known.kp[j]),
+                "kd": float(known.kd[j]),
+                "const_effort": -float(known.offset[j]),
             },
-            "clamping": [{"type": "max_effort", "max_effort": float(told.limit[j])}]
-            if np.isfinite(told.limit[j])
+            "clamping": [{"type": "max_effort", "max_effort": float(known.limit[j])}]
+            if np.isfinite(known.limit[j])
             else [],
             "joint_properties": {
-                "armature": float(told.armature[j]),
-                "friction": float(told.friction[j]),
-                "damping": float(told.damping[j]),
+                "armature": float(known.armature[j]),
+                "friction": float(known.friction[j]),
+                "damping": float(known.damping[j]),
             },
         }
         for j, name in enumerate(result.joints)
@@ -87,14 +87,14 @@ def newton_text(result: Actuators) -> str:
         "robot": result.robot,
         "units": "SI",
         "joints": joints,
-        "not_expressed": _left_out(told),
+        "not_expressed": _left_out(known),
     }
     return json.dumps(data, indent=2) + "\n"
 
 
-def _left_out(told: Expressible) -> list[str]:
-    masses = [f"link mass times {factor:.3g}" for factor in told.mass_factor if factor != 1.0]
-    return [*told.left_out, *masses]
+def _left_out(known: Expressible) -> list[str]:
+    masses = [f"link mass times {factor:.3g}" for factor in known.mass_factor if factor != 1.0]
+    return [*known.left_out, *masses]
 
 
 def _by_name(result: Actuators, values: np.ndarray) -> str:

@@ -49,7 +49,7 @@ class Expressible:
 
 
 def expressible(result: Actuators) -> Expressible:
-    """Works out what a simulator can be told of identified drives.
+    """Works out what a simulator can express of identified drives.
 
     Args:
         result: identified drives.

@@ -28,9 +28,9 @@ def simulator_files(result: Actuators, folder: Path) -> SimulatorFiles:
         result: identified drives.
         folder: into which the files will be written.
     """
-    told = expressible(result)
+    known = expressible(result)
     files = {"isaac_lab.py": isaac_lab_text(result), "newton.json": newton_text(result)}
-    remarks = [f"simulators cannot state: {text}" for text in told.left_out]
+    remarks = [f"simulators cannot state: {text}" for text in known.left_out]
     try:
         files["drives.xml"] = drives_mjcf(result, folder).text
     except InputError as error:

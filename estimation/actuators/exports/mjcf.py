@@ -48,20 +48,20 @@ def drives_mjcf(result: Actuators, folder: Path) -> DrivesMjcf:
     """
     if not result.robots:
         raise InputError("a loaded result has no robot to write an MJCF of", remedy="identify the drives again")
-    told = expressible(result)
+    known = expressible(result)
     path = Path(result.robots[0].mjcf)
-    remarks = list(told.left_out)
+    remarks = list(known.left_out)
     if result.robots[0].mjcf and path.is_file():
-        root, step, delays = _edited(read_source(path), result, told, folder)
+        root, step, delays = _edited(read_source(path), result, known, folder)
     elif len(result.robots) == 1:
-        root, step, delays = _new(result.robots[0], told), NEW_STEP, True
+        root, step, delays = _new(result.robots[0], known), NEW_STEP, True
     else:
         raise InputError(
             "no MJCF of a URDF that branches",
             remedy="convert the URDF with MuJoCo, and identify with that MJCF",
         )
-    _actuators(root, result, told, step, delays)
-    if np.any(told.delay > 0) and not delays:
+    _actuators(root, result, known, step, delays)
+    if np.any(known.delay > 0) and not delays:
         remarks.append("delays: this version of MuJoCo has none")
     if any(law in ("velocity", "cascade") for law in result.law):
         remarks.append("cascades are written as PD control without the integral part")
@@ -71,20 +71,20 @@ def drives_mjcf(result: Actuators, folder: Path) -> DrivesMjcf:
     return DrivesMjcf(ElementTree.tostring(root, encoding="unicode") + "\n", tuple(remarks))
 
 
-def _edited(source: Source, result: Actuators, told: Expressible, folder: Path) -> tuple[Element, float, bool]:
+def _edited(source: Source, result: Actuators, known: Expressible, folder: Path) -> tuple[Element, float, bool]:
     step = float(source.model.opt.timestep)
     for j, name in enumerate(result.joints):
         if name not in source.joints:
             raise InputError(f"the joint {name!r} is not in the text of the file", file=source.path)
         element = source.joints[name]
-        element.set("armature", repr(float(told.armature[j])))
-        element.set("damping", repr(float(told.damping[j])))
-        element.set("frictionloss", repr(float(told.friction[j])))
-        if told.friction[j] > 0:
+        element.set("armature", repr(float(known.armature[j])))
+        element.set("damping", repr(float(known.damping[j])))
+        element.set("frictionloss", repr(float(known.friction[j])))
+        if known.friction[j] > 0:
             # MuJoCo's default lets a joint creep that friction should hold.
             element.set("solreffriction", f"{STEPS * step!r} 1")
-        if told.mass_factor[j] != 1.0:
-            _scale_body(source, name, float(told.mass_factor[j]))
+        if known.mass_factor[j] != 1.0:
+            _scale_body(source, name, float(known.mass_factor[j]))
     keep_assets(source, folder)
     return source.root, step, hasattr(source.model, "actuator_delay")
 
@@ -98,20 +98,20 @@ def _scale_body(source: Source, joint: str, factor: float) -> None:
     set_inertial(source.bodies[source.names.bodies[body]], inertial(factor * own))
 
 
-def _new(robot: Robot, told: Expressible) -> Element:
+def _new(robot: Robot, known: Expressible) -> Element:
     zero = np.zeros(robot.n)
     contents = Contents(
-        inertia=told.mass_factor[:, None] * np.asarray(robot.inertia),
-        armature=told.armature,
-        coulomb=told.friction,
-        damping=told.damping,
+        inertia=known.mass_factor[:, None] * np.asarray(robot.inertia),
+        armature=known.armature,
+        coulomb=known.friction,
+        damping=known.damping,
         stiffness=zero,
         springref=zero,
     )
     return new_model(contents, robot)
 
 
-def _actuators(root: Element, result: Actuators, told: Expressible, step: float, delays: bool) -> None:
+def _actuators(root: Element, result: Actuators, known: Expressible, step: float, delays: bool) -> None:
     """Replaces the joints' actuators by general ones of the form of a position servo."""
     names = set(result.joints)
     called: dict[str, str] = {}
@@ -130,15 +130,15 @@ def _actuators(root: Element, result: Actuators, told: Expressible, step: float,
             joint=name,
             gaintype="fixed",
             biastype="affine",
-            gainprm=numbers([told.kp[j]]),
-            biasprm=numbers([-told.offset[j], -told.kp[j], -told.kd[j]]),
+            gainprm=numbers([known.kp[j]]),
+            biasprm=numbers([-known.offset[j], -known.kp[j], -known.kd[j]]),
             ctrllimited="false",
             forcelimited="false",
         )
-        if np.isfinite(told.limit[j]):
+        if np.isfinite(known.limit[j]):
             element.set("forcelimited", "true")
-            element.set("forcerange", numbers([-told.limit[j], told.limit[j]]))
-        if delays and told.delay[j] > 0:
-            element.set("delay", repr(float(told.delay[j])))
-            element.set("nsample", str(int(np.ceil(told.delay[j] / step)) + 1))
+            element.set("forcerange", numbers([-known.limit[j], known.limit[j]]))
+        if delays and known.delay[j] > 0:
+            element.set("delay", repr(float(known.delay[j])))
+            element.set("nsample", str(int(np.ceil(known.delay[j] / step)) + 1))
             element.set("interp", "zoh")

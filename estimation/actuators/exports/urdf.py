@@ -25,16 +25,16 @@ def drives_urdf(result: Actuators) -> str:
     source = result.robots[0].origin if result.robots else ""
     if not is_description(source):
         raise InputError("the robot did not come from a URDF", remedy="take the MJCF or the table")
-    told = expressible(result)
+    known = expressible(result)
     root = ElementTree.fromstring(urdf_bytes(source))
     joints = {joint.get("name"): joint for joint in root.findall("joint")}
     for j, name in enumerate(result.joints):
         dynamics = joints[name].find("dynamics")
         if dynamics is None:
             dynamics = ElementTree.SubElement(joints[name], "dynamics")
-        dynamics.set("damping", repr(float(told.damping[j])))
-        dynamics.set("friction", repr(float(told.friction[j])))
-    left = ["rotor inertia, gains, delays and offsets", *told.left_out]
+        dynamics.set("damping", repr(float(known.damping[j])))
+        dynamics.set("friction", repr(float(known.friction[j])))
+    left = ["rotor inertia, gains, delays and offsets", *known.left_out]
     said = f" drives identified by robot-oed {VERSION}; a URDF cannot state: {'; '.join(left)} ".replace("--", "-")
     root.insert(0, ElementTree.Comment(said))
     ElementTree.indent(root)

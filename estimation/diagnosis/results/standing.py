@@ -25,7 +25,7 @@ def standing_of(verdict: str, before: ArrayLike, after: ArrayLike, every: ArrayL
 
     Returns:
         ``unconfirmed`` where effects are named that do not reduce the error of unseen rows: they are no order to act.
-        ``inaccurate`` where nothing is left to name and a joint's error is large all the same. Else ``sound``.
+        ``inaccurate`` where nothing is left to name but a joint's error is large. Else ``sound``.
     """
     if verdict == "named" and not _pooled(after) < _pooled(before):
         return "unconfirmed"

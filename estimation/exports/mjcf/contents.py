@@ -71,7 +71,7 @@ def contents_of(model: Model, robot: Robot) -> Contents:
     try:
         inertia, rotors = standard_and_rotors(model, *described)
     except InfeasibleError:
-        # Noise makes the small inertias of a wrist negative; a simulator needs bodies all the same.
+        # Noise makes the small inertias of a wrist negative; but a simulator needs bodies.
         model, moved = nearest_feasible(model, *described)
         inertia, rotors = standard_and_rotors(model, *described)
     if not (inertia[:, 0] > 0).all():

@@ -28,7 +28,7 @@ def friction_excess(
     u is the external torque by the model's own friction. It begins with the least squares of the log's first memory.
     With the weights of `contact_weight` a push adds no more than one at the threshold would. A contact of many seconds
     is taken for friction in part, the later the stronger it is. While a joint does not slide, its level stays and time
-    does not count: static friction says nothing of sliding, and the sign of the model's is then that of noise.
+    does not count: static friction does not show the sliding one, and the sign of the model's is then that of noise.
 
     Args:
         t: times (N,) [s].

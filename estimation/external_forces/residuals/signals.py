@@ -163,7 +163,7 @@ def logged_motion(log: Log, t: Array) -> tuple[Array, Array]:
 
 
 def _unsettled(t: Array, begins: NDArray[np.bool_], constant: float, smoother: Smoother) -> NDArray[np.bool_]:
-    """Marks samples (N,) near the ends of each part, where smoothed positions are not to be trusted.
+    """Marks samples (N,) near the ends of each part, where smoothed positions are not reliable.
 
     At the start filters of the recorder settle as well: the observer waits for some of its time constants.
     """

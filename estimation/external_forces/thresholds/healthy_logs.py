@@ -28,7 +28,7 @@ Flags = NDArray[np.bool_]
 
 # Samples of the healthy log from which the levels of the localisation are estimated.
 MOST_ROWS = 4000
-ROUNDS = 8
+ITERATIONS = 8
 # Where the first round cuts residuals off, and a normal distribution's standard deviation over its median size.
 WINSOR = 3.0
 
@@ -54,7 +54,7 @@ def calibrate_signals(
         bandwidth: of the observer [Hz].
         velocity: what velocities the signals have.
         false_alarms: an hour.
-        own: whether the logs may contain contacts: those are left out, until nothing changes any more.
+        own: whether the logs may contain contacts: those are left out, until nothing changes.
         in_fit: whether the model was fitted to these logs, so that they say nothing new about its parameters.
 
     Raises:
@@ -73,7 +73,7 @@ def calibrate_signals(
             remedy="give a longer healthy log with --healthy: a minute or more",
         )
     noise = np.median(whole.velocity_noise, axis=0)
-    for number in range(ROUNDS if own else 1):
+    for number in range(ITERATIONS if own else 1):
         first = own and number == 0
         residual = lag(whole.external, from_zero=True)
         # Contacts are not known at first: they must not enter the size of the errors.

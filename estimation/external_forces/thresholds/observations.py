@@ -17,7 +17,7 @@ from estimation.external_forces.thresholds.error_models import ErrorModel
 Array = NDArray[np.float64]
 
 # Rounds in which the friction's level and the weights of the samples suit each other, and when they do.
-ROUNDS, ALIKE = 12, 1e-3
+ITERATIONS, ALIKE = 12, 1e-3
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,7 +63,7 @@ def observe_robustly(signals: Signals, calibration: Calibration) -> tuple[Signal
         The signals with that level, and what is observed.
     """
     weights = np.ones(len(signals.t))
-    for _ in range(ROUNDS):
+    for _ in range(ITERATIONS):
         observed = observe(signals, calibration.errors, calibration.bandwidth)
         before, weights = weights, contact_weight(observed.statistic / calibration.threshold.value)
         if np.abs(weights - before).max() <= ALIKE:

@@ -13,12 +13,12 @@ from estimation.gate.finding import Finding
 from estimation.gate.quick_fits.delays import Delay, usual_delay
 
 # Standard errors from which a delay is significant, and share of a sample from which it is reported.
-SURE, LONG = 4.0, 0.5
+SIGNIFICANT, LEAST_SAMPLES = 4.0, 0.5
 # Share of the unexplained torque that a delay must explain. A delay longer than usual must explain more: friction with
 # memory or an elastic joint may look like one.
-WORTH, WORTH_LONG = 0.15, 0.5
+LEAST_EXPLAINED, LEAST_EXPLAINED_LONG = 0.15, 0.5
 # The delays of two joints agree within this share of a sample, this share of the delay, or so many standard errors.
-AGREE, AGREE_SHARE, AGREE_ERRORS = 0.5, 0.2, 3.0
+AGREE_SAMPLES, AGREE_SHARE, AGREE_ERRORS = 0.5, 0.2, 3.0
 # A joint contradicts a long delay of another if its own differs by more than this share, with a smaller error.
 CONTRADICTS = 0.25
 
@@ -65,23 +65,25 @@ def _common_delay(delays: Sequence[Delay | None], period: float) -> Finding | No
     mean = float(weights @ [delay.value for delay in known] / weights.sum())
     error = float(1 / np.sqrt(weights.sum()))
     agree = all(
-        abs(delay.value - mean) < max(AGREE_ERRORS * delay.error, AGREE * period, AGREE_SHARE * abs(mean))
+        abs(delay.value - mean) < max(AGREE_ERRORS * delay.error, AGREE_SAMPLES * period, AGREE_SHARE * abs(mean))
         for delay in known
     )
     sticks = float(np.median([delay.sticks for delay in known]))
-    if not agree or abs(mean) <= sticks + max(LONG * period, SURE * error):
+    if not agree or abs(mean) <= sticks + max(LEAST_SAMPLES * period, SIGNIFICANT * error):
         return None
     return _finding(mean, error, None, period, len(known))
 
 
 def _is_significant(delay: Delay, delays: Sequence[Delay | None], period: float) -> bool:
-    if not np.isfinite(delay.error) or abs(delay.value) <= delay.sticks + max(SURE * delay.error, LONG * period):
+    if not np.isfinite(delay.error) or abs(delay.value) <= delay.sticks + max(
+        SIGNIFICANT * delay.error, LEAST_SAMPLES * period
+    ):
         return False
     if abs(delay.value) <= usual_delay(period):
-        return delay.saved > WORTH
+        return delay.saved > LEAST_EXPLAINED
     # A long delay comes from the logger: no other joint is without it.
     others = [other for other in delays if other is not None and other.error < CONTRADICTS * abs(delay.value)]
-    return delay.saved > WORTH_LONG and all(
+    return delay.saved > LEAST_EXPLAINED_LONG and all(
         abs(other.value - delay.value) < CONTRADICTS * abs(delay.value) for other in others
     )
 

@@ -7,13 +7,13 @@ from typing import ClassVar
 from estimation.gate.check import Check
 from estimation.gate.context import Context, Stage
 from estimation.gate.finding import Finding
-from estimation.gate.quick_fits.whole_fit import HOPELESS, POOR
+from estimation.gate.quick_fits.whole_fit import LIKE_A_CONSTANT, POORLY_EXPLAINED
 from robots.common.plain import two_digits
 from robots.robot import Robot
 
 # A joint is badly excited if its held-out error over the torque's standard deviation is above the first, and neither
 # inertia nor friction differs from zero by so many standard errors.
-WEAK, FAINTLY = 0.7, 10.0
+BADLY_EXCITED, SIGNIFICANT = 0.7, 10.0
 # What to do if no joint is explained better than by a constant.
 NOTHING_FITS = "check units, signs and order of the joints, and that the log belongs to this robot"
 
@@ -28,13 +28,13 @@ class Excitation(Check):
     def run(self, context: Context) -> list[Finding]:
         """Compares held-out errors and the significance of inertia and friction with the limits."""
         fitted, prefix = context.fitted, context.cleaned.columns.prefix
-        others = bool((fitted.unexplained < HOPELESS).any())
+        others = bool((fitted.unexplained < LIKE_A_CONSTANT).any())
         findings = []
         for joint, (found, error) in enumerate(zip(fitted.physics, fitted.unexplained, strict=True)):
-            if found is None or error < POOR:
+            if found is None or error < POORLY_EXPLAINED:
                 continue
             # Inertia or friction that differ from zero are excited: the torque holds something else, too.
-            weak = not error <= WEAK and found.information < FAINTLY
+            weak = not error <= BADLY_EXCITED and found.information < SIGNIFICANT
             findings.append(
                 _bad(context.robot, float(error), found.information, prefix, joint, others)
                 if weak

@@ -18,17 +18,17 @@ Array = NDArray[np.float64]
 Rows = NDArray[np.intp]
 
 # A step is a jump above so many times the 99th percentile of the steps and this share of the travel, ...
-OUT, SHARE = 3.0, 0.005
+LARGE_STEP, LEAST_TRAVEL = 3.0, 0.005
 # ... and above so many times all other steps within so many rows: messages that come twice make steps of up to four.
-LOCAL, WINDOW = 5.0, 10
+LARGE_BESIDE, WINDOW = 5.0, 10
 # Most rows of one jump: one row may lie between the old value and the new one.
-AT_ONCE = 2
+ROWS_OF_A_JUMP = 2
 # Share of large steps above which they are the motion.
-USUAL = 0.01
+COMMON = 0.01
 # Number of steps from which the percentile is estimated.
 SAMPLES = 20_000
 # Share of the travel above which a jump would make a fit wrong.
-MUCH = 0.05
+REFUSED_TRAVEL = 0.05
 
 
 class Jumps(Check):
@@ -64,14 +64,14 @@ def jump_rows(periods: Array, q: Array) -> Rows:
     """
     steps = np.abs(np.diff(q)) / periods
     usual = float(np.quantile(steps[:: max(1, len(steps) // SAMPLES)], 0.99))
-    large = steps > max(OUT * usual, SHARE * float(q.max() - q.min()))
-    if not large.any() or large.mean() > USUAL:
+    large = steps > max(LARGE_STEP * usual, LEAST_TRAVEL * float(q.max() - q.min()))
+    if not large.any() or large.mean() > COMMON:
         return np.empty(0, dtype=np.intp)
     # A joint that stands for most of the log makes many large steps in a row when it accelerates.
     for start, stop in spans(large):
-        large[start:stop] = stop - start <= AT_ONCE
+        large[start:stop] = stop - start <= ROWS_OF_A_JUMP
     around = maximum_filter1d(np.where(large, 0.0, steps), 2 * WINDOW + 1)
-    return np.flatnonzero(large & (steps > LOCAL * around)) + 1
+    return np.flatnonzero(large & (steps > LARGE_BESIDE * around)) + 1
 
 
 def _finding(joint: int, q: Array, rows: Rows, travel: float) -> Finding:
@@ -79,7 +79,7 @@ def _finding(joint: int, q: Array, rows: Rows, travel: float) -> Finding:
     largest = int(np.argmax(np.abs(sizes)))
     return Finding(
         name="jump",
-        severity="refuse" if abs(sizes[largest]) > MUCH * travel else "warning",
+        severity="refuse" if abs(sizes[largest]) > REFUSED_TRAVEL * travel else "warning",
         text=f"jumps {several(len(rows), 'time')}, by up to {sizes[largest]:.4g} in one sample",
         action="cut the log there, and check the encoder and the logger",
         value=float(sizes[largest]),

@@ -20,7 +20,7 @@ SLOWEST = 0.5
 ALIKE = 1.5
 # Correlation of the steps of a position with its velocity column from which the period is known, and the share by which
 # the periods of the joints may differ.
-SURE, SIMILAR = 0.95, 0.1
+LEAST_CORRELATION, SIMILAR = 0.95, 0.1
 # Standard deviation of the time steps over the median step, from which jitter is reported.
 JITTER = 0.05
 # Share of rows in too short parts from which the log is refused.
@@ -111,7 +111,7 @@ def _period_by_velocity(log: Log) -> float:
     product = np.einsum("tj,tj->j", moved, mean)[moves]
     alike = product / np.sqrt(energy[moves] * size[moves])
     periods = product / energy[moves]
-    periods = periods[alike > SURE]
+    periods = periods[alike > LEAST_CORRELATION]
     agree = 2 * len(periods) > len(alike) and float(np.ptp(periods)) < SIMILAR * float(periods.max())
     return float(np.median(periods)) if agree else np.nan
 

@@ -14,7 +14,7 @@ from estimation.gate.candidates.torque_hypotheses import GEARED, Hypothesis, hyp
 from estimation.gate.check import Check
 from estimation.gate.context import Context, Stage
 from estimation.gate.finding import Finding
-from estimation.gate.quick_fits.whole_fit import HOPELESS
+from estimation.gate.quick_fits.whole_fit import LIKE_A_CONSTANT
 from robots.common.plain import joints_in_words, percent, two_digits
 from robots.robot import Robot
 
@@ -69,7 +69,7 @@ class TorqueMeanings(Check):
         explained = any(finding.severity != "info" for finding in context.found(EXPLAINED))
         if not context.robot.has_masses or explained:
             return []
-        if context.cleaned.columns.prefix != "tau" or not (context.logged.unexplained < HOPELESS).any():
+        if context.cleaned.columns.prefix != "tau" or not (context.logged.unexplained < LIKE_A_CONSTANT).any():
             return []
         evidence = joint_evidence(context.logged)
         if not evidence:

@@ -14,23 +14,23 @@ from estimation.gate.finding import Finding
 from estimation.gate.quick_fits.joint_columns import OWN
 from estimation.gate.quick_fits.joint_fit import JointFit
 from estimation.gate.quick_fits.joint_physics import JointPhysics, described_ratio
-from estimation.gate.quick_fits.whole_fit import POOR
+from estimation.gate.quick_fits.whole_fit import POORLY_EXPLAINED
 from estimation.gate.stages.fitted import Fitted
 from robots.robot import Robot
 
 Array = NDArray[np.float64]
 
-# Standard errors below zero from which inertia or friction is negative; of friction alone CLEAR, for a spring or a
-# balancer that the model lacks can look like negative friction.
-SURE, CLEAR = 5.0, 15.0
+# Standard errors below zero from which inertia or friction is negative. The second one is for friction alone: a spring
+# or a balancer that the model lacks can look like negative friction.
+NEGATIVE, CLEARLY_NEGATIVE = 5.0, 15.0
 # Friction drives if its power is below minus this share of the joint's power.
-DRIVES = 0.2
+DRIVING_SHARE = 0.2
 # Increase of the error of all joints (mean log) by the opposite sign of a torque, from which the sign is right.
 SIGN_COST = 0.15
 # Correlation with the described torque from which a torque has the described sign.
-ALIKE = 0.9
+SAME_SIGN = 0.9
 # RMS torque over the joint's limit, below which a torque is too small for a refusal.
-FAINT = 0.01
+SMALL_TORQUE = 0.01
 # Least ratio of inertia to first moment of mass of a link [m], and the acceleration of gravity [m/s2].
 COMPACT, GRAVITY = 0.01, 9.81
 
@@ -46,30 +46,32 @@ class TorqueSigns(Check):
         """Looks at inertia and friction of each joint, then at the fit of all joints."""
         fitted, prefix = context.fitted, context.cleaned.columns.prefix
         significances = [(0.0, 0.0) if found is None else found.significances for found in fitted.physics]
-        backwards = 2 * sum(friction < -CLEAR for _, friction in significances) > len(significances)
-        plausible = [inertia > SURE or friction > CLEAR for inertia, friction in significances]
+        backwards = 2 * sum(friction < -CLEARLY_NEGATIVE for _, friction in significances) > len(significances)
+        plausible = [inertia > NEGATIVE or friction > CLEARLY_NEGATIVE for inertia, friction in significances]
         findings = []
         opposite: dict[int, bool] = {}  # joints with a torque of opposite sign, and whether that is certain
         for joint, (fit, found) in enumerate(zip(fitted.fits, fitted.physics, strict=True)):
             if fit is None or found is None:
                 continue
             inertia, friction = significances[joint]
-            drives = -found.loss > DRIVES * found.power
-            negative = inertia < -SURE and friction < SURE / 2
+            drives = -found.loss > DRIVING_SHARE * found.power
+            negative = inertia < -NEGATIVE and friction < NEGATIVE / 2
             # The other joints move the same links: the opposite sign would fit them better if this one were wrong.
             contradicted = any(plausible[:joint] + plausible[joint + 1 :]) and _sign_cost(fitted, joint) > SIGN_COST
             if _is_moved_by_others(fit, found, joint, context.robot):
                 findings.append(_moved_by_others(found, prefix, joint))
-            elif friction < -CLEAR and inertia > SURE and drives:
+            elif friction < -CLEARLY_NEGATIVE and inertia > NEGATIVE and drives:
                 # Time that runs backwards makes the friction of all joints drive.
-                certain = backwards and fitted.unexplained[joint] < POOR
+                certain = backwards and fitted.unexplained[joint] < POORLY_EXPLAINED
                 findings.append(_negative_friction(found, prefix, joint, certain))
-            elif (negative or (friction < -SURE and inertia < SURE / 2 and drives)) and not contradicted:
+            elif (negative or (friction < -NEGATIVE and inertia < NEGATIVE / 2 and drives)) and not contradicted:
                 described = described_ratio(context.robot, fit)
-                if described is not None and described[0] > 0 and described[1] > ALIKE:
+                if described is not None and described[0] > 0 and described[1] > SAME_SIGN:
                     continue
-                large = _rms_torque(fitted, joint) > FAINT * _finite(context.robot.limits.torque[joint])
-                opposite[joint] = fitted.unexplained[joint] < POOR and (negative or (friction < -CLEAR and large))
+                large = _rms_torque(fitted, joint) > SMALL_TORQUE * _finite(context.robot.limits.torque[joint])
+                opposite[joint] = fitted.unexplained[joint] < POORLY_EXPLAINED and (
+                    negative or (friction < -CLEARLY_NEGATIVE and large)
+                )
         return findings + [
             _torque_sign(found, prefix, joint, certain)
             for joint, certain in opposite.items()
@@ -104,7 +106,7 @@ def _is_moved_by_others(fit: JointFit, found: JointPhysics, joint: int, robot: R
     weight = fit.Y[:, :-OWN] @ fit.values[:-OWN]
     moment = float(weight.std()) / GRAVITY
     # An inverted torque has an inertia that is as large as any link's, of the wrong sign.
-    return abs(found.inertia + SURE * found.inertia_error) < COMPACT * moment
+    return abs(found.inertia + NEGATIVE * found.inertia_error) < COMPACT * moment
 
 
 def _moved_by_others(found: JointPhysics, prefix: str, joint: int) -> Finding:

@@ -17,15 +17,15 @@ Array = NDArray[np.float64]
 Rows = NDArray[np.intp]
 
 # A row is an outlier if it leaves its neighbours and returns by more than this many times the median of such moves, ...
-OUT = 25.0
+OUTLIER = 25.0
 # ... and by more than this share of the column's usual range: a torque may return at once, a position cannot.
 SHARE_OF_POSITION, SHARE_OF_SIGNAL = 0.01, 0.1
 # Share of its larger step by which an outlier returns at least: a jump goes on from where it led to.
 BACK = 0.5
 # Steps of a coarse sensor by which its value flickers.
 FLICKER = 3.0
-# Share of rows above which outliers are not isolated: in a torque they are noise, in a position they spoil it.
-MANY = 0.03
+# Share of rows above which outliers are not isolated: in a torque they are noise, in a position they make it useless.
+NOT_ISOLATED = 0.03
 # Peaks of torque within so many rows of a reversal of any joint are real if more than MOST of all peaks are there:
 # friction that changes its direction shakes the arm, and a sharp fall of it makes a peak.
 BESIDE, MOST = 4, 0.5
@@ -53,7 +53,7 @@ def outlier_rows(values: Array, share: float, step: float, *, noisy: bool) -> Ro
     usual = _returns(steps, np.arange(0, len(steps) - 1, max(1, (len(steps) - 1) // SAMPLES)))
     if noisy:
         usual = usual[usual > 0]
-    noise = OUT * float(np.median(usual)) if len(usual) else 0.0
+    noise = OUTLIER * float(np.median(usual)) if len(usual) else 0.0
     level = max(noise, share * float(high - low), FLICKER * (step or _flicker(values)))
     if not level > 0:
         return np.empty(0, dtype=np.intp)
@@ -88,7 +88,7 @@ def find_outliers(columns: Columns) -> dict[tuple[str, int], Rows]:
 
 def are_isolated(rows: Rows, samples: int) -> bool:
     """Whether outliers are so few that a column of this length can be used without them."""
-    return len(rows) <= MANY * samples
+    return len(rows) <= NOT_ISOLATED * samples
 
 
 def isolated_rows(columns: Columns, outliers: dict[tuple[str, int], Rows]) -> Rows:
@@ -133,7 +133,7 @@ def _flicker(values: Array) -> float:
     if not low < high or ((some > low) & (some < high)).any():
         return 0.0
     counts = [int(np.count_nonzero(values == value)) for value in (low, high)]
-    return high - low if sum(counts) == len(values) and min(counts) > MANY * len(values) else 0.0
+    return high - low if sum(counts) == len(values) and min(counts) > NOT_ISOLATED * len(values) else 0.0
 
 
 def _lost_values(values: Array, q: Array, step: float) -> Rows:
@@ -146,7 +146,7 @@ def _lost_values(values: Array, q: Array, step: float) -> Rows:
     """
     rows = np.flatnonzero((values[1:] == 0.0) & (q[1:] != q[:-1])) + 1
     # Zero is a usual value of a coarse torque, and of a drive that is off.
-    return rows if step == 0 and 2 <= len(rows) <= MANY * len(values) else np.empty(0, dtype=np.intp)
+    return rows if step == 0 and 2 <= len(rows) <= NOT_ISOLATED * len(values) else np.empty(0, dtype=np.intp)
 
 
 def _reversing_rows(columns: Columns) -> NDArray[np.bool_]:

@@ -16,14 +16,14 @@ Array = NDArray[np.float64]
 # chooses.
 RIDGES = (1e-8, 1e-6, 1e-5, 1e-4, 1e-3)
 # Number of times that the weights of the joints are computed from the residuals.
-ROUNDS = 3
+REWEIGHTINGS = 3
 # Decrease of the held-out error (mean log) that a larger ridge must bring.
-LOWER = 1e-3
+LEAST_DECREASE = 1e-3
 # A joint is not identified if its held-out error is above this share of the torque's standard deviation: hardly better
 # than a constant.
-HOPELESS = 0.9
+LIKE_A_CONSTANT = 0.9
 # The same, from which a joint is poorly explained.
-POOR = 0.3
+POORLY_EXPLAINED = 0.3
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,7 +51,7 @@ def fit_all(blocks: Blocks, spread: Array, ridges: Sequence[float] = RIDGES) -> 
     rows = np.maximum(total.count, 1)
     floor = 1e-12 * total.square / rows + np.finfo(float).tiny
     weights = np.where(used, 1.0 / np.where(used, spread, 1.0) ** 2, 0.0)
-    for _ in range(ROUNDS):
+    for _ in range(REWEIGHTINGS):
         variance = np.maximum(total.residual(total.solve(weights, RIDGES[1])) / rows, floor)
         weights = np.where(used, 1.0 / variance, 0.0)
     best, lowest = np.full(blocks.square.shape, np.inf), np.inf
@@ -60,7 +60,7 @@ def fit_all(blocks: Blocks, spread: Array, ridges: Sequence[float] = RIDGES) -> 
         errors = blocks.squares_by_block(blocks.without(weights, candidate, None))
         relative = np.sqrt(errors.sum(axis=1) / rows) / scale
         cost = float(np.mean(np.log(np.clip(relative[used], 1e-9, 1.0)))) if used.any() else 0.0
-        if cost < lowest - LOWER:
+        if cost < lowest - LEAST_DECREASE:
             lowest, best = cost, errors
     unexplained = np.sqrt(best.sum(axis=1) / rows) / scale
     with np.errstate(invalid="ignore", divide="ignore"):

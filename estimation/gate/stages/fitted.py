@@ -11,7 +11,7 @@ from estimation.gate.quick_fits.cutoff_choice import CHOICE_ROWS
 from estimation.gate.quick_fits.delays import Delay, estimate_delays
 from estimation.gate.quick_fits.joint_fit import JointFit, Rows
 from estimation.gate.quick_fits.joint_physics import JointPhysics, joint_physics, mean_inertias
-from estimation.gate.quick_fits.whole_fit import HOPELESS, fit_all
+from estimation.gate.quick_fits.whole_fit import LIKE_A_CONSTANT, fit_all
 from estimation.gate.stages.cleaned import Cleaned
 from estimation.gate.stages.smoothed import Smoothed
 
@@ -74,7 +74,9 @@ class Fitted:
         """Delay of each joint's torque (n), None of a joint whose torque the motion does not explain."""
         sharp = self.sharp
         fits = {
-            j: sharp.fit(j) for j, fit in enumerate(self.fits) if fit is not None and self.unexplained[j] < HOPELESS
+            j: sharp.fit(j)
+            for j, fit in enumerate(self.fits)
+            if fit is not None and self.unexplained[j] < LIKE_A_CONSTANT
         }
         period, cutoff = self._smoothed.period, self._smoothed.choice.sharp_cutoff
         return tuple(estimate_delays(sharp, fits, period, cutoff, self.unexplained))

@@ -41,7 +41,7 @@ def monitor_logs(
 
     Logs that the monitor has counted before are not counted again. A log in which most joints change at its first
     window does not fit. If a later log fits again, it was of another robot, and is left out. If none does, the model
-    does not fit this robot any more.
+    no longer fits this robot.
 
     Args:
         monitor: new, or with what it has seen before; it is changed.

@@ -9,7 +9,7 @@ Array = NDArray[np.float64]
 
 # Deviations of a joint, in standard deviations, from which it counts less, and not at all.
 FAR, TOO_FAR = 2.0, 4.0
-ROUNDS = 10
+ITERATIONS = 10
 
 
 def common_change(
@@ -41,7 +41,7 @@ def common_change(
     prior = np.diag(spread[live] ** -2.0)
     values = _start(d, S, v, prior)
     inverse = np.linalg.inv(prior)
-    for _ in range(ROUNDS):
+    for _ in range(ITERATIONS):
         distance = np.abs(d - S @ values) / np.sqrt(v)
         weight = np.where(distance < TOO_FAR, np.minimum(1.0, FAR / np.maximum(distance, FAR)) ** 2, 0.0) / v
         inverse = np.linalg.inv(prior + (S * weight[:, None]).T @ S)
@@ -58,7 +58,7 @@ def _start(d: Array, S: Array, v: Array, prior: Array) -> Array:
         return np.array([np.median(d[seen] / S[seen, 0])])
     # Least absolute deviations.
     values: Array = np.zeros(S.shape[1])
-    for _ in range(2 * ROUNDS):
+    for _ in range(2 * ITERATIONS):
         weight = 1.0 / (np.sqrt(v) * np.maximum(np.abs(d - S @ values), 0.1 * np.sqrt(v)))
         values = np.asarray(np.linalg.solve(prior + (S * weight[:, None]).T @ S, S.T @ (weight * d)), dtype=np.float64)
     return np.asarray(values)

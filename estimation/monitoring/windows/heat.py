@@ -183,7 +183,7 @@ class HeatState:
         found = cls(data["kind"], baseline)
         found.states = [None if state is None else np.array(state, dtype=float) for state in data["states"]]
         found.kept = np.array(data["kept"], dtype=float)
-        if "work" in data:  # A state of an older version knows nothing of pauses.
+        if "work" in data:  # A state of an older version has no pauses.
             found.work = UnloggedWork.from_dict(found.n, data["work"])
         found.reference = np.array([np.nan if value is None else value for value in data["reference"]], dtype=float)
         return found

@@ -1,4 +1,4 @@
-"""How much the measurements say of each number: Gauss-Newton information, freed of the noise's colour."""
+"""How much the measurements say of each number: Gauss-Newton information, for coloured noise."""
 
 from __future__ import annotations
 

@@ -57,7 +57,7 @@ def estimate_levels(rows: Sequence[Row], predicted: Array, parameters: int) -> N
     Args:
         rows: the measurements.
         predicted: by the fit (M,).
-        parameters: that were fitted, which have eaten some of the noise.
+        parameters: that were fitted, and have absorbed some of the noise.
     """
     guess = first_guess(rows)
     residuals: dict[str, list[Array]] = {}

@@ -1,4 +1,4 @@
-"""What a wrong command line is answered with: one line in the form of all other errors."""
+"""The message for a wrong command line: one line in the form of all other errors."""
 
 from __future__ import annotations
 

@@ -34,7 +34,7 @@ class Channel:
 
         Raises:
             ProtocolError: no ping was ever answered.
-            LinkError: no answer any more.
+            LinkError: no more answers.
         """
         data = self._form.encode(Frame(Ping(), Comm.REQUEST))
         end = time.monotonic() + (self._options.patience if patience is None else patience)

@@ -42,7 +42,7 @@ def warn_of_other_robot(robot: Robot, lowest: Array, highest: Array, planned: Ar
 
 
 def doubts_about_robot(robot: Robot, lowest: Array, highest: Array, planned: Array | None = None) -> list[str]:
-    """Names what speaks against a robot in the positions that its controller reports.
+    """Names what contradicts a robot in the positions that its controller reports.
 
     Feedback does not say how many joints there are: those that a controller lacks read zero.
 

@@ -28,7 +28,7 @@ class Faults:
         late: share that arrives late.
         late_by: by so much [s].
         reorder: share that the next one overtakes.
-        silent_after: points after which nothing is sent any more; None for never.
+        silent_after: points after which nothing more is sent; None for never.
         error_after: points after which the controller reports an error.
         e_stop_after: points after which an emergency stop is pressed.
         restart_after: points after which the controller restarts and forgets everything.

@@ -13,7 +13,7 @@ from oed.reports.rendering.saving import save_page
 from robots.common.files import ResultFolder
 from robots.terms.effects import EFFECTS, EXPERIMENTS
 
-SURE = 0.95
+DECISIVE = 0.95
 """Chance from which an experiment counts as sure."""
 
 
@@ -120,6 +120,6 @@ def discrimination_page(result: Discrimination) -> Page:
 
 
 def _unsure(result: Discrimination) -> tuple[str, ...]:
-    if result.resolves >= SURE:
+    if result.resolves >= DECISIVE:
         return ()
     return (f"The experiment gives the right decision with {100 * result.resolves:.0f} % probability only.",)

@@ -125,7 +125,7 @@ def friction_picture(
         error = None
         if spread is not None:
             error = NORMAL_95 * np.sqrt(np.maximum(np.einsum("ij,jk,ik->i", columns, spread[joint], columns), 0.0))
-        # Joints have colours of their own: one entry in the legend would not speak for all of them.
+        # Joints have colours of their own: one entry in the legend would not show all of them.
         label = "identified" if count == 1 else ""
         series = [Series(x=dq, y=columns @ table[joint], error=error, name=label, role=joint_role(joint + 1))]
         if known is not None and np.isfinite(known[joint]).all():

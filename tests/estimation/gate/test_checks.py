@@ -57,14 +57,18 @@ def test_findings_of_equal_severity_have_a_fixed_order():
     assert len({(check.stage, check.order) for check in checks}) == len(checks)
 
 
-def test_the_page_on_logs_explains_each_finding():
-    """Each name of a finding of the built-in checks is in the table of the documentation."""
+def test_the_page_on_refused_logs_explains_each_finding():
+    """Each name of a finding of checks and readers is in the tables of the documentation."""
     root = Path(__file__).parents[3]
-    named = re.compile(r'[ (]name="([a-z_]+)"(?: if .+ else "([a-z_]+)")?,')
-    sources = [path.read_text(encoding="utf-8") for path in (root / "estimation/gate/checks").glob("*.py")]
+    named = re.compile(r'[ (](?:name=|"name": )"([a-z_]+)"(?: if .+ else "([a-z_]+)")?,')
+    sources = [
+        path.read_text(encoding="utf-8")
+        for pattern in ("gate/checks/*.py", "gate/candidates/*.py", "gate/log_sets.py", "logs/*.py")
+        for path in (root / "estimation").glob(pattern)
+    ]
     names = {name for source in sources for pair in named.findall(source) for name in pair if name}
-    page = (root / "docs/logs.md").read_text(encoding="utf-8")
-    assert len(names) > 25
+    page = (root / "docs/refused.md").read_text(encoding="utf-8")
+    assert len(names) > 45
     assert {name for name in names if f"`{name}`" not in page} == set()
 
 

@@ -274,8 +274,8 @@ def test_a_zero_that_wanders_stays_in_a_stretch_that_is_hardly_begun(seen, share
 
 
 def test_the_documentation_lists_every_effect():
-    """The page of the diagnosis names each effect of the catalogue."""
-    text = (Path(__file__).parents[4] / "docs" / "diagnosis.md").read_text()
+    """The page of effects names each effect of the catalogue."""
+    text = (Path(__file__).parents[4] / "docs" / "effects.md").read_text()
     missing = [name for name in EFFECTS if f"`{name}`" not in text]
     assert not missing
 
