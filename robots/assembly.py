@@ -11,7 +11,6 @@ from numpy.typing import ArrayLike, NDArray
 
 from robots.common.config import read_config
 from robots.common.errors import InputError
-from robots.controller_axes import ControllerAxes
 from robots.description import MOTOR_UNITS, Bounds, Pose, Range, RobotDescription, Values
 from robots.description_notes import assumed_in_urdf, assumed_limits, require_stops, unknown_masses, urdf_notes
 from robots.geometry.chain import Chain, LinkPlace, homogeneous, rotation_from_rpy
@@ -20,11 +19,12 @@ from robots.geometry.dh_tables import table_notes, table_rows
 from robots.geometry.inertia import SIZE, check_body, inertial_parameters, symmetric
 from robots.geometry.urdf import read_urdf
 from robots.geometry.urdf_selection import Choice, digest_of
+from robots.joints.controller_axes import ControllerAxes
+from robots.joints.velocity_ramps import NO_RAMP, VelocityRamp
 from robots.limits import Limits
 from robots.mujoco_models import robot_from_mjcf
 from robots.per_joint import PerJoint
 from robots.robot import Robot
-from robots.velocity_ramps import NO_RAMP, VelocityRamp
 
 Array = NDArray[np.float64]
 

@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from robots.common.errors import InputError
+from robots.joints.velocity_ramps import VelocityRamp
 from robots.signals import FloatArray, Motion
-from robots.velocity_ramps import VelocityRamp
 
 ACCELERATION_PER_VELOCITY = 4.0
 """Default acceleration limit over the velocity limit [1/s]: full speed in a quarter of a second, as small arms do."""

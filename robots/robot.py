@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from robots.common.errors import InputError
-from robots.controller_axes import ControllerAxes
 from robots.geometry.chain import Chain, LinkPlace
+from robots.joints.controller_axes import ControllerAxes
 from robots.limits import Limits
 
 Array = NDArray[np.float64]

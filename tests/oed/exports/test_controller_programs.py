@@ -13,7 +13,7 @@ from scipy.interpolate import CubicSpline
 from oed.exports import ExportOptions, export_trajectory
 from oed.exports.forms.controller_programs import ARRAY
 from robots.common.errors import AssumedValueWarning, InputError
-from robots.controller_axes import ControllerAxes
+from robots.joints.controller_axes import ControllerAxes
 from robots.loading import load_robot
 from robots.robot import Robot
 from robots.signals import Motion

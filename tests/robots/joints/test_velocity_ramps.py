@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 
 from robots.common.errors import InputError
+from robots.joints.velocity_ramps import VelocityRamp
 from robots.limits import Limits
 from robots.loading import load_robot
 from robots.signals import Motion
-from robots.velocity_ramps import VelocityRamp
 
 ONE = np.ones(2)
 LIMITS = Limits(
