@@ -29,7 +29,7 @@ def checked_motion(robot: Robot, log: Log) -> tuple[GateReport, list[Log]]:
 
     Returns:
         The findings, those on torques as warnings at most; and the parts of the log between gaps, with unwrapped
-        angles and interpolated outliers of positions.
+        angles and interpolated outliers.
 
     Raises:
         InputError: the motion is wrong: units of time or position, wrapped angles, jumps, impossible values; or all
@@ -38,7 +38,7 @@ def checked_motion(robot: Robot, log: Log) -> tuple[GateReport, list[Log]]:
     gate = check_log(robot, log).for_motion()
     gate.raise_if_refused()
     # Copied positions stay: what smooths them knows them, and a torque is wanted in every row.
-    return gate, list(replace(gate, stale=gate.stale[:0]).usable(log, interpolate=["q"]))
+    return gate, list(replace(gate, stale=gate.stale[:0]).usable(log, interpolate=("q", "tau", "current")))
 
 
 def joined(parts: Sequence[Log]) -> Log:

@@ -147,7 +147,7 @@ class Diagnosis:
         if self.findings:
             rows["with the extended model"] = after
         if np.isfinite(self.every_row).any():
-            rows[f"all rows, as in `oed predict{' --before' if self.model.keeps_heat else ''}`"] = every
+            rows[f"all rows in motion, as in `oed predict{' --before' if self.model.keeps_heat else ''}`"] = every
         width = 2 + max(map(len, rows))
         lines += [f"{name:>{width}}: {errors}" for name, errors in rows.items()]
         lines.append(f"  measured on {self.how_unseen}")

@@ -54,6 +54,11 @@ def without_gravity(why: str, value: float, unit: str, certain: bool) -> Finding
     )
 
 
+def opposite(joints: int, joint: int) -> str:
+    """Writes what a mapping states for the opposite sign of one joint, counted from 0."""
+    return f"`sign: [{', '.join('-1' if j == joint else '1' for j in range(joints))}]`"
+
+
 def _gravity(robot: Robot, prefix: str, cause: Cause, severity: Severity, smaller: float) -> Finding:
     assert cause.meaning.gravity is not None
     values = ",".join(f"{component:.3g}" for component in np.round(cause.meaning.gravity, 2) + 0.0)
@@ -96,8 +101,8 @@ def _sign(robot: Robot, prefix: str, cause: Cause, severity: Severity, smaller: 
         severity=severity,
         text=f"{robot.joint_names[joint]} seems to turn opposite to the robot's description: errors are "
         f"{smaller:.3g} % smaller with the opposite sign of its {what if turned else 'torque'}",
-        action=f"set `sign: -1` for its {what if turned else 'torque'} in a mapping (--mapping), or correct the "
-        "description",
+        action=f"state {opposite(robot.n, joint)} for the {what if turned else 'torque'} in a mapping (--mapping), or "
+        "correct the description",
         value=smaller,
         unit="%",
         column=f"{'q' if turned else prefix}{joint + 1}",

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from estimation.gate.candidates.candidate_fits import CandidateFits, Meaning
+from estimation.gate.candidates.cause_findings import opposite
 from estimation.gate.check import Check
 from estimation.gate.context import Context, Stage
 from estimation.gate.finding import Finding
@@ -73,7 +74,7 @@ class TorqueSigns(Check):
                     negative or (friction < -CLEARLY_NEGATIVE and large)
                 )
         return findings + [
-            _torque_sign(found, prefix, joint, certain)
+            _torque_sign(found, prefix, joint, certain, fitted.robot.n)
             for joint, certain in opposite.items()
             for found in [fitted.physics[joint]]
             if found is not None
@@ -137,14 +138,14 @@ def _negative_friction(found: JointPhysics, prefix: str, joint: int, certain: bo
     )
 
 
-def _torque_sign(found: JointPhysics, prefix: str, joint: int, certain: bool) -> Finding:
+def _torque_sign(found: JointPhysics, prefix: str, joint: int, certain: bool, joints: int) -> Finding:
     return Finding(
         name="torque_sign",
         severity="refuse" if certain else "warning",
         text=f"implausible: with this torque the joint's inertia is {found.inertia:.3g} (standard error "
         f"{found.inertia_error:.2g}) and its friction power is {found.loss:.3g} W ({found.loss_error:.2g}): "
         + ("its sign is inverted" if certain else "it accelerates instead of braking"),
-        action="set `sign: -1` for the torque, or the position, of this joint in a mapping (--mapping)",
+        action=f"state {opposite(joints, joint)} for the torque, or for the position, in a mapping (--mapping)",
         value=found.loss,
         unit="W",
         column=f"{prefix}{joint + 1}",
