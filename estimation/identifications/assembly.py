@@ -57,7 +57,8 @@ def joint_fits(found: Fit, figures: Figures, identified: NDArray[np.bool_]) -> t
         "residual_rms": residual,
         "held_out_rms": found.choice.held_out,
         "nominal_rms": nominal,
-        "noise_floor": figures.floor,
+        # A residual that is not white at its fast end has less noise than that end says.
+        "noise_floor": np.minimum(figures.floor, residual),
         "band": figures.band,
     }
     return tuple(

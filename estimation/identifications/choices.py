@@ -39,6 +39,7 @@ class Choice:
         position: whether the model has a torque by each joint's position.
         held_out: RMS of the torque error on blocks left out of the fit (n,) [N m or N], on all rows in which the joint
             is not at rest: those of a prediction.
+        without_position: the same without a torque by position (n,), if the model has one; None otherwise.
         spread: standard deviation of the torque (n,): the error of a constant.
         band: of the prediction of other motions.
         contradiction: a log that one model does not fit together with the others; None where they agree.
@@ -52,6 +53,7 @@ class Choice:
     prior: GaussianPrior
     position: bool
     held_out: Array
+    without_position: Array | None = None
     spread: Array
     band: Band
     contradiction: Contradiction | None
@@ -90,7 +92,7 @@ def choose(
     smoother, low_pass = comparison.smoother()
     averaged, logged = comparison.blocks(smoother), comparison.blocks(smoother, 1)
     transfer = Transfer(comparison, smoother)
-    trial = comparison.trial(averaged)
+    plain = trial = comparison.trial(averaged)
     if position is not False and len(comparison.plain) < base.size:
         other = comparison.trial(averaged, position=True)
         if position or transfer.cost(averaged, other) < transfer.cost(averaged, trial) - POSITION_GAIN:
@@ -104,6 +106,7 @@ def choose(
         prior=trial.prior,
         position=bool(position),
         held_out=held_out,
+        without_position=comparison.left_out(logged, plain) if position else None,
         spread=comparison.spread,
         band=transfer.band(averaged, trial),
         contradiction=transfer.contradiction(averaged, trial),
