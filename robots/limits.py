@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from robots.common.errors import InputError
+from robots.common.records import read_null_as
 from robots.signals import FloatArray, Motion
 
 ACCELERATION_PER_VELOCITY = 4.0
@@ -47,12 +48,18 @@ class Margin:
             there is no limit, 0 on it, negative beyond it.
     """
 
+    ENTRIES = ("quantity", "joint", "unit?", "value", "limit", "time", "slack_fraction")
+
     quantity: str
     joint: int
     value: float
-    limit: float
+    limit: float = field(metadata=read_null_as(np.inf))
     time: float
     slack_fraction: float
+
+    def unit(self, limits: Limits | None = None) -> str | None:
+        """Unit of the value, by the limits of the joints; None where they are not given."""
+        return None if limits is None else limits.unit(self.joint - 1, self.quantity)
 
     @property
     def slack(self) -> float:

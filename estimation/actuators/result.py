@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field
-from html import escape
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -14,8 +12,7 @@ from numpy.typing import NDArray
 
 from estimation.actuators.search import LoopFinding
 from robots.common.errors import InputError
-from robots.common.files import existing_file, write_atomic
-from robots.common.plain import finite, number
+from robots.common.records import Result, read, read_json
 from robots.drives import Drive
 from robots.robot import Robot
 
@@ -25,8 +22,7 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
-FILE, MOTION = "actuators.json", "motion.parquet"
-FORMAT, FORMAT_VERSION = "robot-oed actuators", 1
+MOTION = "motion.parquet"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -106,7 +102,7 @@ class Trace:
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Actuators:
+class Actuators(Result, format="robot-oed actuators"):
     """Identified drives of a robot.
 
     Attributes:
@@ -126,6 +122,20 @@ class Actuators:
         robots: the chains; empty if the result was loaded.
         drives: the drives with the identified values; empty if the result was loaded.
     """
+
+    FILE = "actuators.json"
+    ENTRIES = (
+        "robot",
+        "joints=laws",
+        "parameters",
+        "errors",
+        "findings",
+        "notes",
+        "held_out",
+        "written_error",
+        "success",
+        "provenance",
+    )
 
     robot: str
     joints: tuple[str, ...]
@@ -174,6 +184,14 @@ class Actuators:
                 return item
         known = ", ".join(dict.fromkeys(item.parameter for item in self.parameters))
         raise InputError(f"{parameter} of {joint} was not identified", allowed=f"{known} of {', '.join(self.joints)}")
+
+    @property
+    def laws(self) -> list[dict[str, Any]]:
+        """Name, law and values of each joint's drive, as plain data."""
+        return [
+            {"name": name, "law": law, "values": values}
+            for name, law, values in zip(self.joints, self.law, self.values, strict=True)
+        ]
 
     def summary(self) -> str:
         """Lists errors of the simulated motion, findings, parameters, and what is not determined."""
@@ -225,39 +243,6 @@ class Actuators:
         axes.legend()
         return axes
 
-    def _repr_html_(self) -> str:
-        return f"<pre>{escape(self.summary())}</pre>"
-
-    def to_dict(self) -> dict[str, Any]:
-        """Writes the result as plain data for `actuators.json`."""
-        return {
-            "format": FORMAT,
-            "format_version": FORMAT_VERSION,
-            "robot": self.robot,
-            "joints": [
-                {"name": name, "law": law, "values": dict(values)}
-                for name, law, values in zip(self.joints, self.law, self.values, strict=True)
-            ],
-            "parameters": [
-                {
-                    **asdict(value),
-                    "joints": list(value.joints),
-                    "standard_error": finite(value.standard_error),
-                    "lower": finite(value.lower),
-                    "upper": finite(value.upper),
-                    "partners": list(value.partners),
-                }
-                for value in self.parameters
-            ],
-            "errors": [asdict(error) for error in self.errors],
-            "findings": [asdict(finding) | {"rivals": [list(r) for r in finding.rivals]} for finding in self.findings],
-            "notes": list(self.notes),
-            "held_out": self.held_out,
-            "written_error": finite(self.written_error),
-            "success": self.success,
-            "provenance": dict(self.provenance),
-        }
-
     def save(self, folder: str | Path, *, force: bool = False) -> None:
         """Writes `actuators.json` and `motion.parquet` into a folder that is there.
 
@@ -268,9 +253,7 @@ class Actuators:
         Raises:
             InputError: a file is there, and force is not given.
         """
-        place = Path(folder)
-        text = json.dumps(self.to_dict(), indent=2, allow_nan=False) + "\n"
-        write_atomic(place / FILE, text, force=force)
+        super().save(folder, force=force)
         if self.traces:
             import pandas as pd
 
@@ -279,7 +262,7 @@ class Actuators:
             names = {"q": "measured", "qref": "command", "described": "described", "identified": "identified"}
             for prefix, key in names.items():
                 columns |= {f"{prefix}{j + 1}": getattr(trace, key)[:, j] for j in range(len(self.joints))}
-            target = place / MOTION
+            target = Path(folder) / MOTION
             if target.exists() and not force:
                 raise InputError("the file exists", file=target, remedy="use --force")
             pd.DataFrame(columns).to_parquet(target, index=False)
@@ -294,41 +277,26 @@ def load_actuators(path: str | Path) -> Actuators:
     Raises:
         InputError: a missing file, or one that holds no drives.
     """
-    place = Path(path)
-    file = existing_file(place / FILE if place.is_dir() else place)
-    try:
-        data = json.loads(file.read_text(encoding="utf-8"))
-    except (UnicodeDecodeError, json.JSONDecodeError) as error:
-        raise InputError(f"is no JSON ({error})", file=file) from error
-    if not isinstance(data, dict) or data.get("format") != FORMAT:
-        raise InputError("holds no drives", file=file, allowed=f"a file of the format {FORMAT!r}")
-    try:
-        joints = tuple(joint["name"] for joint in data["joints"])
-        return Actuators(
-            robot=data["robot"],
-            joints=joints,
-            law=tuple(joint["law"] for joint in data["joints"]),
-            values=tuple(joint["values"] for joint in data["joints"]),
-            parameters=tuple(_value(value) for value in data["parameters"]),
-            errors=tuple(MotionError(**error) for error in data["errors"]),
-            findings=tuple(
-                LoopFinding(**finding | {"rivals": tuple((r[0], r[1]) for r in finding["rivals"])})
-                for finding in data["findings"]
-            ),
-            notes=tuple(data["notes"]),
-            held_out=data["held_out"],
-            written_error=number(data["written_error"]),
-            success=data["success"],
-            provenance=data["provenance"],
-            traces=_traces(file.parent / MOTION, len(joints), data["held_out"]),
-        )
-    except (KeyError, TypeError, ValueError) as error:
-        raise InputError(f"is damaged ({type(error).__name__}: {error})", file=file) from error
+    file, remedy = Path(path), f"give an {Actuators.FILE} of oed actuators"
+    file = file / Actuators.FILE if file.is_dir() else file
+    data = read_json(file, Actuators.FORMAT, Actuators.FORMAT_VERSION, remedy=remedy)
+    drives = read(list[_Law], data.get("joints"), file=file, remedy=remedy)
+    return Actuators.from_dict(
+        data,
+        file=file,
+        remedy=remedy,
+        joints=tuple(drive.name for drive in drives),
+        law=tuple(drive.law for drive in drives),
+        values=tuple(drive.values for drive in drives),
+        traces=_traces(file.parent / MOTION, len(drives), str(data.get("held_out"))),
+    )
 
 
-def _value(value: dict[str, Any]) -> DriveValue:
-    unknown = {key: np.nan for key in ("standard_error", "lower", "upper") if value[key] is None}
-    return DriveValue(**value | unknown | {key: tuple(value[key]) for key in ("joints", "partners")})
+@dataclass(frozen=True, kw_only=True)
+class _Law:
+    name: str
+    law: str
+    values: Mapping[str, float]
 
 
 def _traces(path: Path, n: int, name: str) -> tuple[Trace, ...]:

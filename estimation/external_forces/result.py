@@ -2,18 +2,17 @@
 
 from __future__ import annotations
 
-import json
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from estimation.external_forces.contacts import Contact
 from estimation.external_forces.thresholds.calibrations import Calibration
-from robots.common.files import write_atomic
 from robots.common.plain import percent
+from robots.common.records import Result
 from robots.common.tables.table_files import write_table
 
 if TYPE_CHECKING:
@@ -21,13 +20,11 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
-FORMAT = "robot-oed forces"
-FORMAT_VERSION = 2
 AXES = ("x", "y", "z")
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class ForceEstimate:
+class ForceEstimate(Result, format="robot-oed forces", version=2):
     """External forces of one log.
 
     Attributes:
@@ -49,6 +46,20 @@ class ForceEstimate:
         warnings: limitations of the result.
     """
 
+    FILE = "forces.json"
+    ENTRIES = (
+        "robot",
+        "samples=t.size",
+        "duration",
+        "contacts",
+        "flagged=flagged.mean",
+        "extrapolates=extrapolates.mean",
+        "false_alarm_rate=calibration.check.summary",
+        "force_standard_deviation=median_deviation",
+        "calibration",
+        "warnings",
+    )
+
     robot: str
     joint_names: tuple[str, ...]
     t: Array
@@ -65,6 +76,12 @@ class ForceEstimate:
     contacts: tuple[Contact, ...]
     calibration: Calibration
     warnings: tuple[str, ...] = ()
+
+    @property
+    def median_deviation(self) -> Array:
+        """Median standard deviation of the force's components (3,) [N]; NaN where the joints never feel one."""
+        known = np.where(np.isfinite(self.force_deviation), self.force_deviation, np.nan)
+        return np.array([np.nan if np.isnan(column).all() else float(np.nanmedian(column)) for column in known.T])
 
     @property
     def duration(self) -> float:
@@ -110,26 +127,6 @@ class ForceEstimate:
             lines.append("the joints do not feel all directions of a force at the tool, so its size is not known")
         return "\n".join([*lines, *self.warnings])
 
-    def to_dict(self) -> dict[str, Any]:
-        """Gives contacts and settings as plain data."""
-        finite = np.where(np.isfinite(self.force_deviation), self.force_deviation, np.nan)
-        return {
-            "format": FORMAT,
-            "format_version": FORMAT_VERSION,
-            "robot": self.robot,
-            "samples": len(self.t),
-            "duration": self.duration,
-            "contacts": [contact.to_dict() for contact in self.contacts],
-            "flagged": float(self.flagged.mean()),
-            "extrapolates": float(self.extrapolates.mean()),
-            "false_alarm_rate": None if self.calibration.check is None else self.calibration.check.summary(),
-            "force_standard_deviation": [
-                None if np.isnan(column).all() else float(np.nanmedian(column)) for column in finite.T
-            ],
-            "calibration": self.calibration.to_dict(),
-            "warnings": list(self.warnings),
-        }
-
     def to_frame(self) -> pd.DataFrame:
         """Gives the samples as a table, see `save`."""
         import pandas as pd
@@ -149,8 +146,7 @@ class ForceEstimate:
         folder = Path(folder)
         units = {"t": "s", **{f"f{k}{end}": "N" for k in AXES for end in ("", "_sd")}}
         write_table(folder / "forces.csv", self._columns(), {"content": "external forces"}, units=units, force=force)
-        text = json.dumps(self.to_dict(), indent=2, allow_nan=False) + "\n"
-        write_atomic(folder / "forces.json", text, force=force)
+        super().save(folder, force=force)
 
     def _columns(self) -> dict[str, Array]:
         columns = {"t": self.t, "contact": self.flagged.astype(float), "statistic": self.statistic}

@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass
-from typing import Any, Literal, get_args
+from dataclasses import dataclass
+from typing import Literal, get_args
+
+from robots.common.records import Record
 
 Severity = Literal["info", "warning", "refuse"]
 SEVERITIES: tuple[Severity, ...] = get_args(Severity)
 
 
 @dataclass(frozen=True, kw_only=True)
-class Finding:
+class Finding(Record):
     """One finding of a check.
 
     Attributes:
@@ -39,7 +41,3 @@ class Finding:
         named = (("joint", self.joint), ("column", self.column), ("row", self.row))
         place = ", ".join(f"{word} {value}" for word, value in named if value is not None)
         return f"{place}: {self.text}; {self.action}" if place else f"{self.text}; {self.action}"
-
-    def to_dict(self) -> dict[str, Any]:
-        """Gives the fields, for JSON."""
-        return asdict(self)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,7 +13,7 @@ from estimation.gate.measurements.held_torque import between_updates
 from estimation.gate.measurements.timing import FEWEST
 from estimation.logs.torque_source import NO_TORQUE
 from robots.common.errors import InputError, NotIdentifiableError
-from robots.common.plain import all_finite, finite
+from robots.common.records import Result
 from robots.signals import Log
 
 if TYPE_CHECKING:
@@ -44,7 +44,7 @@ NO_INFORMATION = frozenset({"badly_excited"})
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class GateReport:
+class GateReport(Result):
     """The findings on one log.
 
     Attributes:
@@ -70,6 +70,23 @@ class GateReport:
         information: inertia or friction power of each joint over its standard error, the larger of the two (n,);
             NaN without torque.
     """
+
+    ENTRIES = (
+        "robot",
+        "log",
+        "refused",
+        "samples",
+        "duration",
+        "period",
+        "spikes=spike_rows",
+        "stale=stale_rows",
+        "parts",
+        "delay",
+        "delay_error",
+        "unexplained",
+        "information",
+        "findings",
+    )
 
     robot: str
     log: str
@@ -185,6 +202,16 @@ class GateReport:
         ]
         return replace(self, findings=worst_first(mild))
 
+    @property
+    def spike_rows(self) -> NDArray[np.intp]:
+        """Rows with a spike, counted from 1."""
+        return self.spikes + 1
+
+    @property
+    def stale_rows(self) -> NDArray[np.intp]:
+        """Rows that repeat the one before, counted from 1."""
+        return self.stale + 1
+
     def summary(self) -> str:
         """Gives the verdict and lists the findings, the worst first."""
         lacks_torque = any(finding.name == NO_TORQUE for finding in self.findings)
@@ -197,29 +224,7 @@ class GateReport:
         """Tabulates the findings, one a row."""
         import pandas as pd
 
-        return pd.DataFrame([finding.to_dict() for finding in self.findings], columns=list(Finding.__annotations__))
-
-    def to_dict(self) -> dict[str, Any]:
-        """Gives everything, for JSON: NaN becomes None."""
-        arrays = ("delay", "delay_error", "unexplained", "information")
-        return {
-            "robot": self.robot,
-            "log": self.log,
-            "refused": self.refused,
-            "samples": self.samples,
-            "duration": self.duration,
-            "period": self.period,
-            "spikes": [int(row) + 1 for row in self.spikes],
-            "stale": [int(row) + 1 for row in self.stale],
-            "parts": [list(part) for part in self.parts],
-            **{name: all_finite(getattr(self, name)) for name in arrays},
-            "findings": [{**finding.to_dict(), "value": finite(finding.value)} for finding in self.findings],
-        }
-
-    def _repr_html_(self) -> str:
-        import html
-
-        return f"<pre>{html.escape(self.summary())}</pre>"
+        return pd.DataFrame(list(self.findings), columns=list(Finding.__annotations__))
 
 
 def worst_first(findings: list[Finding]) -> tuple[Finding, ...]:

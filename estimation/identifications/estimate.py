@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,7 +12,8 @@ from numpy.typing import NDArray
 from estimation.gate import GateReport
 from estimation.identifications.choices import Choice
 from estimation.models.model import Model
-from robots.common.plain import finite, percent
+from robots.common.plain import percent
+from robots.common.records import Record
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -43,6 +44,20 @@ class JointFit:
         identified: whether the left-out error is clearly below that of a constant.
     """
 
+    ENTRIES = (
+        "joint",
+        "name",
+        "identified",
+        "torque_rms",
+        "residual_rms",
+        "held_out_rms",
+        "held_out_nrmse=nrmse",
+        "constant_rms=torque_spread",
+        "nominal_rms",
+        "noise_floor",
+        "band95=band",
+    )
+
     joint: int
     name: str
     torque_rms: float
@@ -61,7 +76,7 @@ class JointFit:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Estimate:
+class Estimate(Record):
     """An identified model and the evidence for it.
 
     Attributes:
@@ -78,6 +93,8 @@ class Estimate:
         fitted_rows: number of fitted rows, where the arrays hold evenly spread stretches of a log that was read in
             pieces; None where they hold all.
     """
+
+    ENTRIES = ("success", "warnings", "joints", "model")
 
     model: Model
     choice: Choice
@@ -201,30 +218,6 @@ class Estimate:
     def to_frame(self) -> pd.DataFrame:
         """Gives a row per parameter, see `Model.to_frame`."""
         return self.model.to_frame()
-
-    def to_dict(self) -> dict[str, Any]:
-        """Gives what machines want to know of it."""
-        return {
-            "success": self.success,
-            "warnings": list(self.warnings),
-            "joints": [
-                {
-                    "joint": joint.joint,
-                    "name": joint.name,
-                    "identified": joint.identified,
-                    "torque_rms": joint.torque_rms,
-                    "residual_rms": joint.residual_rms,
-                    "held_out_rms": joint.held_out_rms,
-                    "held_out_nrmse": finite(joint.nrmse),
-                    "constant_rms": joint.torque_spread,
-                    "nominal_rms": finite(joint.nominal_rms),
-                    "noise_floor": joint.noise_floor,
-                    "band95": joint.band,
-                }
-                for joint in self.joints
-            ],
-            "model": self.model.to_dict(),
-        }
 
     def plot(self, ax: Axes | None = None) -> Axes:
         """Draws measured against predicted torque of all joints, each over its RMS.

@@ -2,19 +2,19 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
-from estimation.monitoring.change_points import ChangePoints, find_change_points
+from estimation.monitoring.change_points import ChangePoint, find_change_points
 from estimation.monitoring.findings import LIGHTS, Finding, Severity, when, worst
 from estimation.monitoring.log_row import UNFIT, LogRow
 from robots.common.files import write_atomic
+from robots.common.records import Result
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -24,7 +24,6 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 
 RESULT = "monitor.json"
-FORMAT, FORMAT_VERSION = "robot-oed monitoring", 1
 HEAT_WORDS = {
     "model": "the thermal model",
     "temperature": "measured joint temperatures",
@@ -34,7 +33,7 @@ HEAT_WORDS = {
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class MonitorResult:
+class MonitorResult(Result, format="robot-oed monitoring", shares=("origin",)):
     """What a monitor found in logs.
 
     Attributes:
@@ -50,6 +49,23 @@ class MonitorResult:
         change_points: of the stored logs; None without the package `ruptures`.
     """
 
+    FILE = RESULT
+    ENTRIES = (
+        "robot",
+        "light",
+        "severity",
+        "verdict",
+        "heat",
+        "heat_percent=heat_range",
+        "false_alarm_hours",
+        "hours",
+        "origin",
+        "findings",
+        "logs",
+        "notes",
+        "change_points",
+    )
+
     robot: str
     joint_names: tuple[str, ...]
     heat: str
@@ -59,7 +75,7 @@ class MonitorResult:
     notes: tuple[str, ...]
     history: dict[str, Array]
     origin: float
-    change_points: ChangePoints | None
+    change_points: tuple[ChangePoint, ...] | None
 
     @classmethod
     def of(cls, monitor: Monitor, notes: Sequence[str]) -> MonitorResult:
@@ -156,26 +172,6 @@ class MonitorResult:
             lines.append("  Change points of the stored logs need the package ruptures: pip install ruptures.")
         return "\n".join(lines)
 
-    def to_dict(self) -> dict[str, Any]:
-        """Gives the result as plain data, without the trends."""
-        return {
-            "format": FORMAT,
-            "format_version": FORMAT_VERSION,
-            "robot": self.robot,
-            "light": self.light,
-            "severity": self.severity,
-            "verdict": self.verdict(),
-            "heat": self.heat,
-            "heat_percent": list(self.heat_range),
-            "false_alarm_hours": self.false_alarm_hours,
-            "hours": self.hours,
-            "origin": self.origin,
-            "findings": [f.to_dict(self.origin) for f in self.findings],
-            "logs": [row.to_dict() for row in self.logs],
-            "notes": list(self.notes),
-            "change_points": None if self.change_points is None else self.change_points.to_dict(),
-        }
-
     def to_frame(self) -> pd.DataFrame:
         """Gives the trends: a row per window and joint, changes in per cent of the model's friction."""
         import pandas as pd
@@ -199,10 +195,8 @@ class MonitorResult:
         Raises:
             InputError: a file is there, and force is not given.
         """
-        place = Path(folder)
-        text = json.dumps(self.to_dict(), indent=2, allow_nan=False)
-        write_atomic(place / RESULT, text + "\n", force=force)
-        write_atomic(place / "trends.csv", self.to_frame().to_csv(index=False), force=force)
+        super().save(folder, force=force)
+        write_atomic(Path(folder) / "trends.csv", self.to_frame().to_csv(index=False), force=force)
 
     def rows_of(self, log: int) -> Sequence[int]:
         """Indices of the windows of a log, counted from 0."""

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import combinations_with_replacement
@@ -17,7 +16,7 @@ from oed.criteria import criterion as choose_criterion
 from oed.experiments.designing import design
 from oed.experiments.results.result import Design
 from robots.common.errors import InputError
-from robots.common.files import write_atomic
+from robots.common.records import Result
 from robots.robot import Robot
 
 if TYPE_CHECKING:
@@ -31,7 +30,7 @@ MOST_CRITERIA = 3
 
 
 @dataclass(frozen=True, kw_only=True)
-class ParetoFront:
+class ParetoFront(Result, format="robot-oed pareto front"):
     """Designs between the extremes of several criteria.
 
     Attributes:
@@ -40,6 +39,9 @@ class ParetoFront:
         designs: the P designs, one for each row of weights.
         values: of each criterion for the optimised part of each design, (P, k), as people read them.
     """
+
+    FILE = PARETO
+    ENTRIES = ("criteria=named_criteria", "points")
 
     criteria: tuple[Criterion, ...]
     weights: Array
@@ -54,6 +56,21 @@ class ParetoFront:
         worse = (costs[None] <= costs[:, None]).all(axis=2) & (costs[None] < costs[:, None]).any(axis=2)
         efficient: NDArray[np.bool_] = ~worse.any(axis=1)
         return efficient
+
+    @property
+    def named_criteria(self) -> list[dict[str, str]]:
+        """Name and label of each criterion."""
+        return [{"name": criterion.name, "label": criterion.label} for criterion in self.criteria]
+
+    @property
+    def points(self) -> list[dict[str, Any]]:
+        """The designs, each in a folder beside the file, with weights and values."""
+        return [
+            {"folder": folder_of(point), "weights": weights, "values": values, "efficient": bool(efficient)}
+            for point, (weights, values, efficient) in enumerate(
+                zip(self.weights, self.values, self.efficient, strict=True), start=1
+            )
+        ]
 
     @property
     def success(self) -> bool:
@@ -97,25 +114,6 @@ class ParetoFront:
         axes.legend()
         return axes
 
-    def to_dict(self) -> dict[str, Any]:
-        """Writes the front as plain data for `pareto.json`; the designs lie in folders beside it."""
-        return {
-            "format": "robot-oed pareto front",
-            "format_version": 1,
-            "criteria": [{"name": criterion.name, "label": criterion.label} for criterion in self.criteria],
-            "points": [
-                {
-                    "folder": folder_of(point),
-                    "weights": weights.tolist(),
-                    "values": values.tolist(),
-                    "efficient": bool(efficient),
-                }
-                for point, (weights, values, efficient) in enumerate(
-                    zip(self.weights, self.values, self.efficient, strict=True), start=1
-                )
-            ],
-        }
-
     def save(self, folder: str | Path, *, force: bool = False) -> None:
         """Writes `pareto.json`, and each design in a folder of its own.
 
@@ -130,7 +128,7 @@ class ParetoFront:
             own = Path(folder) / folder_of(point)
             own.mkdir(exist_ok=True)
             saved.save(own, force=force)
-        write_atomic(Path(folder) / PARETO, json.dumps(self.to_dict(), indent=2, allow_nan=False) + "\n", force=force)
+        super().save(folder, force=force)
 
 
 def pareto(

@@ -12,6 +12,7 @@ from oed.criteria import Criterion, Weighting, triangle
 from oed.criteria import criterion as choose_criterion
 from robots.base_parameters import BaseParameters
 from robots.common.parallel import one_blas_thread
+from robots.common.records import Record
 from robots.regressor import TorqueModel, default_model
 from robots.robot import Robot
 from robots.signals import Motion
@@ -20,7 +21,7 @@ _LABELS = {"fourier": "Fourier series", "sinusoid": "velocity strokes", "whole":
 
 
 @dataclass(frozen=True, kw_only=True)
-class Quality:
+class Quality(Record):
     """Information of a part of the experiment on the parameters.
 
     Attributes:
@@ -28,6 +29,15 @@ class Quality:
         samples: how many.
         singular_values: of the unscaled regressor Y (m,), ascending.
     """
+
+    ENTRIES = (
+        "part",
+        "samples",
+        "cond_Y=cond",
+        "log_det_YtY=log_det",
+        "smallest_singular_value_Y=smallest",
+        "singular_values_Y=singular_values",
+    )
 
     part: str
     samples: int
@@ -39,21 +49,29 @@ class Quality:
         kind, *rest = self.part.split(" ", 1)
         return " ".join([_LABELS.get(kind, kind), *rest])
 
+    @property
+    def full(self) -> bool:
+        """Whether Y has full rank, so that the motion excites all parameters."""
+        return self.singular_values[0] > 1e-10 * self.singular_values[-1]
+
+    @property
+    def cond(self) -> float | None:
+        """Condition number of Y; None where it has not full rank."""
+        return self.value("cond") if self.full else None
+
+    @property
+    def log_det(self) -> float | None:
+        """Logarithm of det(Y'Y); None where Y has not full rank."""
+        return self.value("d") if self.full else None
+
+    @property
+    def smallest(self) -> float:
+        """Smallest singular value of Y; 0 where it has not full rank."""
+        return self.singular_values[0] if self.full else 0.0
+
     def value(self, criterion: str | Criterion) -> float:
         """Evaluates a criterion."""
         return choose_criterion(criterion).value(np.square(self.singular_values))
-
-    def to_dict(self) -> dict[str, Any]:
-        """Lists cond(Y), log det(Y'Y) and the smallest singular value; null where Y has not full rank."""
-        full = self.singular_values[0] > 1e-10 * self.singular_values[-1]
-        return {
-            "part": self.part,
-            "samples": self.samples,
-            "cond_Y": self.value("cond") if full else None,
-            "log_det_YtY": self.value("d") if full else None,
-            "smallest_singular_value_Y": self.singular_values[0] if full else 0.0,
-            "singular_values_Y": list(self.singular_values),
-        }
 
 
 @one_blas_thread()

@@ -2,25 +2,22 @@
 
 from __future__ import annotations
 
-import json
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from estimation.diagnosis.experiment_plans.detection_limits import Limit, summarise_limits
 from estimation.diagnosis.experiment_plans.next_experiment import NextExperiment
-from estimation.diagnosis.findings import Finding, list_parameters, read_finding
+from estimation.diagnosis.findings import Finding, list_parameters
 from estimation.diagnosis.results.standing import standing_text, standing_verdict
 from estimation.diagnosis.results.verdict_text import close_rivals, format_p_value, state_verdict
-from estimation.diagnosis.simulations.simulation_result import Simulation, read_simulation
+from estimation.diagnosis.simulations.simulation_result import Simulation
 from estimation.diagnosis.validations.prediction_settings import all_row_errors
 from estimation.models.model import Model, load_model
-from robots.common.errors import InputError
-from robots.common.files import write_atomic
-from robots.common.plain import finite, number
+from robots.common.records import Result, read, read_json
 from robots.terms.base import length_unit
 
 if TYPE_CHECKING:
@@ -30,7 +27,7 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 
 DIAGNOSIS, MODEL = "diagnosis.json", "model.json"
-VERDICTS = ("none", "named", "ambiguous", "unexplained")
+Verdict = Literal["none", "named", "ambiguous", "unexplained"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,7 +53,7 @@ class Trace:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Diagnosis:
+class Diagnosis(Result):
     """The result of `diagnose`.
 
     Attributes:
@@ -77,6 +74,22 @@ class Diagnosis:
         simulation: forward simulation of a stretch of held-out data, without and with the findings; None without
             findings.
     """
+
+    FILE = DIAGNOSIS
+    ENTRIES = (
+        "robot.name=model.robot.name",
+        "verdict",
+        "findings",
+        "baseline.nrmse=baseline",
+        "extended.nrmse=extended",
+        "explained",
+        "excess=excess_shares",
+        "limits",
+        "next_experiment",
+        "unseen=how_unseen",
+        "simulation",
+        "notes",
+    )
 
     verdict: str
     findings: tuple[Finding, ...]
@@ -100,6 +113,11 @@ class Diagnosis:
     def success(self) -> bool:
         """Whether the verdict is conclusive: ``none`` or ``named``."""
         return self.verdict in ("none", "named")
+
+    @property
+    def excess_shares(self) -> list[dict[str, float]]:
+        """The shares of `excess`, by name."""
+        return [dict(zip(("noise", "state", "time"), row, strict=True)) for row in self.excess.tolist()]
 
     @property
     def every_row(self) -> Array:
@@ -182,25 +200,6 @@ class Diagnosis:
         names = ["effect", "joint", "parameter", "value", "unit", "low", "high", "determined", "p_value", "delta_bic"]
         return pd.DataFrame(rows, columns=names)
 
-    def to_dict(self) -> dict[str, Any]:
-        """Returns the content of `diagnosis.json` as plain data."""
-        return {
-            "robot": {"name": self.model.robot.name},
-            "verdict": self.verdict,
-            "findings": [finding.to_dict() for finding in self.findings],
-            "baseline": {"nrmse": list(map(finite, self.baseline.tolist()))},
-            "extended": {"nrmse": list(map(finite, self.extended.tolist()))},
-            "explained": self.explained,
-            "excess": [
-                dict(zip(("noise", "state", "time"), map(finite, row), strict=True)) for row in self.excess.tolist()
-            ],
-            "limits": [limit.to_dict() for limit in self.limits],
-            "next_experiment": None if self.next_experiment is None else self.next_experiment.to_dict(),
-            "unseen": self.how_unseen,
-            "simulation": None if self.simulation is None else self.simulation.to_dict(),
-            "notes": list(self.notes),
-        }
-
     def plot(self, ax: Axes | None = None) -> Axes:
         """Plots the held-out error of each joint for both models, on `ax` or on a new figure; returns the axes."""
         from matplotlib.figure import Figure
@@ -224,8 +223,7 @@ class Diagnosis:
         Raises:
             InputError: a file exists, and `force` is not set.
         """
-        text = json.dumps(self.to_dict(), indent=2, allow_nan=False) + "\n"
-        write_atomic(Path(folder) / DIAGNOSIS, text, force=force)
+        super().save(folder, force=force)
         self.model.save(Path(folder) / MODEL, force=force)
 
     @staticmethod
@@ -238,63 +236,14 @@ class Diagnosis:
         Raises:
             InputError: a file is missing or not a valid diagnosis.
         """
-        file = Path(folder) / DIAGNOSIS
-        try:
-            data = json.loads(file.read_text(encoding="utf-8"))
-            model = load_model(Path(folder) / MODEL)
-            return _from_dict(data, model)
-        except FileNotFoundError:
-            raise InputError("no such file", file=file, remedy="give the folder written by `oed diagnose`") from None
-        except (OSError, UnicodeDecodeError, json.JSONDecodeError) as error:
-            raise InputError(f"cannot be read as JSON: {error}", file=file) from error
-        except (KeyError, TypeError, ValueError) as error:
-            raise InputError(f"is no valid diagnosis: {type(error).__name__} {error}", file=file) from error
-
-
-def _from_dict(data: dict[str, Any], model: Model) -> Diagnosis:
-    if data["verdict"] not in VERDICTS:
-        raise ValueError(f"verdict {data['verdict']!r}")
-    following = data["next_experiment"]
-    return Diagnosis(
-        verdict=data["verdict"],
-        findings=tuple(read_finding(item) for item in data["findings"]),
-        baseline=np.array(data["baseline"]["nrmse"], dtype=float),
-        extended=np.array(data["extended"]["nrmse"], dtype=float),
-        explained=float(data["explained"]),
-        excess=np.array([[number(row[key]) for key in ("noise", "state", "time")] for row in data["excess"]]),
-        limits=tuple(_limit(item) for item in data["limits"]),
-        next_experiment=None if following is None else _next(following),
-        model=model,
-        how_unseen=data["unseen"],
-        notes=tuple(data["notes"]),
-        # Older files lack this entry.
-        simulation=None if data.get("simulation") is None else read_simulation(data["simulation"]),
-    )
-
-
-def _limit(item: dict[str, Any]) -> Limit:
-    return Limit(
-        effect=item["effect"],
-        joint=item["joint"],
-        detectable=number(item["detectable"], np.inf),
-        # Older files lack this entry.
-        at_worst=number(item.get("at_worst"), np.inf),
-        attributable=number(item["attributable"], np.inf),
-        toughest=item["toughest_rival"],
-        visible=float(item["visible"]),
-        note=item["note"],
-    )
-
-
-def _next(item: dict[str, Any]) -> NextExperiment:
-    return NextExperiment(
-        kind=item["kind"],
-        joint=item["joint"],
-        why=item["why"],
-        resolves=float(item["resolves"]),
-        stages=(),
-        ranking=(),
-        # Older files lack this entry.
-        times=int(item.get("times", 1)),
-        logged=str(item.get("logged", "")),
-    )
+        file, remedy = Path(folder) / DIAGNOSIS, "give the folder written by `oed diagnose`"
+        data = read_json(file, remedy=remedy)
+        read(Verdict, data.get("verdict"), file=file, remedy=remedy)
+        rows = read(list[dict[str, float]], data.get("excess"), file=file, remedy=remedy)
+        return Diagnosis.from_dict(
+            data,
+            file=file,
+            remedy=remedy,
+            model=load_model(Path(folder) / MODEL),
+            excess=np.array([list(row.values()) for row in rows]),
+        )

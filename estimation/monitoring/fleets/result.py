@@ -2,24 +2,23 @@
 
 from __future__ import annotations
 
-import json
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from estimation.monitoring.fleets.robot_row import LIGHTS, RobotRow
 from robots.common.files import write_atomic
+from robots.common.records import Result
 
 if TYPE_CHECKING:
     import pandas as pd
 
 RESULT, TABLE = "fleet.json", "fleet.csv"
-FORMAT, FORMAT_VERSION = "robot-oed fleet", 1
 LISTED = 20
 
 
 @dataclass(frozen=True, kw_only=True)
-class FleetResult:
+class FleetResult(Result, format="robot-oed fleet"):
     """All robots of a fleet.
 
     Attributes:
@@ -28,6 +27,9 @@ class FleetResult:
         single: robots that are a log directly in the folder.
     """
 
+    FILE = RESULT
+    ENTRIES = ("light", "verdict", "counts", "resumed", "robots=rows")
+
     rows: tuple[RobotRow, ...]
     resumed: int = 0
     single: int = 0
@@ -35,6 +37,11 @@ class FleetResult:
     def count(self, light: str) -> int:
         """Number of robots with a light."""
         return sum(row.light == light for row in self.rows)
+
+    @property
+    def counts(self) -> dict[str, int]:
+        """Number of robots with each light."""
+        return {light: self.count(light) for light in LIGHTS}
 
     @property
     def light(self) -> str:
@@ -69,18 +76,6 @@ class FleetResult:
             )
         return "\n".join(lines)
 
-    def to_dict(self) -> dict[str, Any]:
-        """Gives the result as plain data."""
-        return {
-            "format": FORMAT,
-            "format_version": FORMAT_VERSION,
-            "light": self.light,
-            "verdict": self.verdict(),
-            "counts": {light: self.count(light) for light in LIGHTS},
-            "resumed": self.resumed,
-            "robots": [row.to_dict() for row in self.rows],
-        }
-
     def to_frame(self) -> pd.DataFrame:
         """Gives a row per robot, worst first."""
         import pandas as pd
@@ -108,7 +103,5 @@ class FleetResult:
         Raises:
             InputError: a file is there, and force is not given.
         """
-        place = Path(folder)
-        text = json.dumps(self.to_dict(), indent=2, allow_nan=False)
-        write_atomic(place / RESULT, text + "\n", force=force)
-        write_atomic(place / TABLE, self.to_frame().to_csv(index=False), force=force)
+        super().save(folder, force=force)
+        write_atomic(Path(folder) / TABLE, self.to_frame().to_csv(index=False), force=force)

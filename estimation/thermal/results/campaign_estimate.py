@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from estimation.models.model import Model
 from estimation.thermal.results.estimate import ThermalEstimate
 from estimation.thermal.torque import ThermalTorqueModel
+from robots.common.records import Record
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -20,7 +21,7 @@ Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class CampaignEstimate:
+class CampaignEstimate(Record):
     """A torque model with heat, and the evidence for it.
 
     Attributes:
@@ -31,6 +32,8 @@ class CampaignEstimate:
         rounds: of the two fits' turns.
         notes: what a reader must know.
     """
+
+    ENTRIES = ("success", "residual_rms", "residual_without", "rounds", "notes", "thermal", "model=torque_model")
 
     torque_model: ThermalTorqueModel
     thermal: tuple[ThermalEstimate | None, ...]
@@ -85,18 +88,6 @@ class CampaignEstimate:
 
         frames = [fit.to_frame().assign(joint=j + 1) for j, fit in enumerate(self.thermal) if fit is not None]
         return pd.concat(frames)
-
-    def to_dict(self) -> dict[str, Any]:
-        """Writes the estimate as plain data."""
-        return {
-            "success": self.success,
-            "residual_rms": self.residual_rms.tolist(),
-            "residual_without": self.residual_without.tolist(),
-            "rounds": self.rounds,
-            "notes": list(self.notes),
-            "thermal": [None if fit is None else fit.to_dict() for fit in self.thermal],
-            "model": self.torque_model.to_dict(),
-        }
 
     def plot(self, ax: Axes | None = None) -> Axes:
         """Draws each joint's friction over that at T0 against time."""

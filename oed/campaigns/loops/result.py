@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass
-from typing import Any
+from dataclasses import dataclass
 
 from oed.campaigns.loops.state import Experiment, Verdict
 from robots.common.plain import several
+from robots.common.records import Record
 from robots.robot import Robot
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class LoopResult:
+class LoopResult(Record):
     """A loop that has ended.
 
     Attributes:
@@ -23,6 +23,18 @@ class LoopResult:
         success: whether nothing was ambiguous or unexplained at the end.
         duration: from the beginning of this start [s].
     """
+
+    ENTRIES = (
+        "robot=robot.name",
+        "place",
+        "folder",
+        "verdict=diagnosis.verdict",
+        "causes=diagnosis.causes",
+        "ended",
+        "success",
+        "duration",
+        "experiments",
+    )
 
     robot: Robot
     place: str
@@ -38,20 +50,6 @@ class LoopResult:
         last = self.experiments[-1].diagnosis
         assert last is not None
         return last
-
-    def to_dict(self) -> dict[str, Any]:
-        """Gives everything as plain data."""
-        return {
-            "robot": self.robot.name,
-            "place": self.place,
-            "folder": self.folder,
-            "verdict": self.diagnosis.verdict,
-            "causes": self.diagnosis.causes,
-            "ended": self.ended,
-            "success": self.success,
-            "duration": self.duration,
-            "experiments": [asdict(experiment) for experiment in self.experiments],
-        }
 
     def summary(self) -> str:
         """Gives the course in a few lines."""

@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from typing import Any
+from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 
 from robots.base_parameters import BaseParameters
-from robots.common.plain import finite
 from robots.limits import Limits, Margin, symmetric_margins
 from robots.plants import PlantEffect
 from robots.robot import Robot
@@ -84,22 +82,3 @@ def _rms_margins(motion: Motion, tau: Array, limits: Limits) -> list[Margin]:
         )
         for joint, (value, limit) in enumerate(zip(rms, limits.torque_rms, strict=True))
     ]
-
-
-def margin_data(margin: Margin, limits: Limits | None = None) -> dict[str, Any]:
-    """Writes a margin as plain data, with its unit if the limits are given; a limit that is not there is null."""
-    return {
-        "quantity": margin.quantity,
-        "joint": margin.joint,
-        **({} if limits is None else {"unit": limits.unit(margin.joint - 1, margin.quantity)}),
-        "value": margin.value,
-        "limit": finite(margin.limit),
-        "time": margin.time,
-        "slack_fraction": margin.slack_fraction,
-    }
-
-
-def margin_from(data: Mapping[str, Any]) -> Margin:
-    """Reads what `margin_data` wrote."""
-    known = {key: value for key, value in data.items() if key != "unit"}
-    return Margin(**{**known, "limit": np.inf if data["limit"] is None else data["limit"]})

@@ -123,17 +123,9 @@ def quality_section(qualities: tuple[Quality, ...]) -> Section:
     """Shows the information of each part on the parameters."""
     rows = []
     for quality in qualities:
-        data = quality.to_dict()
-        rows.append(
-            (
-                quality.label,
-                quality.samples,
-                data["cond_Y"],
-                None if data["cond_Y"] is None else data["cond_Y"] ** 2,
-                data["log_det_YtY"],
-                data["smallest_singular_value_Y"],
-            )
-        )
+        cond = quality.cond
+        squared = None if cond is None else cond**2
+        rows.append((quality.label, quality.samples, cond, squared, quality.log_det, quality.smallest))
     table = Table(
         headings=("part", "samples", "cond(Y)", "cond(Y'Y)", "log det(Y'Y)", "smallest singular value of Y"),
         rows=tuple(rows),
@@ -188,13 +180,12 @@ def parameters_section(names: tuple[str, ...], formulas: tuple[str, ...]) -> Sec
 
 
 def _facts(design: Design) -> tuple[Fact, ...]:
-    fourier, whole = design.optimised.to_dict(), design.whole.to_dict()
     value = design.optimised.value(design.criterion)
     tightest = min((m for m in design.margins if np.isfinite(m.limit)), key=lambda m: m.slack_fraction, default=None)
     facts = [
         Fact(label=f"Criterion {design.criterion.label}", value=value, note="of the optimised motion"),
-        Fact(label="cond(Y), optimised motion", value=fourier["cond_Y"]),
-        Fact(label="cond(Y), whole experiment", value=whole["cond_Y"]),
+        Fact(label="cond(Y), optimised motion", value=design.optimised.cond),
+        Fact(label="cond(Y), whole experiment", value=design.whole.cond),
         Fact(label="Parameters", value=design.base.size),
         Fact(label="Duration", value=f"{design.motion.duration:.1f} s"),
     ]
@@ -249,7 +240,7 @@ def excitation_findings(quality: Quality) -> tuple[Finding, ...]:
     Args:
         quality: of the whole motion.
     """
-    cond = quality.to_dict()["cond_Y"]
+    cond = quality.cond
     code = excitation_code(cond, quality.samples)
     if not code:
         return ()

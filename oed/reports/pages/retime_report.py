@@ -30,7 +30,7 @@ def save_retime_report(result: RetimedExperiment, given: Motion, folder: ResultF
 def retime_page(result: RetimedExperiment, given: Motion) -> Page:
     """Builds the page: gain and cost of the new timing."""
     robot, retimed = result.robot, result.retimed
-    before, after = result.before.to_dict()["cond_Y"], result.after.to_dict()["cond_Y"]
+    before, after = result.before.cond, result.after.cond
     name, joint, share = retimed.peak
     pictures = tuple(
         trajectory_picture(

@@ -136,7 +136,7 @@ def _change_points(result: MonitorResult) -> tuple[Section, ...]:
     if result.change_points is None:
         return ()
     rows: tuple[tuple[Cell, ...], ...] = tuple(
-        (joint, result.since(time), f"{percent:+.3g} %") for joint, time, percent in result.change_points.points
+        (point.joint, result.since(point.time), f"{point.percent:+.3g} %") for point in result.change_points
     )
     return (
         Section(

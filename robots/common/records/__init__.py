@@ -1,0 +1,8 @@
+"""Results as plain data: written, read back, and checked."""
+
+from robots.common.records.entries import entries_of, plain
+from robots.common.records.files import read_json, write_json
+from robots.common.records.reading import read, read_null_as
+from robots.common.records.record import Record, Result
+
+__all__ = ["Record", "Result", "entries_of", "plain", "read", "read_json", "read_null_as", "write_json"]
