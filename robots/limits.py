@@ -62,6 +62,12 @@ class Margin:
         return None if limits is None else limits.unit(self.joint - 1, self.quantity)
 
     @property
+    def text(self) -> str:
+        """Quantity, joint and time, such as "velocity of joint 3 at 1.204 s"."""
+        quantity = "position" if self.quantity in ("lower", "upper") else self.quantity
+        return f"{quantity} of joint {self.joint} at {self.time:.3f} s"
+
+    @property
     def slack(self) -> float:
         """The distance to the limit in the unit of the quantity, negative beyond it."""
         if self.quantity == "lower":

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from estimation.actuators.search import LoopFinding
 from robots.common.errors import InputError
-from robots.common.records import Result, read, read_json
+from robots.common.records import Finding, Result, findings_of, read, read_json
 from robots.drives import Drive
 from robots.robot import Robot
 
@@ -23,6 +23,8 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 
 MOTION = "motion.parquet"
+_UNEXPLAINED = 3.0
+"""A joint whose held-out error is so many times the median of all joints is named as unexplained."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -192,6 +194,69 @@ class Actuators(Result, format="robot-oed actuators"):
             {"name": name, "law": law, "values": values}
             for name, law, values in zip(self.joints, self.law, self.values, strict=True)
         ]
+
+    @property
+    def conclusion(self) -> str:
+        """How well the simulated motion is, as identified and as described."""
+        return (
+            f"The simulated motion misses the measured one by {1e3 * self.held_out_error:.3g} mrad on {self.held_out}; "
+            f"as described, by {1e3 * self.described_error:.3g} mrad."
+        )
+
+    @property
+    def remarks(self) -> tuple[Finding, ...]:
+        """Effects that were found, joints that stay unexplained, and what is not determined."""
+        found = [
+            Finding(
+                code="drives.effect",
+                subject=item.name,
+                text=f"{item.title}: {item.states}. Held-out error {1e3 * item.before:.3g} -> {1e3 * item.after:.3g} "
+                "mrad.",
+            )
+            for item in self.findings
+        ]
+        middle = float(np.median([error.held_out for error in self.errors]))
+        for error in self.errors:
+            if error.held_out > _UNEXPLAINED * middle and len(self.errors) > 1:
+                found.append(
+                    Finding(
+                        code="drives.unexplained",
+                        subject=error.name,
+                        text=f"{1e3 * error.held_out:.3g} mrad remain, with no effect of the catalogue to explain "
+                        "them.",
+                        action="look at its motion below; compare the joint with its like",
+                    )
+                )
+        open_ = self.undetermined
+        if open_:
+            names = ", ".join(value.name for value in open_[:6]) + (", ..." if len(open_) > 6 else "")
+            found.append(
+                Finding(
+                    code="drives.undetermined",
+                    text=f"The motion does not determine {len(open_)} of {len(self.parameters)} parameters: {names}.",
+                    action=self.next_motion,
+                )
+            )
+        return (*found, *findings_of("drives.note", self.notes))
+
+    @property
+    def next_motion(self) -> str:
+        """Says which motion would determine the rest."""
+        kinds = {value.parameter for value in self.undetermined}
+        parts = []
+        if kinds & {"armature", "delay"}:
+            parts.append("faster motion (steps, or sines of several Hz), which shows inertia and delay")
+        if kinds & {"viscous", "coulomb", "stribeck"}:
+            parts.append(
+                "constant speeds from slow to fast in both directions, which separate viscous and dry friction"
+            )
+        if kinds & {"torque_offset", "encoder_zero", "mass_factor"}:
+            parts.append("holds at poses with different gravity load")
+        if kinds & {"kp", "kd", "kv", "kr", "ki"}:
+            parts.append("a known payload, whose weight fixes the scale of gains")
+        if not parts:
+            return "All parameters are determined. To check them, play another motion and give its log as --held-out."
+        return f"Log a motion with {'; '.join(parts)}."
 
     def summary(self) -> str:
         """Lists errors of the simulated motion, findings, parameters, and what is not determined."""

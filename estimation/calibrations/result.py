@@ -16,7 +16,7 @@ from estimation.calibrations.selection import KindTrial
 from estimation.calibrations.undetermined import Undetermined
 from estimation.models.robot_in_file import build_robot, describe_robot
 from robots.common.errors import InputError
-from robots.common.records import Record, Result, read_json
+from robots.common.records import Finding, Record, Result, findings_of, read_json
 from robots.geometry_errors.terms import error_term
 from robots.geometry_errors.terms.base import shown_unit
 from robots.robot import Robot
@@ -217,6 +217,36 @@ class Calibration(Result, format="robot-oed calibration"):
         """
         unit, factor = SHOWN[self.unit]
         return f"{factor * value:.3g} {unit}"
+
+    @property
+    def conclusion(self) -> str:
+        """How well the calibrated robot predicts poses that it has not seen."""
+        levels = self.levels
+        if not levels.held_out < levels.before:
+            return "The poses do not support a calibration: the description predicts held-out poses as well."
+        return (
+            f"The calibrated robot predicts poses that it has not seen to {self.shown(levels.held_out)} instead of "
+            f"{self.shown(levels.before)}."
+        )
+
+    @property
+    def remarks(self) -> tuple[Finding, ...]:
+        """Doubts, causes, and poses that were left out."""
+        found = list(findings_of("calibration.doubtful", self.warnings))
+        found += [
+            Finding(code="calibration.cause", text=cause["sentence"], action=cause.get("action", ""))
+            for cause in self.causes.get("findings", ())
+        ]
+        found += [
+            Finding(
+                code="calibration.outlier",
+                subject=f"Pose {item.pose}:",
+                text=f"line {item.line} of the file is off by {self.shown(item.error)}; it was left out.",
+                action="Measure it again, or remove it.",
+            )
+            for item in self.outliers
+        ]
+        return tuple(found)
 
     def summary(self) -> str:
         """Lists errors before and after, what was fitted, and what is left open."""

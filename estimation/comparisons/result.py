@@ -19,7 +19,7 @@ from estimation.comparisons.merging import MergedModel
 from estimation.comparisons.part_names import grouped, listed
 from estimation.comparisons.payload_differences import PayloadDifference
 from estimation.comparisons.runs import Run
-from robots.common.records import Result, plain
+from robots.common.records import Finding, Result, findings_of, plain
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -148,6 +148,36 @@ class ModelComparison(Result, format="robot-oed comparison", shares=("labels", "
                 for joint, change in changes.items()
             ),
         )
+
+    @property
+    def conclusion(self) -> str:
+        """What differs."""
+        return self.verdict()
+
+    @property
+    def remarks(self) -> tuple[Finding, ...]:
+        """Changes of one joint alone, payloads, parts that differ, and warnings."""
+        found = [
+            Finding(
+                code="difference.joint",
+                subject=f"{self.labels[item.run]}:",
+                text=item.sentence(),
+            )
+            for item in self.damaged
+        ]
+        found += [
+            Finding(code="difference.payload", subject=f"{self.labels[item.run]}:", text=item.sentence(self.labels))
+            for item in self.payloads
+        ]
+        runs: dict[str, list[str]] = {}
+        for run in range(1, len(self.runs)):
+            for name in self.parts(run):
+                runs.setdefault(name, []).append(self.labels[run])
+        found += [
+            Finding(code="difference", subject=f"{name}:", text=f"differs from {self.labels[0]} in {', '.join(those)}.")
+            for name, those in runs.items()
+        ]
+        return (*found, *findings_of("comparison.note", self.warnings))
 
     def verdict(self) -> str:
         """Says in one or two sentences what differs."""

@@ -9,6 +9,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from robots.common.records import Record, read_null_as
+from robots.terms.effects import EFFECTS
 
 # Number of parameters of one finding that a summary lists.
 MOST_LISTED = 8
@@ -113,6 +114,16 @@ class Finding(Record):
     coordinate: str = ""
     pattern: str = ""
     measured_by: str = ""
+
+    @property
+    def named(self) -> bool:
+        """Whether it is an effect of the catalogue, not a pattern without a known cause."""
+        return self.effect in EFFECTS
+
+    @property
+    def title(self) -> str:
+        """What it is, in words."""
+        return EFFECTS[self.effect].title if self.named else "a pattern without a known cause"
 
     @property
     def elsewhere(self) -> str:

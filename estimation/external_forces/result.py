@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from estimation.external_forces.contacts import Contact
 from estimation.external_forces.thresholds.calibrations import Calibration
 from robots.common.plain import percent
-from robots.common.records import Result
+from robots.common.records import Finding, Result, findings_of
 from robots.common.tables.table_files import write_table
 
 if TYPE_CHECKING:
@@ -95,6 +95,33 @@ class ForceEstimate(Result, format="robot-oed forces", version=2):
         rate = "the false-alarm rate is the model's claim: no healthy log tests it" if check is None else check.text()
         share = percent(float(self.extrapolates.mean()))
         return f"{rate}\n{share} of the samples extrapolate from the fitted motions: the threshold is higher there"
+
+    @property
+    def conclusion(self) -> str:
+        """Whether there is a contact, and which is the largest."""
+        largest = max(self.contacts, key=lambda contact: contact.magnitude, default=None)
+        if largest is None:
+            return "No contact was found in this log."
+        count, alone = len(self.contacts), len(self.contacts) == 1
+        return (
+            f"Check the robot's surroundings: {'one contact' if alone else f'{count} contacts'}, "
+            f"{'at' if alone else 'the largest at'} {largest.start:.4g} s with {largest.magnitude:.3g} N at the tool."
+        )
+
+    @property
+    def remarks(self) -> tuple[Finding, ...]:
+        """The contacts, and warnings."""
+        contacts = (
+            Finding(
+                code="contact",
+                subject=f"{contact.start:.4g} s:",
+                text=f"contact at {contact.place.text(self.joint_names)}, {contact.magnitude:.3g} N, for "
+                f"{contact.end - contact.start:.2g} s.",
+                action="Check what the robot touched.",
+            )
+            for contact in self.contacts
+        )
+        return (*contacts, *findings_of("force.note", self.warnings))
 
     def summary(self) -> str:
         """Says what was found, a line per contact."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import chain, repeat
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -12,8 +13,8 @@ from numpy.typing import NDArray
 from estimation.gate import GateReport
 from estimation.identifications.choices import Choice
 from estimation.models.model import Model
-from robots.common.plain import percent
-from robots.common.records import Record
+from robots.common.plain import percent, place_of
+from robots.common.records import Finding, Result
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -76,7 +77,7 @@ class JointFit:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Estimate(Record):
+class Estimate(Result):
     """An identified model and the evidence for it.
 
     Attributes:
@@ -174,6 +175,35 @@ class Estimate(Record):
         if self.dropped_rows:
             rows = "row repeats" if self.dropped_rows == 1 else "rows repeat"
             found.append(f"{self.dropped_rows} {rows} an old position (ignored).")
+        return tuple(found)
+
+    @property
+    def conclusion(self) -> str:
+        """What to do with the model, in one sentence."""
+        lost = [joint.joint for joint in self.joints if not joint.identified]
+        if lost:
+            return f"Record more motion of {place_of(lost)} and identify again: these logs do not determine it."
+        if self.choice.contradiction is not None:
+            return "State the payload or base of each log, or run oed diagnose: the logs contradict each other."
+        error = 100 * np.median([joint.nrmse for joint in self.joints])
+        return f"Use model.json: it predicts held-out torque to {error:.1f} % of the torque RMS (median joint)."
+
+    @property
+    def remarks(self) -> tuple[Finding, ...]:
+        """What the estimate warns of, and the findings in its logs."""
+        # `Estimate.warnings` begins with these three, as far as they apply, in this order.
+        urgent = (
+            ("joint.not_identified", not all(joint.identified for joint in self.joints)),
+            ("logs.contradict", self.choice.contradiction is not None),
+            ("parameters.undetermined", not self.model.determined.all()),
+        )
+        codes = chain((code for code, applies in urgent if applies), repeat("model.warning"))
+        found = [Finding(code=code, text=text) for code, text in zip(codes, self.warnings, strict=False)]
+        found += [
+            Finding(code=f"log.{finding.severity}", subject=f"{gate.log}:", text=f"{finding}.")
+            for gate in self.gates
+            for finding in gate.findings
+        ]
         return tuple(found)
 
     def summary(self) -> str:

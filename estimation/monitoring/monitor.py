@@ -213,8 +213,8 @@ class Monitor(Record, format="robot-oed monitor", whole=True):
             InputError: a missing or damaged file.
         """
         remedy = "start the monitor anew from the logs"
-        data = read_json(path, cls.FORMAT, cls.FORMAT_VERSION, remedy=remedy)
         try:
+            data = read_json(path, cls.FORMAT, cls.FORMAT_VERSION, remedy=remedy)
             found = cls(
                 baseline_of(model_from_dict(data["model"]), data["model"]), read(MonitorSettings, data["settings"])
             )
@@ -228,7 +228,7 @@ class Monitor(Record, format="robot-oed monitor", whole=True):
             if data["evaluation"] is not None:
                 found._evaluation = Evaluation.restored(data["evaluation"], found.baseline, found.settings)
         except (InputError, AttributeError, KeyError, TypeError, ValueError) as e:
-            raise InputError(
-                f"is not a state of a monitor, or is damaged ({type(e).__name__}: {e})", file=path, remedy=remedy
-            ) from e
+            reason = e.problem if isinstance(e, InputError) else f"{type(e).__name__}: {e}"
+            problem = f"is not a state of a monitor, or is damaged ({reason})"
+            raise InputError(problem, file=path, remedy=remedy) from e
         return found

@@ -14,7 +14,8 @@ from estimation.monitoring.change_points import ChangePoint, find_change_points
 from estimation.monitoring.findings import LIGHTS, Finding, Severity, when, worst
 from estimation.monitoring.log_row import UNFIT, LogRow
 from robots.common.files import write_atomic
-from robots.common.records import Result
+from robots.common.records import Finding as Remark
+from robots.common.records import Result, findings_of
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -148,6 +149,27 @@ class MonitorResult(Result, format="robot-oed monitoring", shares=("origin",)):
         if self.headline is not None:
             return self.headline.advice()
         return "Check which robot this log belongs to." if self.undecided else ""
+
+    @property
+    def conclusion(self) -> str:
+        """What to do about the most urgent findings."""
+        urgent = [f for f in self.findings if f.severity == self.severity != "info"]
+        if not urgent:
+            return "No change beyond what temperature explains."
+        return " ".join(dict.fromkeys(finding.advice() for finding in urgent))
+
+    @property
+    def remarks(self) -> tuple[Remark, ...]:
+        """The findings, logs that were left out, and notes."""
+        found = (
+            Remark(code=f"change.{f.severity}", text=f.sentence(self.origin), action=f.advice()) for f in self.findings
+        )
+        left_out = (
+            Remark(code="log.left_out", subject=f"{row.name}:", text=f"left out: {row.note}")
+            for row in self.logs
+            if not row.used
+        )
+        return (*found, *left_out, *findings_of("monitor.note", self.notes))
 
     def verdict(self) -> str:
         """Says in some sentences what was found, and how much temperature explains."""

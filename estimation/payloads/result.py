@@ -15,7 +15,7 @@ from estimation.payloads.body import DAMAGED, FORMAT, FORMAT_VERSION, Body, body
 from estimation.payloads.determination import determined
 from estimation.payloads.intervals import Quantity, quantities
 from robots.common.plain import two_digits
-from robots.common.records import Result
+from robots.common.records import Finding, Result, findings_of
 from robots.terms.situations.sensitivities import moved_body
 
 if TYPE_CHECKING:
@@ -162,6 +162,23 @@ class PayloadEstimate(Result, format=FORMAT, version=FORMAT_VERSION):
     def seen_from(self, pose: ArrayLike) -> PayloadEstimate:
         """Gives the result in a frame with this pose (4, 4) in the flange frame."""
         return replace(self, frame=np.asarray(pose, dtype=float))
+
+    @property
+    def conclusion(self) -> str:
+        """What to enter as the payload, or the largest that there may be."""
+        if not self.found:
+            return f"No payload was found: {self.limit}."
+        mass, *centre = self.quantities[:4]
+        widest = max(centre, key=lambda item: item.half_width)
+        return (
+            f"Set the payload to {mass.text} kg ({mass.interval_text}); its centre of mass is known to "
+            f"{1000 * widest.half_width:.2g} mm or better."
+        )
+
+    @property
+    def remarks(self) -> tuple[Finding, ...]:
+        """Its warnings."""
+        return findings_of("payload.uncertain", self.warnings)
 
     def summary(self) -> str:
         """Lists the quantities with their 95 % intervals, the torque errors, and warnings."""

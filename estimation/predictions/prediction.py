@@ -22,7 +22,7 @@ from estimation.regressions.preparation import torque_of
 from estimation.regressions.torque_meanings import as_joint_torque
 from robots.common.errors import InputError
 from robots.common.plain import joints_in_words, percent
-from robots.common.records import Record
+from robots.common.records import Finding, Result, findings_of
 from robots.common.tables.table_files import write_table
 from robots.signals import Log, Motion
 
@@ -39,7 +39,7 @@ MOSTLY = 0.5
 
 
 @dataclass(frozen=True, kw_only=True)
-class Prediction(Record):
+class Prediction(Result):
     """Torques of a motion.
 
     Attributes:
@@ -151,6 +151,26 @@ class Prediction(Record):
         if scale is None:
             return error
         return np.divide(error, scale, out=np.full_like(error, np.nan), where=scale > 0)
+
+    @property
+    def conclusion(self) -> str:
+        """How well the model predicts the motion, where torque was logged."""
+        if self.measured is None:
+            return "The torques are predicted; the log has none to compare with."
+        return f"The model predicts this motion to {100 * np.median(self.nrmse):.1f} % of the torque RMS (median)."
+
+    @property
+    def remarks(self) -> tuple[Finding, ...]:
+        """What extrapolates, and what the gate found."""
+        share = self.extrapolated
+        texts = []
+        if share is not None and share.any():
+            texts = [f"{percent(float(share.mean()))} of the torques extrapolate: the fit has seen no such motion."]
+        gate = () if self.gate is None else self.gate.findings
+        return (
+            *findings_of("prediction.extrapolates", (*texts, *self.beyond)),
+            *(Finding(code=f"log.{finding.severity}", text=f"{finding}.") for finding in gate),
+        )
 
     def summary(self) -> str:
         """Gives the error per joint, where torque was logged."""

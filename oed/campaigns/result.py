@@ -19,12 +19,13 @@ from oed.campaigns.programme import Programme
 from oed.campaigns.stages import Stage
 from oed.campaigns.timetable import Slot
 from oed.experiments.results.planned import OF_ROBOT, Planned
-from oed.experiments.safety_checks.freedom import freedom_text
+from oed.experiments.safety_checks.freedom import collides, freedom_text
+from oed.experiments.safety_checks.margins import assumption_findings
 from oed.exports import read_trajectory, write_trajectory
 from robots.collision import Surroundings
 from robots.common.errors import InputError
 from robots.common.files import existing_file, sha256
-from robots.common.records import plain, read, write_json
+from robots.common.records import Finding, findings_of, plain, read, write_json
 from robots.loading import load_robot
 from robots.robot import Robot
 from robots.thermal import KnownThermal, SecondOrder
@@ -174,6 +175,52 @@ class Campaign(Planned, format="robot-oed campaign", tool=True):
         """
         torque = TorqueCheck(self.robot, self.torque_margin)
         return tuple(checked(stage, self.robot, self.home, torque) for stage in self.stages)
+
+    @property
+    def conclusion(self) -> str:
+        """Whether to play the campaign, and how."""
+        codes = {finding.code for finding in self.remarks}
+        if "limit.exceeded" in codes:
+            return "Do not play this campaign: at least one stage exceeds a limit."
+        if "collision.found" in codes:
+            return "Do not play this campaign before its collisions are checked."
+        return (
+            f"Play {len(self.stages)} files in {self.cycles} cycles by the timetable below, "
+            f"{self.duration / 60:.1f} min in all."
+        )
+
+    @property
+    def remarks(self) -> tuple[Finding, ...]:
+        """Limits that are exceeded, collisions, notes, and what was assumed."""
+        found = [
+            Finding(
+                code="limit.exceeded",
+                subject=f"{stage.name}, joint {margin.joint}:",
+                text=f"the limit of {margin.quantity} is exceeded at {margin.time:.3f} s.",
+                action="Do not play it.",
+            )
+            for stage in self.stages
+            for margin in stage.margins
+            if margin.violated
+        ]
+        colliding = []
+        for stage in self.stages:
+            if collides(stage.freedom):
+                text = freedom_text(stage.freedom)
+                action = (
+                    "Design it again with oed design, which avoids collisions."
+                    if stage.kind == "excitation"
+                    else "Check it first."
+                )
+                found.append(Finding(code="collision.found", subject=f"{stage.name}:", text=text, action=action))
+                colliding.append(stage.name)
+        if self.success:
+            text = "Every stage respects all limits, and starts and ends at rest in the home pose."
+            found += findings_of("done", [text])
+        # The notes say the same of collisions.
+        own = tuple(f"COLLISION in the {name} stage" for name in colliding)
+        notes = [note for note in self.notes if not (own and note.startswith(own))]
+        return (*found, *findings_of("experiment.note", notes), *assumption_findings(self.robot))
 
     def summary(self) -> str:
         """Lists the stages, the expected heating, and notes."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import combinations_with_replacement
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -14,9 +14,10 @@ from numpy.typing import NDArray
 from oed.criteria import Blend, Criterion
 from oed.criteria import criterion as choose_criterion
 from oed.experiments.designing import design
+from oed.experiments.quality import excitation_findings
 from oed.experiments.results.result import Design
 from robots.common.errors import InputError
-from robots.common.records import Result
+from robots.common.records import Finding, Result
 from robots.robot import Robot
 
 if TYPE_CHECKING:
@@ -86,6 +87,34 @@ class ParetoFront(Result, format="robot-oed pareto front"):
         data |= {name: self.values[:, k] for k, name in enumerate(names)}
         index = pd.RangeIndex(1, len(self.designs) + 1, name="point")
         return pd.DataFrame({**data, "efficient": self.efficient}, index=index)
+
+    @property
+    def conclusion(self) -> str:
+        """How many designs there are to choose from."""
+        return (
+            f"Choose one of {int(self.efficient.sum())} Pareto-optimal designs, of {len(self.designs)}: no other "
+            "design is better in every criterion."
+        )
+
+    @property
+    def remarks(self) -> tuple[Finding, ...]:
+        """What single designs do not determine, and limits that they exceed."""
+        found = [
+            replace(finding, subject=f"Point {point}:")
+            for point, design in enumerate(self.designs, start=1)
+            for finding in excitation_findings(design.whole)
+        ]
+        found += [
+            Finding(
+                code="limit.exceeded",
+                subject=f"Point {point}:",
+                text=f"the motion exceeds {len(design.violated)} limits.",
+                action="Do not play it.",
+            )
+            for point, design in enumerate(self.designs, start=1)
+            if design.violated
+        ]
+        return tuple(found)
 
     def summary(self) -> str:
         """Lists the designs with their criteria."""

@@ -12,8 +12,8 @@ from datetime import UTC, datetime
 from pathlib import Path
 
 from oed.overviews.kinds import BY_NAME, Figure, Reading, read_kind
-from oed.reports.rendering.severity import ORDER, Level, severity
 from robots.common.errors import InputError
+from robots.common.records.findings import ORDER, Level, severity
 
 LARGEST = 64_000_000
 """Files above this size [bytes] are not read."""

@@ -8,10 +8,11 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from estimation.diagnosis.results.standing import standing_of, standing_verdict
+from oed.experiments.quality import excitation_code
 from oed.experiments.safety_checks.freedom import collides, freedom_text
-from oed.reports.pages.design_report import excitation_code
-from oed.reports.rendering.severity import LEVELS
 from robots.common.plain import two_digits
+from robots.common.records import effect_code
+from robots.terms.effects import EFFECTS
 
 Figure = float | str | None
 Data = Mapping[str, Any]
@@ -139,7 +140,7 @@ def _diagnosis(data: Data) -> Reading:
         "ambiguous": "Several causes fit",
         "unexplained": "Part of the residual has no known cause",
     }[verdict]
-    known = [f"effect.{f['effect']}" for f in findings if f"effect.{f['effect']}" in LEVELS]
+    known = [effect_code(f["effect"]) for f in findings if f["effect"] in EFFECTS]
     before, after = ([math.nan if x is None else x for x in data[part]["nrmse"]] for part in ("baseline", "extended"))
     standing, forbidden = standing_of(verdict, before, after), standing_verdict(verdict, before, after)
     codes = [*(known if standing != "unconfirmed" else []), *([f"diagnosis.{standing}"] if standing != "sound" else [])]
@@ -177,7 +178,7 @@ def _monitoring(data: Data) -> Reading:
     return Reading(
         kind="monitoring",
         verdict=data["verdict"],
-        codes=(*(f"change.{f['kind']}" for f in data["findings"]), "done"),
+        codes=(*(f"change.{f['severity']}" for f in data["findings"]), "done"),
         figures={"changes": len(data["findings"]), "hours": data["hours"]},
         robot=_robot(data),
     )

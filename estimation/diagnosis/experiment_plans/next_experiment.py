@@ -21,6 +21,7 @@ from estimation.diagnosis.experiment_plans.choices import (
     Choice,
     Proposal,
     combined,
+    experiment_words,
     make_choice,
     repeat_stages,
     repeated,
@@ -76,6 +77,11 @@ class NextExperiment(Record):
     times: int = 1
     logged: str = ""
     kinds: tuple[str, ...] = ()
+
+    @property
+    def words(self) -> str:
+        """What the robot does, and how often."""
+        return experiment_words(self.kind, self.times)
 
     @property
     def all_kinds(self) -> tuple[str, ...]:

@@ -12,12 +12,14 @@ from numpy.typing import NDArray
 from estimation.diagnosis.experiment_plans.detection_limits import Limit, summarise_limits
 from estimation.diagnosis.experiment_plans.next_experiment import NextExperiment
 from estimation.diagnosis.findings import Finding, list_parameters
-from estimation.diagnosis.results.standing import standing_text, standing_verdict
+from estimation.diagnosis.results.actions import action_for, close_causes, sentence_for
+from estimation.diagnosis.results.standing import standing_of, standing_text, standing_verdict
 from estimation.diagnosis.results.verdict_text import close_rivals, format_p_value, state_verdict
 from estimation.diagnosis.simulations.simulation_result import Simulation
 from estimation.diagnosis.validations.prediction_settings import all_row_errors
 from estimation.models.model import Model, load_model
-from robots.common.records import Result, read, read_json
+from robots.common.records import Finding as Remark
+from robots.common.records import Result, effect_code, findings_of, read, read_json
 from robots.terms.base import length_unit
 
 if TYPE_CHECKING:
@@ -126,6 +128,66 @@ class Diagnosis(Result):
         `baseline` and `extended` leave out rows in which a joint's direction of motion is not known.
         """
         return all_row_errors(self.model)
+
+    @property
+    def _errors(self) -> tuple[Array, Array, Array]:
+        return self.baseline, self.extended, self.every_row
+
+    @property
+    def conclusion(self) -> str:
+        """What to do, in a sentence or two."""
+        forbidden = standing_verdict(self.verdict, *self._errors, self.limits)
+        following = "" if self.next_experiment is None else self.next_experiment.words
+        if forbidden:
+            return f"{forbidden} Record {following} and diagnose again." if following else forbidden
+        if self.verdict == "none":
+            return "No missing effect was found: use the model as it is."
+        if self.verdict == "named":
+            known = sentence_for((finding.effect, finding.joint) for finding in self.findings)
+            return f"{known} {self.findings[0].sentence}" if len(self.findings) == 1 else known
+        # A free function does not name a cause, whatever its gain.
+        helps = any(finding.gain.ci95[0] > 0 and finding.named for finding in self.findings)
+        why = "part of the error has no known cause" if helps else "no effect of the catalogue explains the residual"
+        if self.verdict == "ambiguous":
+            why = "several causes fit"
+        if following:
+            return f"Record {following} and diagnose again: {why}."
+        return f"Check logs and robot: {why}, and no known experiment finds it."
+
+    @property
+    def remarks(self) -> tuple[Remark, ...]:
+        """Effects, unexplained residuals, close rivals and notes."""
+        standing = standing_of(self.verdict, *self._errors)
+        confirmed = standing != "unconfirmed"
+        found = [
+            Remark(
+                code="diagnosis.unexplained"
+                if not finding.named
+                else effect_code(finding.effect)
+                if confirmed
+                else "diagnosis.note",
+                subject=f"{finding.title[:1].upper()}{finding.title[1:]}:",
+                text=finding.sentence,
+                action=action_for(finding.effect, [finding.joint]) if finding.named and confirmed else "",
+            )
+            for finding in self.findings
+        ]
+        if standing != "sound":
+            text = standing_text(self.verdict, *self._errors, self.limits)
+            found += findings_of(f"diagnosis.{standing}", [text])
+        found += findings_of("diagnosis.unexplained", [f.sentence for f in self.findings if f.pattern])
+        if self.verdict == "unexplained" and not any(item.code == "diagnosis.unexplained" for item in found):
+            found += findings_of("diagnosis.unexplained", ["Part of the residual is not noise and has no known cause."])
+        if self.verdict == "ambiguous":
+            texts = [
+                f"{f.title[:1].upper()}{f.title[1:]} explains the logs hardly better than {', '.join(close_causes(f))}."
+                for f in self.findings
+                if close_causes(f)
+            ]
+            found += findings_of("diagnosis.ambiguous", texts or ["Several causes explain the logs about as well."])
+        seen = summarise_limits(self.limits) if self.verdict == "none" else ""
+        done = [f"{seen}."] if seen else []
+        return (*found, *findings_of("diagnosis.note", self.notes), *findings_of("done", done))
 
     def summary(self) -> str:
         """Returns the verdict, findings, held-out errors, simulation, next experiment and notes as text."""

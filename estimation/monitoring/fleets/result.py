@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 from estimation.monitoring.fleets.robot_row import LIGHTS, RobotRow
 from robots.common.files import write_atomic
-from robots.common.records import Result
+from robots.common.records import Finding, Result
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -47,6 +47,20 @@ class FleetResult(Result, format="robot-oed fleet"):
     def light(self) -> str:
         """The worst light."""
         return self.rows[0].light
+
+    @property
+    def conclusion(self) -> str:
+        """How many robots need what, and with which one to begin."""
+        worst = self.rows[0]
+        return f"{self.verdict()} Begin with {worst.name}. {worst.advice}" if worst.advice else self.verdict()
+
+    @property
+    def remarks(self) -> tuple[Finding, ...]:
+        """One of each robot."""
+        return tuple(
+            Finding(code=f"fleet.{row.light}", subject=f"{row.name}:", text=row.text, action=row.advice)
+            for row in self.rows
+        )
 
     def verdict(self) -> str:
         """Says in one sentence how many robots need what."""

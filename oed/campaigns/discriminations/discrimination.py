@@ -15,17 +15,20 @@ from estimation.diagnosis.hypothesis_tests.power import resolving_energy
 from oed.campaigns.discriminations.motions import Run
 from oed.experiments.results.design_file import TRAJECTORY
 from oed.experiments.results.planned import OF_ROBOT, Planned
-from oed.experiments.safety_checks.freedom import freedom_of, freedom_text
+from oed.experiments.safety_checks.freedom import freedom_findings, freedom_of, freedom_text, is_free
 from oed.experiments.safety_checks.margins import missing_limits
 from oed.exports import write_trajectory
 from robots.collision import Surroundings
 from robots.common.plain import percent
-from robots.common.records import Record
+from robots.common.records import Finding, Record, findings_of
 from robots.robot import Robot
 from robots.signals import Motion
 from robots.version import VERSION
 
 Array = NDArray[np.float64]
+
+_SURE = 0.95
+"""Chance from which an experiment counts as sure."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -233,6 +236,22 @@ class Discrimination(
             )
         notes.append("Collisions are not checked.")
         return tuple(notes)
+
+    @property
+    def conclusion(self) -> str:
+        """What the experiment distinguishes, and whether to play it."""
+        warning = "" if is_free(self.freedom) else "Do not play these motions. "
+        return f"{warning}{self.why}. {freedom_text(self.freedom)}"
+
+    @property
+    def remarks(self) -> tuple[Finding, ...]:
+        """What is not known of collisions, conditions, and how sure the decision is."""
+        text = f"The experiment gives the right decision with {100 * self.resolves:.0f} % probability only."
+        return (
+            *freedom_findings(self.freedom),
+            *findings_of("experiment.note", self.warnings),
+            *findings_of("experiment.unsure", [text] if self.resolves < _SURE else []),
+        )
 
     def save(self, folder: str | Path, *, force: bool = False) -> None:
         """Writes the trajectories and `design.json`.

@@ -4,14 +4,16 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from oed.campaigns.loops.state import Experiment, Verdict
+from estimation.diagnosis.results.actions import action_for
+from oed.campaigns.loops.state import Experiment, Verdict, name_of
 from robots.common.plain import several
-from robots.common.records import Record
+from robots.common.records import Finding, Result, effect_code, findings_of
 from robots.robot import Robot
+from robots.terms.effects import EFFECTS
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class LoopResult(Record):
+class LoopResult(Result):
     """A loop that has ended.
 
     Attributes:
@@ -50,6 +52,28 @@ class LoopResult(Record):
         last = self.experiments[-1].diagnosis
         assert last is not None
         return last
+
+    @property
+    def conclusion(self) -> str:
+        """Why the loop ended."""
+        return f"{self.ended[:1].upper()}{self.ended[1:]}."
+
+    @property
+    def remarks(self) -> tuple[Finding, ...]:
+        """The findings of the last diagnosis, and whether the loop ended early."""
+        found = [
+            Finding(
+                code=effect_code(item["effect"]) if item["effect"] in EFFECTS else "diagnosis.unexplained",
+                subject=f"{name_of(item)}:",
+                text=str(item.get("sentence", "")),
+                action=action_for(item["effect"], [item["joint"]]) if item["effect"] in EFFECTS else "",
+            )
+            for item in self.diagnosis.findings
+        ]
+        return (
+            *found,
+            *findings_of("loop.unfinished", [] if self.success else [f"The loop ended early: {self.ended}."]),
+        )
 
     def summary(self) -> str:
         """Gives the course in a few lines."""

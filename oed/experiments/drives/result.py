@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from oed.exports.trajectory_checks import UNKNOWN_COLLISIONS
 from robots.common.errors import InputError
 from robots.common.files import existing_file
-from robots.common.records import Result, read_json
+from robots.common.records import Finding, Result, findings_of, read_json
 from robots.common.tables.table_files import write_table
 
 if TYPE_CHECKING:
@@ -89,6 +89,18 @@ class DriveDesign(Result, format="robot-oed drive design"):
     def ratio(self) -> float:
         """Median over the parameters of the standard error over that of a chirp."""
         return float(np.nanmedian([item.ratio for item in self.expected]))
+
+    @property
+    def conclusion(self) -> str:
+        """Whether to play the motion, and what it is worth beside a chirp."""
+        if self.collides:
+            return f"Do not play this motion. {self.collisions}"
+        return f"Standard errors will be {self.ratio:.2g} times those of a chirp of the same time and limits."
+
+    @property
+    def remarks(self) -> tuple[Finding, ...]:
+        """What was checked for collisions."""
+        return findings_of("experiment.note", [self.collisions])
 
     def summary(self) -> str:
         """Lists segments and expected standard errors, beside those of a chirp."""

@@ -14,7 +14,7 @@ from oed.experiments.pose_designs.observability import observability_indices
 from oed.experiments.results.planned import OF_ROBOT, Planned
 from oed.experiments.safety_checks.freedom import freedom_text, is_free
 from oed.exports import write_trajectory
-from robots.common.records import read, read_json
+from robots.common.records import Finding, findings_of, read, read_json
 from robots.common.tables.table_files import write_table
 from robots.geometry_errors.terms import ErrorParameter
 from robots.robot import Robot
@@ -120,6 +120,25 @@ class PoseDesign(Planned, format="robot-oed pose design", tool=True):
     def success(self) -> bool:
         """Whether all poses are reached and the moves are proved free of collisions."""
         return self.left_out == 0 and (self.freedom is None or is_free(self.freedom))
+
+    @property
+    def conclusion(self) -> str:
+        """How well the calibrated robot is expected to predict."""
+        unit, factor = SHOWN[self.unit]
+        return (
+            f"Measured at these {len(self.q)} poses, the calibrated robot is expected to be right to "
+            f"{factor * self.prediction:.3g} {unit}, if the kinds of errors are these and the noise is as stated."
+        )
+
+    @property
+    def remarks(self) -> tuple[Finding, ...]:
+        """What is not known of collisions, and poses that were left out."""
+        code = "collision.unchecked" if self.freedom is None else "collision.found"
+        text = f"{self.left_out} poses were left out: no free move reaches them."
+        return (
+            *findings_of(code, [] if is_free(self.freedom) else [freedom_text(self.freedom)]),
+            *findings_of("experiment.note", [text] if self.left_out else []),
+        )
 
     def summary(self) -> str:
         """Says how good the poses are, what errors to expect, and whether the moves are free."""

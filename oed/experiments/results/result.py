@@ -11,17 +11,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from oed.criteria import Criterion
-from oed.experiments.quality import Quality
+from oed.experiments.quality import Quality, excitation_findings
 from oed.experiments.results.design_file import TRAJECTORY, read_design
 from oed.experiments.results.outcome import Outcome
 from oed.experiments.results.planned import OF_ROBOT, Planned
 from oed.experiments.results.views import motion_frame, plot_velocities
-from oed.experiments.safety_checks.freedom import freedom_text, is_free
-from oed.experiments.safety_checks.margins import measured_margins
+from oed.experiments.safety_checks.freedom import freedom_findings, freedom_text, is_free
+from oed.experiments.safety_checks.margins import assumption_findings, measured_margins
 from oed.experiments.safety_checks.spatial_check import SpatialMargin
 from oed.experiments.searches.search import INTERRUPTED
 from oed.exports import write_trajectory
 from robots.base_parameters import BaseParameters
+from robots.common.records import Finding, findings_of
 from robots.limits import Margin
 from robots.plants import PlantEffect
 from robots.robot import Robot
@@ -184,6 +185,45 @@ class Design(Planned, format="robot-oed design", tool=True, shares=("limits=robo
     def check(self) -> tuple[Margin, ...]:
         """Computes all margins from the samples of the motion, independently of the solver."""
         return measured_margins(self.robot, self.motion, self.base, [e for e in self.effects if e.static])
+
+    @property
+    def conclusion(self) -> str:
+        """Whether to play the motion, and what it determines."""
+        codes = {finding.code for finding in self.remarks}
+        if "limit.exceeded" in codes:
+            return f"Do not play this motion: it exceeds the limit of {self.violated[0].text}."
+        if codes & {"collision.found", "collision.unchecked"}:
+            return f"Do not play this motion. {freedom_text(self.freedom)}"
+        if codes & {"excitation.incomplete", "excitation.weak"}:
+            return "Design the experiment again: this motion does not determine all parameters."
+        return (
+            f"Play trajectory.csv on the robot: in {self.motion.duration:.0f} s it determines all {self.base.size} "
+            f"base parameters within all limits. {freedom_text(self.freedom)}"
+        )
+
+    @property
+    def remarks(self) -> tuple[Finding, ...]:
+        """Limits that are exceeded, what is not determined, and what was assumed or not checked."""
+        robot = self.robot
+        found = [
+            Finding(
+                code="limit.exceeded",
+                subject=f"Joint {margin.joint}:",
+                text=f"the motion exceeds the limit of {margin.text}.",
+                action="Do not play it.",
+            )
+            for margin in self.violated
+        ]
+        found += excitation_findings(self.whole)
+        found += assumption_findings(robot)
+        if not any(margin.quantity == "torque" for margin in self.margins):
+            text = "Torque limits were not checked: the robot's description lacks nominal dynamics or torque limits."
+            found += findings_of("torque.unchecked", [text])
+        found += freedom_findings(self.freedom)
+        if self.strokes_left_out:
+            joints = ", ".join(str(joint) for joint in self.strokes_left_out)
+            found += findings_of("stroke.left_out", [f"No velocity stroke for joints {joints}: the arm would collide."])
+        return tuple(found)
 
     def summary(self) -> str:
         """Describes the experiment, its quality and its margins in a few lines."""

@@ -12,19 +12,19 @@ import numpy as np
 from numpy.typing import NDArray
 
 from oed.criteria import CRITERIA
-from oed.experiments.quality import Quality, design_model
+from oed.experiments.quality import Quality, design_model, excitation_findings
 from oed.experiments.results.design_file import DESIGN, TRAJECTORY
 from oed.experiments.results.planned import OF_ROBOT, Planned
 from oed.experiments.results.views import motion_frame, plot_velocities
-from oed.experiments.safety_checks.freedom import collides, freedom_text
-from oed.experiments.safety_checks.margins import measured_margins
+from oed.experiments.safety_checks.freedom import collides, freedom_findings, freedom_text, is_free
+from oed.experiments.safety_checks.margins import assumption_findings, measured_margins
 from oed.exports import read_trajectory, write_trajectory
 from oed.retiming import Retimed
 from robots.base_parameters import BaseParameters, find_base_parameters
 from robots.common.errors import InputError
 from robots.common.files import existing_file
 from robots.common.plain import number
-from robots.common.records import Record, read
+from robots.common.records import Finding, Record, findings_of, read
 from robots.limits import Margin
 from robots.loading import load_robot
 from robots.robot import Robot
@@ -132,6 +132,30 @@ class RetimedExperiment(Planned, format="robot-oed design", tool=True, shares=("
     def success(self) -> bool:
         """Whether all limits hold, and no collision was found."""
         return not any(margin.violated for margin in self.margins) and not collides(self.freedom)
+
+    @property
+    def conclusion(self) -> str:
+        """Whether to play the motion, and how fast it is."""
+        retimed = self.retimed
+        name, joint, share = retimed.peak
+        unsafe = not self.success or not is_free(self.freedom)
+        return (
+            f"{'Do not play this motion. ' if unsafe else ''}{retimed.method} runs the path in "
+            f"{retimed.duration_after:.1f} s instead of {retimed.duration_before:.1f} s, using {100 * share:.1f} % of "
+            f"the {name} limit of joint {joint}. {freedom_text(self.freedom)}"
+        )
+
+    @property
+    def remarks(self) -> tuple[Finding, ...]:
+        """What is not determined, limits that are exceeded, and what was assumed or not checked."""
+        text, action = "The new timing exceeds a limit.", "Do not play it."
+        return (
+            *excitation_findings(self.after),
+            *(() if self.success else (Finding(code="limit.exceeded", text=text, action=action),)),
+            *findings_of("timing.slower", [self.retimed.verdict()] if self.retimed.slower else []),
+            *freedom_findings(self.freedom),
+            *assumption_findings(self.robot),
+        )
 
     def summary(self) -> str:
         """Compares the experiment before and after retiming."""

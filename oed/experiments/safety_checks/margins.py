@@ -8,13 +8,19 @@ import numpy as np
 from numpy.typing import NDArray
 
 from robots.base_parameters import BaseParameters
-from robots.limits import Limits, Margin, symmetric_margins
+from robots.common.records import Finding, findings_of
+from robots.limits import ACCELERATION_PER_VELOCITY, JERK_PER_ACCELERATION, Limits, Margin, symmetric_margins
 from robots.plants import PlantEffect
 from robots.robot import Robot
 from robots.signals import Motion
 from robots.terms.effects import situation
 
 Array = NDArray[np.float64]
+
+_SUBSTITUTES = {
+    "acceleration": f"{ACCELERATION_PER_VELOCITY:g}/s times the velocity limit",
+    "jerk": f"{JERK_PER_ACCELERATION:g}/s times the acceleration limit",
+}
 
 
 def missing_limits(limits: Limits) -> dict[str, tuple[int, ...]]:
@@ -82,3 +88,18 @@ def _rms_margins(motion: Motion, tau: Array, limits: Limits) -> list[Margin]:
         )
         for joint, (value, limit) in enumerate(zip(rms, limits.torque_rms, strict=True))
     ]
+
+
+def assumption_findings(robot: Robot) -> tuple[Finding, ...]:
+    """Lists what a plan assumes of its robot.
+
+    Args:
+        robot: whose motions are planned.
+    """
+    values = [f"Assumed values without a source: {', '.join(robot.assumed)}."] if robot.assumed else []
+    limits = [
+        f"The robot's description states no {name} limit for joint {', '.join(map(str, joints))}; assumed: "
+        f"{_SUBSTITUTES[name]}."
+        for name, joints in missing_limits(robot.limits).items()
+    ]
+    return (*findings_of("value.assumed", values), *findings_of("limit.assumed", limits))

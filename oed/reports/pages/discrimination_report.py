@@ -3,18 +3,13 @@
 from __future__ import annotations
 
 from oed.campaigns.discriminations.discrimination import Discrimination
-from oed.experiments.safety_checks.freedom import freedom_text, is_free
 from oed.reports.pages.design_report import margins_section
-from oed.reports.pages.motions.freedom_findings import freedom_findings
 from oed.reports.pictures.trajectory_pictures import trajectory_picture
-from oed.reports.rendering.page import Fact, Page, Section, Table, findings_of
+from oed.reports.rendering.page import Fact, Page, Section, Table
 from oed.reports.rendering.provenance import footer
 from oed.reports.rendering.saving import save_page
 from robots.common.files import ResultFolder
 from robots.terms.effects import EFFECTS, EXPERIMENTS
-
-SURE = 0.95
-"""Chance from which an experiment counts as sure."""
 
 
 def save_discrimination_report(result: Discrimination, folder: ResultFolder, *, png: bool = False) -> None:
@@ -46,16 +41,11 @@ def discrimination_page(result: Discrimination) -> Page:
         )
         for judged in result.ranking
     )
-    warning = "" if is_free(result.freedom) else "Do not play these motions. "
     return Page(
         title="Experiment to distinguish two causes",
         robot=robot.title or robot.name,
-        verdict=f"{warning}{result.why}. {freedom_text(result.freedom)}",
-        findings=(
-            *freedom_findings(result.freedom),
-            *findings_of("experiment.note", result.warnings),
-            *findings_of("experiment.unsure", _unsure(result)),
-        ),
+        verdict=result.conclusion,
+        findings=result.remarks,
         facts=(
             Fact(label="Probability of the right decision", value=f"{100 * result.resolves:.0f} %"),
             Fact(label="With the reference motion alone", value=f"{100 * result.alone:.0f} %"),
@@ -117,9 +107,3 @@ def discrimination_page(result: Discrimination) -> Page:
         ),
         footer=footer(),
     )
-
-
-def _unsure(result: Discrimination) -> tuple[str, ...]:
-    if result.resolves >= SURE:
-        return ()
-    return (f"The experiment gives the right decision with {100 * result.resolves:.0f} % probability only.",)

@@ -7,15 +7,14 @@ from numpy.typing import NDArray
 
 from estimation.identifications.estimate import Estimate
 from estimation.predictions.method_table import MethodTable
-from oed.reports.pages.estimates.estimate_findings import findings_in, verdict_of
 from oed.reports.pictures.parameter_pictures import error_bars_picture, friction_picture, parameter_picture
 from oed.reports.pictures.torque_pictures import residual_picture, torque_picture
 from oed.reports.rendering.page import Cell, Fact, Page, Section, Table
 from oed.reports.rendering.picture import Picture
 from oed.reports.rendering.provenance import footer, recordings_of
 from oed.reports.rendering.saving import save_page
-from oed.reports.rendering.significant import significant, significant_error
 from robots.common.files import ResultFolder
+from robots.common.plain import significant, significant_error
 
 Array = NDArray[np.float64]
 
@@ -97,9 +96,9 @@ def estimate_page(estimate: Estimate, methods: MethodTable | None = None) -> Pag
     return Page(
         title="Identified dynamics",
         robot=robot.title or robot.name,
-        verdict=verdict_of(estimate),
+        verdict=estimate.conclusion,
         logs=recordings_of(model.provenance["logs"]),
-        findings=findings_in(estimate),
+        findings=estimate.remarks,
         facts=(
             Fact(label="Parameters determined", value=f"{known} of {len(model.names)}"),
             Fact(label="Worst joint, held-out data", value=f"{100 * max(joint.nrmse for joint in joints):.1f} %"),

@@ -11,8 +11,8 @@ from numpy.typing import ArrayLike
 from oed.reports.rendering.joint_units import JointUnits, joint_titles, joint_units
 from oed.reports.rendering.palette import joint_role, sequence_role
 from oed.reports.rendering.picture import Line, Panel, Picture, Series, Span
-from oed.reports.rendering.significant import significant
 from robots.common.errors import InputError
+from robots.common.plain import significant
 from robots.limits import Limits, Margin
 from robots.signals import FloatArray
 

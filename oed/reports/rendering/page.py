@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
 from dataclasses import dataclass, field
 from typing import Literal
 
 from oed.reports.animations.animation import Animation
 from oed.reports.rendering.picture import Picture
 from oed.reports.rendering.provenance import Footer, Recording
-from oed.reports.rendering.severity import LEVELS, Level, severity
 from robots.common.errors import InputError
+from robots.common.records.findings import ORDER, Finding, Level, severity
 
 Status = Literal["good", "note", "act", "neutral"]
 Cell = str | int | float | bool | None
@@ -37,34 +36,6 @@ class Fact:
 
     def __post_init__(self) -> None:
         _check("status", self.status, STATUSES)
-
-
-@dataclass(frozen=True, kw_only=True)
-class Finding:
-    """One row of the first screen.
-
-    Args:
-        code: a key of `severity.LEVELS`, which decides how urgent it is.
-        text: what was found, in a sentence.
-        subject: joint, log or part that it is about; empty for the whole.
-        action: what to do; empty where there is nothing to do.
-
-    Raises:
-        InputError: an unknown code.
-    """
-
-    code: str
-    text: str
-    subject: str = ""
-    action: str = ""
-
-    def __post_init__(self) -> None:
-        severity([self.code])
-
-    @property
-    def level(self) -> Level:
-        """How urgent it is."""
-        return LEVELS[self.code]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -153,8 +124,8 @@ class Page:
     footer: Footer = field(default_factory=Footer)
 
     def __post_init__(self) -> None:
-        order = {"act": 0, "note": 1, "good": 2}
-        object.__setattr__(self, "findings", tuple(sorted(self.findings, key=lambda item: order[item.level])))
+        urgent = sorted(self.findings, key=lambda item: -ORDER.index(item.level))
+        object.__setattr__(self, "findings", tuple(urgent))
         names = [picture.name for picture in self.pictures]
         for name in names:
             if names.count(name) > 1:
@@ -179,16 +150,6 @@ class Page:
     def dates(self) -> tuple[str, ...]:
         """When the logs were recorded, each date once; empty where no clock has a date."""
         return tuple(dict.fromkeys(log.date for log in self.logs if log.date))
-
-
-def findings_of(code: str, texts: Iterable[str]) -> tuple[Finding, ...]:
-    """Makes one finding of each text.
-
-    Args:
-        code: a key of `severity.LEVELS`, of all of them.
-        texts: what was found, each in a sentence or two.
-    """
-    return tuple(Finding(code=code, text=text) for text in texts)
 
 
 def is_number(value: object) -> bool:

@@ -38,7 +38,8 @@ def read_json(
     Raises:
         InputError: no such file, no JSON object, or another format or a newer version.
     """
-    wanted = f"is not a {format.removeprefix('robot-oed ')} file" if format else "cannot be read as a JSON object"
+    kind = format.removeprefix("robot-oed ")
+    wanted = f"is not {'an' if kind[0] in 'aeiou' else 'a'} {kind} file" if kind else "cannot be read as a JSON object"
     try:
         data = json.loads(existing_file(path).read_text(encoding="utf-8"))
     except ValueError as error:

@@ -25,6 +25,7 @@ from typing import Any, ClassVar, Self, cast
 
 from robots.common.records.entries import value_at, written
 from robots.common.records.files import write_json
+from robots.common.records.findings import Finding
 from robots.common.records.reading import Reader
 from robots.version import VERSION
 
@@ -108,6 +109,16 @@ class Result(Record):
 
     FILE: ClassVar[str] = ""
     """Name of its JSON file."""
+
+    @property
+    def conclusion(self) -> str:
+        """What follows from the result, in a sentence or two that a person can act on."""
+        raise NotImplementedError
+
+    @property
+    def remarks(self) -> tuple[Finding, ...]:
+        """What a reader must know."""
+        return ()
 
     def summary(self) -> str:
         """Says in some lines what was found."""

@@ -12,7 +12,7 @@ from estimation.calibrations.result import SHOWN, error_words
 from oed.reports.animations.animation import Animation
 from oed.reports.animations.building import animate
 from oed.reports.rendering.joint_units import joint_titles
-from oed.reports.rendering.page import Cell, Fact, Finding, Page, Section, Table, findings_of
+from oed.reports.rendering.page import Cell, Fact, Page, Section, Table
 from oed.reports.rendering.picture import Panel, Picture, Series
 from oed.reports.rendering.provenance import footer
 from oed.reports.rendering.saving import save_page
@@ -42,13 +42,8 @@ def calibration_page(calibration: Calibration) -> Page:
     return Page(
         title="Calibration",
         robot=calibration.robot.name,
-        verdict=(
-            f"The calibrated robot predicts poses that it has not seen to {shown(levels.held_out)} instead of "
-            f"{shown(levels.before)}."
-            if better
-            else "The poses do not support a calibration: the description predicts held-out poses as well."
-        ),
-        findings=_findings(calibration),
+        verdict=calibration.conclusion,
+        findings=calibration.remarks,
         facts=(
             Fact(label="Before", value=shown(levels.before), note=error_words(calibration.measurement)),
             Fact(label="After, held out", value=shown(levels.held_out), status="good" if better else "act"),
@@ -84,24 +79,6 @@ def calibration_page(calibration: Calibration) -> Page:
         ),
         footer=footer(),
     )
-
-
-def _findings(calibration: Calibration) -> tuple[Finding, ...]:
-    found = list(findings_of("calibration.doubtful", calibration.warnings))
-    found += [
-        Finding(code="calibration.cause", text=cause["sentence"], action=cause.get("action", ""))
-        for cause in calibration.causes.get("findings", ())
-    ]
-    found += [
-        Finding(
-            code="calibration.outlier",
-            subject=f"Pose {item.pose}:",
-            text=f"line {item.line} of the file is off by {calibration.shown(item.error)}; it was left out.",
-            action="Measure it again, or remove it.",
-        )
-        for item in calibration.outliers
-    ]
-    return tuple(found)
 
 
 def _pose_picture(calibration: Calibration) -> Picture:

@@ -5,10 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from oed.experiments.pose_designs import PoseDesign, observability_indices
-from oed.experiments.pose_designs.result import SHOWN
-from oed.experiments.safety_checks.freedom import freedom_text, is_free
+from oed.experiments.safety_checks.freedom import freedom_text
 from oed.reports.animations.building import animate
-from oed.reports.rendering.page import Cell, Fact, Finding, Page, Section, Table
+from oed.reports.rendering.page import Cell, Fact, Page, Section, Table
 from oed.reports.rendering.picture import Panel, Picture, Series
 from oed.reports.rendering.provenance import footer
 from oed.reports.rendering.saving import save_page
@@ -22,24 +21,11 @@ def save_pose_design_report(design: PoseDesign, folder: ResultFolder, *, png: bo
 
 def pose_design_page(design: PoseDesign) -> Page:
     """Builds the page: what the poses determine, the robot in 3-D on its way, and the poses."""
-    unit, factor = SHOWN[design.unit]
-    findings = []
-    if design.freedom is None:
-        findings.append(Finding(code="collision.unchecked", text=freedom_text(None)))
-    elif not is_free(design.freedom):
-        findings.append(Finding(code="collision.found", text=freedom_text(design.freedom)))
-    if design.left_out:
-        findings.append(
-            Finding(code="experiment.note", text=f"{design.left_out} poses were left out: no free move reaches them.")
-        )
     return Page(
         title="Poses for a calibration",
         robot=design.robot.name,
-        verdict=(
-            f"Measured at these {len(design.q)} poses, the calibrated robot is expected to be right to "
-            f"{factor * design.prediction:.3g} {unit}, if the kinds of errors are these and the noise is as stated."
-        ),
-        findings=tuple(findings),
+        verdict=design.conclusion,
+        findings=design.remarks,
         facts=(
             Fact(label="Poses", value=len(design.q), note=f"{design.motion.duration:.0f} s of motion"),
             Fact(label="Parameters", value=len(design.parameters)),

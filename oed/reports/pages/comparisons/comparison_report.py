@@ -21,7 +21,7 @@ from oed.reports.pictures.comparison_pictures import (
     friction_runs_picture,
     significance_picture,
 )
-from oed.reports.rendering.page import Cell, Fact, Finding, Page, Section, Table, findings_of
+from oed.reports.rendering.page import Cell, Fact, Page, Section, Table
 from oed.reports.rendering.picture import Picture
 from oed.reports.rendering.provenance import Recording, footer
 from oed.reports.rendering.saving import save_page
@@ -47,9 +47,9 @@ def comparison_page(comparison: ModelComparison) -> Page:
     return Page(
         title="Comparison of models",
         robot=comparison.robot_name,
-        verdict=comparison.verdict(),
+        verdict=comparison.conclusion,
         logs=tuple(Recording(name=run.label, start=run.date) for run in comparison.runs),
-        findings=_findings(comparison),
+        findings=comparison.remarks,
         facts=(
             Fact(label="Runs", value=len(comparison.runs), note=f"order: {comparison.order}"),
             Fact(label="Parts that differ", value=len(parts)),
@@ -108,34 +108,6 @@ def parts_picture(comparison: ModelComparison) -> Picture:
             row = smallest.setdefault(item.name.partition(" of joint ")[0], {})
             row[item.joint] = min(row.get(item.joint, 1.0), item.adjusted)
     return significance_picture(smallest, comparison.alpha, joint_names=comparison.runs[0].model.robot.joint_names)
-
-
-def _findings(comparison: ModelComparison) -> tuple[Finding, ...]:
-    found = [
-        Finding(
-            code="difference.joint",
-            subject=f"{comparison.labels[item.run]}:",
-            text=item.sentence(),
-        )
-        for item in comparison.damaged
-    ]
-    found += [
-        Finding(
-            code="difference.payload", subject=f"{comparison.labels[item.run]}:", text=item.sentence(comparison.labels)
-        )
-        for item in comparison.payloads
-    ]
-    runs: dict[str, list[str]] = {}
-    for run in range(1, len(comparison.runs)):
-        for name in comparison.parts(run):
-            runs.setdefault(name, []).append(comparison.labels[run])
-    found += [
-        Finding(
-            code="difference", subject=f"{name}:", text=f"differs from {comparison.labels[0]} in {', '.join(those)}."
-        )
-        for name, those in runs.items()
-    ]
-    return (*found, *findings_of("comparison.note", comparison.warnings))
 
 
 def _friction(comparison: ModelComparison, last: int) -> tuple[Section, ...]:

@@ -6,7 +6,7 @@ import numpy as np
 
 from estimation.comparisons import ModelComparison
 from oed.reports.rendering.page import Cell, Table
-from oed.reports.rendering.significant import significant, significant_error
+from robots.common.plain import significant, significant_error
 
 
 def runs_table(comparison: ModelComparison) -> Table:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from oed.experiments.drives import DriveDesign
-from oed.reports.rendering.page import Fact, Page, Section, Table, findings_of
+from oed.reports.rendering.page import Fact, Page, Section, Table
 from oed.reports.rendering.palette import sequence_role
 from oed.reports.rendering.picture import Panel, Picture, Series
 from oed.reports.rendering.provenance import footer
@@ -39,10 +39,8 @@ def drive_design_page(design: DriveDesign) -> Page:
     return Page(
         title="Motion for drives",
         robot=design.robot,
-        verdict=f"Do not play this motion. {design.collisions}"
-        if design.collides
-        else f"Standard errors will be {design.ratio:.2g} times those of a chirp of the same time and limits.",
-        findings=findings_of("experiment.note", [design.collisions]),
+        verdict=design.conclusion,
+        findings=design.remarks,
         facts=(
             Fact(label="Duration", value=f"{design.t[-1] - design.t[0]:.3g} s"),
             Fact(label="Ratio to a chirp", value=f"{design.ratio:.2g}", note="median of the standard errors"),

@@ -6,7 +6,7 @@ import numpy as np
 
 from estimation.external_forces import ForceEstimate
 from oed.reports.pictures.force_pictures import external_torque_picture, load_picture, statistic_picture
-from oed.reports.rendering.page import Cell, Fact, Finding, Page, Section, Table, findings_of
+from oed.reports.rendering.page import Cell, Fact, Page, Section, Table
 from oed.reports.rendering.provenance import Recording, footer
 from oed.reports.rendering.saving import save_page
 from robots.common.files import ResultFolder
@@ -43,21 +43,15 @@ def force_page(forces: ForceEstimate, kinds: tuple[str, ...], logs: tuple[Record
     """
     threshold, count = forces.calibration.threshold, len(forces.contacts)
     windows = [(contact.start, contact.end) for contact in forces.contacts]
-    largest = max(forces.contacts, key=lambda contact: contact.magnitude, default=None)
-    verdict = "No contact was found in this log."
-    if largest is not None:
-        verdict = f"Check the robot's surroundings: {'one contact' if count == 1 else f'{count} contacts'}"
-        verdict += f", at {largest.start:.4g} s" if count == 1 else f", the largest at {largest.start:.4g} s"
-        verdict += f" with {largest.magnitude:.3g} N at the tool."
     deviation = forces.force_deviation
     known = deviation[np.isfinite(deviation).all(axis=1)]
     level = f"{np.median(np.linalg.norm(known, axis=1)):.2g} N" if len(known) else "unknown"
     return Page(
         title="External forces",
         robot=forces.robot,
-        verdict=verdict,
+        verdict=forces.conclusion,
         logs=logs,
-        findings=_findings(forces),
+        findings=forces.remarks,
         facts=(
             Fact(label="Contacts", value=count),
             Fact(label="Duration", value=f"{forces.duration:.4g} s"),
@@ -105,22 +99,6 @@ def _verdict(forces: ForceEstimate) -> str:
     if check is None:
         return "not tested"
     return "confirmed" if check.confirmed else "contradicted" if check.contradicted else "not confirmed"
-
-
-def _findings(forces: ForceEstimate) -> tuple[Finding, ...]:
-    return (
-        *(
-            Finding(
-                code="contact",
-                subject=f"{contact.start:.4g} s:",
-                text=f"contact at {contact.place.text(forces.joint_names)}, {contact.magnitude:.3g} N, for "
-                f"{contact.end - contact.start:.2g} s.",
-                action="Check what the robot touched.",
-            )
-            for contact in forces.contacts
-        ),
-        *findings_of("force.note", forces.warnings),
-    )
 
 
 def _contacts(forces: ForceEstimate) -> Table:

@@ -9,16 +9,14 @@ import numpy as np
 from oed.campaigns.loops.result import LoopResult
 from oed.campaigns.loops.state import Experiment, Verdict, name_of
 from oed.exports import read_trajectory
-from oed.reports.pages.diagnosis_actions import action_for
 from oed.reports.pictures.trajectory_pictures import trajectory_picture
-from oed.reports.rendering.page import Cell, Fact, Finding, Page, Section, Table, findings_of
+from oed.reports.rendering.page import Cell, Fact, Page, Section, Table
 from oed.reports.rendering.palette import joint_role
 from oed.reports.rendering.picture import Panel, Picture, Series
 from oed.reports.rendering.provenance import Recording, footer
 from oed.reports.rendering.saving import save_page
 from robots.common.files import ResultFolder
 from robots.common.plain import two_digits
-from robots.terms.effects import EFFECTS
 
 CHANCE = 1e-3
 """Smallest p-value that is written as a number."""
@@ -35,14 +33,14 @@ def loop_page(result: LoopResult) -> Page:
     return Page(
         title="Loop of experiments",
         robot=result.robot.title or result.robot.name,
-        verdict=f"{result.ended[:1].upper()}{result.ended[1:]}.",
+        verdict=result.conclusion,
         logs=tuple(
             Recording(name=run.recorded.log)
             for experiment in result.experiments
             for run in experiment.runs
             if run.recorded is not None
         ),
-        findings=_findings(result),
+        findings=result.remarks,
         facts=(
             Fact(label="Experiments", value=len(result.experiments), note=f"{rows} rows of feedback"),
             Fact(label="Effects found", value=len(last.findings), note=", ".join(last.causes)),
@@ -54,22 +52,6 @@ def loop_page(result: LoopResult) -> Page:
         ),
         sections=(_course(result), *(_section(result, k) for k in range(len(result.experiments)))),
         footer=footer(),
-    )
-
-
-def _findings(result: LoopResult) -> tuple[Finding, ...]:
-    found = [
-        Finding(
-            code=f"effect.{item['effect']}" if item["effect"] in EFFECTS else "diagnosis.unexplained",
-            subject=f"{name_of(item)}:",
-            text=str(item.get("sentence", "")),
-            action=action_for(item["effect"], [item["joint"]]) if item["effect"] in EFFECTS else "",
-        )
-        for item in result.diagnosis.findings
-    ]
-    return (
-        *found,
-        *findings_of("loop.unfinished", [] if result.success else [f"The loop ended early: {result.ended}."]),
     )
 
 

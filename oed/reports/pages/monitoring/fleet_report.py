@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from estimation.monitoring.fleets import FleetResult, RobotRow
-from oed.reports.rendering.page import Cell, Fact, Finding, Page, Section, Status, Table
+from oed.reports.rendering.page import Cell, Fact, Page, Section, Status, Table
 from oed.reports.rendering.palette import joint_role
 from oed.reports.rendering.picture import Line, Panel, Picture, Series
 from oed.reports.rendering.provenance import footer
@@ -27,11 +27,8 @@ def fleet_page(result: FleetResult) -> Page:
     drawn = [row for row in result.rows if row.trend.hours][:DRAWN]
     return Page(
         title="Fleet",
-        verdict=_verdict(result),
-        findings=tuple(
-            Finding(code=f"fleet.{row.light}", subject=f"{row.name}:", text=row.text, action=row.advice)
-            for row in result.rows
-        ),
+        verdict=result.conclusion,
+        findings=result.remarks,
         facts=(
             _count(result, "red", "need action", "act"),
             _count(result, "amber", "to be watched", "note"),
@@ -70,11 +67,6 @@ def fleet_page(result: FleetResult) -> Page:
         ),
         footer=footer(),
     )
-
-
-def _verdict(result: FleetResult) -> str:
-    worst = result.rows[0]
-    return f"{result.verdict()} Begin with {worst.name}. {worst.advice}".strip() if worst.advice else result.verdict()
 
 
 def _count(result: FleetResult, light: str, note: str, status: Status = "neutral") -> Fact:

@@ -8,7 +8,7 @@ from estimation.monitoring import MonitorResult
 from estimation.monitoring.findings import LIGHTS
 from estimation.monitoring.result import HEAT_WORDS
 from oed.reports.pictures.monitor_pictures import trend_picture
-from oed.reports.rendering.page import Cell, Fact, Finding, Page, Section, Status, Table, findings_of
+from oed.reports.rendering.page import Cell, Fact, Page, Section, Status, Table
 from oed.reports.rendering.picture import Picture
 from oed.reports.rendering.provenance import Recording, footer
 from oed.reports.rendering.saving import save_page
@@ -30,11 +30,11 @@ def monitor_page(result: MonitorResult) -> Page:
     return Page(
         title="Monitoring",
         robot=result.robot,
-        verdict=_verdict(result),
+        verdict=result.conclusion,
         logs=tuple(
             Recording(name=row.name, start=row.start, duration=row.end - row.start) for row in result.logs if row.used
         ),
-        findings=_findings(result),
+        findings=result.remarks,
         facts=(
             Fact(label="Light", value=result.light, status=STATUS[result.light]),
             Fact(label="Findings", value=len(result.findings)),
@@ -63,28 +63,6 @@ def monitor_page(result: MonitorResult) -> Page:
             *_change_points(result),
         ),
         footer=footer(),
-    )
-
-
-def _verdict(result: MonitorResult) -> str:
-    urgent = [finding for finding in result.findings if LIGHTS[finding.severity] == result.light]
-    if not urgent or result.light == "green":
-        return "No change beyond what temperature explains."
-    return " ".join(dict.fromkeys(finding.advice() for finding in urgent))
-
-
-def _findings(result: MonitorResult) -> tuple[Finding, ...]:
-    return (
-        *(
-            Finding(code=f"change.{item.kind}", text=item.sentence(result.origin), action=item.advice())
-            for item in result.findings
-        ),
-        *(
-            Finding(code="log.left_out", subject=f"{row.name}:", text=f"left out: {row.note}")
-            for row in result.logs
-            if not row.used
-        ),
-        *findings_of("monitor.note", result.notes),
     )
 
 
