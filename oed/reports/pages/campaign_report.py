@@ -8,8 +8,7 @@ import numpy as np
 
 from oed.campaigns import Campaign, Slot, Stage
 from oed.reports.pictures.campaign_pictures import temperature_picture, velocity_picture
-from oed.reports.rendering.page import Cell, Fact, Page, Section, Table
-from oed.reports.rendering.provenance import footer
+from oed.reports.rendering.page import Cell, Fact, Page, Section, Table, page_of, table_of
 from oed.reports.rendering.saving import save_page
 from robots.common.files import ResultFolder
 
@@ -23,11 +22,10 @@ def campaign_page(campaign: Campaign) -> Page:
     """Builds the page: what runs when, how each stage moves, and how hot the robot is expected to get."""
     robot = campaign.robot
     temperature = _temperature_sections(campaign)
-    return Page(
+    return page_of(
+        campaign,
         title="Campaign",
         robot=robot.title or robot.name,
-        verdict=campaign.conclusion,
-        findings=campaign.remarks,
         facts=_facts(campaign),
         sections=(
             Section(
@@ -47,7 +45,6 @@ def campaign_page(campaign: Campaign) -> Page:
             *_friction_sections(campaign),
             Section(title="Timetable", tables=(_timetable(campaign.slots),), folded=True),
         ),
-        footer=footer(),
     )
 
 
@@ -119,19 +116,15 @@ def _cycle_table(campaign: Campaign) -> Table:
 
 
 def _timetable(slots: tuple[Slot, ...]) -> Table:
-    rows: tuple[tuple[Cell, ...], ...] = tuple(
-        (
-            f"{slot.start:.3f}",
-            f"{slot.end:.3f}",
-            slot.cycle,
-            slot.phase.replace("_", " "),
-            f"{slot.stage}.csv" if slot.stage else "rest",
-        )
-        for slot in slots
-    )
-    return Table(
-        headings=("start [s]", "end [s]", "cycle", "phase", "file"),
-        rows=rows,
+    return table_of(
+        slots,
+        {
+            "start [s]": lambda slot: f"{slot.start:.3f}",
+            "end [s]": lambda slot: f"{slot.end:.3f}",
+            "cycle": lambda slot: slot.cycle,
+            "phase": lambda slot: slot.phase.replace("_", " "),
+            "file": lambda slot: slot.file or "rest",
+        },
         caption="All times count from the start of the campaign.",
     )
 

@@ -10,9 +10,8 @@ from oed.experiments.quality import Quality
 from oed.experiments.safety_checks.margins import nominal_torque
 from oed.reports.animations.building import animate
 from oed.reports.pages.motions.motion_report import animation_section, tightest_fact
-from oed.reports.pictures.trajectory_pictures import margins_picture, spectrum_picture, trajectory_picture
-from oed.reports.rendering.page import Cell, Fact, Page, Section, Table
-from oed.reports.rendering.provenance import footer
+from oed.reports.pictures.trajectory_pictures import margins_picture, motion_picture, spectrum_picture
+from oed.reports.rendering.page import Cell, Fact, Page, Section, Table, page_of
 from oed.reports.rendering.saving import save_page
 from robots.collision import Surroundings
 from robots.common.files import ResultFolder
@@ -29,11 +28,10 @@ def save_design_report(design: Design, folder: ResultFolder, *, png: bool = Fals
 def design_page(design: Design) -> Page:
     """Builds the page: what the experiment is worth, how it moves, how far it stays from the limits."""
     robot, motion = design.robot, design.motion
-    return Page(
+    return page_of(
+        design,
         title="Excitation experiment",
         robot=robot.title or robot.name,
-        verdict=design.conclusion,
-        findings=design.remarks,
         facts=_facts(design),
         sections=(
             _home_section(design),
@@ -46,18 +44,7 @@ def design_page(design: Design) -> Page:
                         "between."
                     ),
                 ),
-                pictures=(
-                    trajectory_picture(
-                        motion.t,
-                        motion.q,
-                        motion.dq,
-                        motion.ddq,
-                        limits=robot.limits,
-                        joint_names=robot.joint_names,
-                        kinds=robot.chain.kinds,
-                        segments=design.segments,
-                    ),
-                ),
+                pictures=(motion_picture(robot, motion, segments=design.segments),),
                 tables=(_segments(design),),
             ),
             _animation(design),
@@ -66,7 +53,7 @@ def design_page(design: Design) -> Page:
             Section(title="Search", paragraphs=(_search_text(design),), tables=(_islands(design),)),
             parameters_section(design.base.names, design.base.formulas()),
         ),
-        footer=footer(design.settings["seed"]),
+        seed=design.settings["seed"],
     )
 
 

@@ -21,9 +21,9 @@ from oed.reports.pages.motions.motion_report import animation_section
 from oed.reports.pictures.diagnosis_pictures import cause_picture, gain_picture
 from oed.reports.pictures.torque_pictures import torque_picture
 from oed.reports.rendering.joint_units import joint_titles
-from oed.reports.rendering.page import Cell, Fact, Page, Section, Table
+from oed.reports.rendering.page import Cell, Fact, Page, Section, Table, page_of
 from oed.reports.rendering.picture import Picture
-from oed.reports.rendering.provenance import footer, recordings_of
+from oed.reports.rendering.provenance import recordings_of
 from oed.reports.rendering.saving import save_page
 from robots.common.files import ResultFolder
 from robots.common.plain import percent, significant, two_digits
@@ -69,15 +69,14 @@ def diagnosis_page(diagnosis: Diagnosis, animation: Animation | None = None) -> 
         sections.append(Section(title="Unexplained residual", paragraphs=left))
     sections.append(_next(diagnosis))
     sections.append(limits_section(diagnosis.limits, folded=bool(diagnosis.findings)))
-    return Page(
+    return page_of(
+        diagnosis,
         title="Diagnosis",
         robot=robot.title or robot.name,
-        verdict=diagnosis.conclusion,
         logs=recordings_of(diagnosis.model.provenance.get("logs", ())),
-        findings=diagnosis.remarks,
         facts=_facts(diagnosis),
-        sections=tuple(sections),
-        footer=footer(diagnosis.model.provenance.get("seed")),
+        sections=sections,
+        seed=diagnosis.model.provenance.get("seed"),
     )
 
 

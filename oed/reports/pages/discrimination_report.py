@@ -4,9 +4,8 @@ from __future__ import annotations
 
 from oed.campaigns.discriminations.discrimination import Discrimination
 from oed.reports.pages.design_report import margins_section
-from oed.reports.pictures.trajectory_pictures import trajectory_picture
-from oed.reports.rendering.page import Fact, Page, Section, Table
-from oed.reports.rendering.provenance import footer
+from oed.reports.pictures.trajectory_pictures import motion_picture
+from oed.reports.rendering.page import Fact, Page, Section, Table, page_of
 from oed.reports.rendering.saving import save_page
 from robots.common.files import ResultFolder
 from robots.terms.effects import EFFECTS, EXPERIMENTS
@@ -41,11 +40,10 @@ def discrimination_page(result: Discrimination) -> Page:
         )
         for judged in result.ranking
     )
-    return Page(
+    return page_of(
+        result,
         title="Experiment to distinguish two causes",
         robot=robot.title or robot.name,
-        verdict=result.conclusion,
-        findings=result.remarks,
         facts=(
             Fact(label="Probability of the right decision", value=f"{100 * result.resolves:.0f} %"),
             Fact(label="With the reference motion alone", value=f"{100 * result.alone:.0f} %"),
@@ -91,19 +89,11 @@ def discrimination_page(result: Discrimination) -> Page:
             Section(
                 title="Motion",
                 pictures=(
-                    trajectory_picture(
-                        run.motion.t,
-                        run.motion.q,
-                        run.motion.dq,
-                        run.motion.ddq,
-                        limits=robot.limits,
-                        joint_names=robot.joint_names,
-                        kinds=robot.chain.kinds,
-                        segments=[{**entry, "kind": entry["part"]} for entry in run.table()],
+                    motion_picture(
+                        robot, run.motion, segments=[{**entry, "kind": entry["part"]} for entry in run.table()]
                     ),
                 ),
             ),
             margins_section(run.margins, robot.joint_names),
         ),
-        footer=footer(),
     )

@@ -9,9 +9,9 @@ from estimation.identifications.estimate import Estimate
 from estimation.predictions.method_table import MethodTable
 from oed.reports.pictures.parameter_pictures import error_bars_picture, friction_picture, parameter_picture
 from oed.reports.pictures.torque_pictures import residual_picture, torque_picture
-from oed.reports.rendering.page import Cell, Fact, Page, Section, Table
+from oed.reports.rendering.page import Cell, Fact, Page, Section, Table, page_of
 from oed.reports.rendering.picture import Picture
-from oed.reports.rendering.provenance import footer, recordings_of
+from oed.reports.rendering.provenance import recordings_of
 from oed.reports.rendering.saving import save_page
 from robots.common.files import ResultFolder
 from robots.common.plain import significant, significant_error
@@ -93,12 +93,11 @@ def estimate_page(estimate: Estimate, methods: MethodTable | None = None) -> Pag
         sections.insert(1, Section(title="Estimators", tables=(_methods(methods),)))
     if any(gate.findings for gate in estimate.gates):
         sections.insert(len(sections) - 1, Section(title="The logs", tables=(_gates(estimate),)))
-    return Page(
+    return page_of(
+        estimate,
         title="Identified dynamics",
         robot=robot.title or robot.name,
-        verdict=estimate.conclusion,
         logs=recordings_of(model.provenance["logs"]),
-        findings=estimate.remarks,
         facts=(
             Fact(label="Parameters determined", value=f"{known} of {len(model.names)}"),
             Fact(label="Worst joint, held-out data", value=f"{100 * max(joint.nrmse for joint in joints):.1f} %"),
@@ -109,8 +108,8 @@ def estimate_page(estimate: Estimate, methods: MethodTable | None = None) -> Pag
                 note="the standard errors are this many times those of white noise",
             ),
         ),
-        sections=tuple(sections),
-        footer=footer(model.provenance.get("seed")),
+        sections=sections,
+        seed=model.provenance.get("seed"),
     )
 
 

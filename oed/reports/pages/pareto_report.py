@@ -8,9 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from oed.experiments import ParetoFront
-from oed.reports.rendering.page import Fact, Page, Section, Table
+from oed.reports.rendering.page import Fact, Page, Section, Table, page_of
 from oed.reports.rendering.picture import Panel, Picture, Series
-from oed.reports.rendering.provenance import footer
 from oed.reports.rendering.saving import save_page
 from robots.common.files import ResultFolder
 
@@ -34,11 +33,10 @@ def pareto_page(front: ParetoFront) -> Page:
         )
     )
     headings = ("point", *(f"weight of {name}" for name in names), *names, "Pareto-optimal")
-    return Page(
+    return page_of(
+        front,
         title="Designs for several criteria",
         robot=robot.title or robot.name,
-        verdict=front.conclusion,
-        findings=front.remarks,
         facts=tuple(Fact(label=f"Best {c.label}", value=_best(front, k)) for k, c in enumerate(front.criteria)),
         sections=(
             Section(
@@ -54,7 +52,6 @@ def pareto_page(front: ParetoFront) -> Page:
                 tables=(Table(headings=headings, rows=rows, caption="Criteria of the optimised motion."),),
             ),
         ),
-        footer=footer(),
     )
 
 

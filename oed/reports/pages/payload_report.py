@@ -7,8 +7,8 @@ import numpy as np
 from estimation.payloads import PayloadEstimate
 from estimation.payloads.result import METHODS
 from oed.reports.pictures.parameter_pictures import error_bars_picture
-from oed.reports.rendering.page import Cell, Fact, Page, Section, Table
-from oed.reports.rendering.provenance import footer, recordings_of
+from oed.reports.rendering.page import Cell, Fact, Page, Section, Table, page_of
+from oed.reports.rendering.provenance import recordings_of
 from oed.reports.rendering.saving import save_page
 from robots.common.files import ResultFolder
 
@@ -30,12 +30,11 @@ def payload_page(payload: PayloadEstimate) -> Page:
         )
         for label, key in (("without payload", "without"), ("with payload", "residual"))
     }
-    return Page(
+    return page_of(
+        payload,
         title="Payload",
         robot=payload.robot,
-        verdict=payload.conclusion,
         logs=recordings_of(payload.provenance.get("logs", ())),
-        findings=payload.remarks,
         facts=(
             Fact(label="Mass", value=f"{mass.text} kg"),
             Fact(
@@ -58,7 +57,6 @@ def payload_page(payload: PayloadEstimate) -> Page:
                 title="Torque", pictures=(error_bars_picture(errors, joint_names=[j.name for j in payload.joints]),)
             ),
         ),
-        footer=footer(),
     )
 
 

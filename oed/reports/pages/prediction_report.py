@@ -6,8 +6,8 @@ import numpy as np
 
 from estimation.predictions.prediction import Prediction
 from oed.reports.pictures.torque_pictures import torque_picture
-from oed.reports.rendering.page import Cell, Fact, Page, Section, Table
-from oed.reports.rendering.provenance import Recording, footer
+from oed.reports.rendering.page import Cell, Fact, Page, Section, Table, page_of
+from oed.reports.rendering.provenance import Recording
 from robots.common.plain import finite
 
 
@@ -24,12 +24,11 @@ def prediction_page(
     """
     measured = prediction.measured
     nothing = np.full_like(prediction.predicted, np.nan)
-    return Page(
+    return page_of(
+        prediction,
         title="Prediction",
         robot=robot_name,
-        verdict=prediction.conclusion,
         logs=logs,
-        findings=prediction.remarks,
         facts=(
             Fact(label="Samples", value=len(prediction.motion)),
             Fact(label="Duration", value=f"{prediction.motion.duration:.4g} s"),
@@ -55,7 +54,6 @@ def prediction_page(
                 tables=(_joints(prediction),),
             ),
         ),
-        footer=footer(),
     )
 
 

@@ -10,9 +10,8 @@ from oed.experiments.safety_checks.margins import nominal_torque
 from oed.reports.animations.building import animate
 from oed.reports.pages.design_report import margins_section, parameters_section, quality_section
 from oed.reports.pages.motions.motion_report import animation_section
-from oed.reports.pictures.trajectory_pictures import trajectory_picture
-from oed.reports.rendering.page import Cell, Fact, Page, Section, Table
-from oed.reports.rendering.provenance import footer
+from oed.reports.pictures.trajectory_pictures import motion_picture
+from oed.reports.rendering.page import Cell, Fact, Page, Section, Table, page_of
 from oed.reports.rendering.saving import save_page
 from robots.common.files import ResultFolder
 from robots.common.plain import finite
@@ -29,23 +28,12 @@ def retime_page(result: RetimedExperiment, given: Motion) -> Page:
     robot, retimed = result.robot, result.retimed
     before, after = result.before.cond, result.after.cond
     pictures = tuple(
-        trajectory_picture(
-            motion.t,
-            motion.q,
-            motion.dq,
-            motion.ddq,
-            limits=robot.limits,
-            joint_names=robot.joint_names,
-            kinds=robot.chain.kinds,
-            name=stem,
-        )
-        for stem, motion in (("after", result.motion), ("before", given))
+        motion_picture(robot, motion, name=stem) for stem, motion in (("after", result.motion), ("before", given))
     )
-    return Page(
+    return page_of(
+        result,
         title="Retimed path",
         robot=robot.title or robot.name,
-        verdict=result.conclusion,
-        findings=result.remarks,
         facts=(
             Fact(label=f"{CRITERIA['cond']().label} before", value=before if before is not None else "not all excited"),
             Fact(label="cond(Y) after", value=after if after is not None else "not all excited"),
@@ -79,7 +67,6 @@ def retime_page(result: RetimedExperiment, given: Motion) -> Page:
             Section(title="Given motion", pictures=pictures[1:], folded=True),
             parameters_section(result.base.names, result.base.formulas()),
         ),
-        footer=footer(),
     )
 
 

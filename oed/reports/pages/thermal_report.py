@@ -15,9 +15,9 @@ from oed.reports.pictures.thermal_pictures import (
     friction_time_picture,
     time_constant_picture,
 )
-from oed.reports.rendering.page import Cell, Fact, Page, Section, Table
+from oed.reports.rendering.page import Cell, Fact, Page, Section, Table, page_of
 from oed.reports.rendering.picture import Picture
-from oed.reports.rendering.provenance import footer, recordings_from
+from oed.reports.rendering.provenance import recordings_from
 from oed.reports.rendering.saving import save_page
 from robots.common.files import ResultFolder
 from robots.common.plain import significant, significant_error
@@ -87,20 +87,18 @@ def thermal_page(
     if choice is not None:
         sections.insert(1, Section(title="Model comparison", tables=(_models(choice, joint),)))
     worst = int(np.argmin(np.where([item is not None for item in fits], gain, np.inf)))
-    return Page(
+    return page_of(
+        estimate,
         title="Friction and temperature",
         robot=robot.title or robot.name,
-        verdict=estimate.conclusion,
         logs=recordings_from(logs),
-        findings=estimate.remarks,
         facts=(
             Fact(label="Model", value=moving[0].model.name if moving else "–"),
             Fact(label="Largest gain", value=f"{100 * gain.max():.0f} %", note=f"joint {int(gain.argmax()) + 1}"),
             Fact(label="Smallest gain", value=f"{100 * gain[worst]:.0f} %", note=f"joint {worst + 1}"),
             Fact(label="Iterations (dynamics, thermal model)", value=estimate.rounds),
         ),
-        sections=tuple(sections),
-        footer=footer(),
+        sections=sections,
     )
 
 

@@ -2,17 +2,20 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Literal
+from typing import Literal, TypeVar
 
 from oed.reports.animations.animation import Animation
 from oed.reports.rendering.picture import Picture
-from oed.reports.rendering.provenance import Footer, Recording
+from oed.reports.rendering.provenance import Footer, Recording, footer
 from robots.common.errors import InputError
+from robots.common.records import Result
 from robots.common.records.findings import ORDER, Finding, Level, severity
 
 Status = Literal["good", "note", "act", "neutral"]
 Cell = str | int | float | bool | None
+Item = TypeVar("Item")
 
 STATUSES = ("good", "note", "act", "neutral")
 ALIGNMENTS = ("left", "right", "center")
@@ -150,6 +153,58 @@ class Page:
     def dates(self) -> tuple[str, ...]:
         """When the logs were recorded, each date once; empty where no clock has a date."""
         return tuple(dict.fromkeys(log.date for log in self.logs if log.date))
+
+
+def page_of(
+    result: Result,
+    *,
+    title: str,
+    robot: str = "",
+    logs: Iterable[Recording] = (),
+    facts: Iterable[Fact] = (),
+    sections: Iterable[Section | None] = (),
+    seed: int | None = None,
+) -> Page:
+    """Arranges the page of a result: what follows from it, what to know, key figures, evidence, and where it is from.
+
+    Args:
+        result: gives conclusion and remarks.
+        title: what the page is about.
+        robot: its name.
+        logs: recordings that the result rests on.
+        facts: the experts' key figures.
+        sections: pictures and tables, in order; None is left out.
+        seed: of the random numbers, where the result states it.
+    """
+    return Page(
+        title=title,
+        robot=robot,
+        verdict=result.conclusion,
+        logs=tuple(logs),
+        findings=result.remarks,
+        facts=tuple(facts),
+        sections=tuple(section for section in sections if section is not None),
+        footer=footer(seed),
+    )
+
+
+def table_of(
+    items: Iterable[Item],
+    columns: Mapping[str, Callable[[Item], Cell]],
+    *,
+    caption: str = "",
+    align: Sequence[str] = (),
+) -> Table:
+    """Makes a table with a row for each item.
+
+    Args:
+        items: in the order of the rows.
+        columns: what each column shows of an item, by its heading.
+        caption: what the table shows.
+        align: see `Table`.
+    """
+    rows = tuple(tuple(cell(item) for cell in columns.values()) for item in items)
+    return Table(headings=tuple(columns), rows=rows, caption=caption, align=tuple(align))
 
 
 def is_number(value: object) -> bool:

@@ -7,11 +7,11 @@ import numpy as np
 from oed.experiments.pose_designs import PoseDesign, observability_indices
 from oed.experiments.safety_checks.freedom import freedom_text
 from oed.reports.animations.building import animate
-from oed.reports.rendering.page import Cell, Fact, Page, Section, Table
+from oed.reports.rendering.page import Cell, Fact, Page, Section, Table, page_of, table_of
 from oed.reports.rendering.picture import Panel, Picture, Series
-from oed.reports.rendering.provenance import footer
 from oed.reports.rendering.saving import save_page
 from robots.common.files import ResultFolder
+from robots.common.plain import finite
 
 
 def save_pose_design_report(design: PoseDesign, folder: ResultFolder, *, png: bool = False) -> None:
@@ -21,11 +21,10 @@ def save_pose_design_report(design: PoseDesign, folder: ResultFolder, *, png: bo
 
 def pose_design_page(design: PoseDesign) -> Page:
     """Builds the page: what the poses determine, the robot in 3-D on its way, and the poses."""
-    return Page(
+    return page_of(
+        design,
         title="Poses for a calibration",
         robot=design.robot.name,
-        verdict=design.conclusion,
-        findings=design.remarks,
         facts=(
             Fact(label="Poses", value=len(design.q), note=f"{design.motion.duration:.0f} s of motion"),
             Fact(label="Parameters", value=len(design.parameters)),
@@ -41,7 +40,6 @@ def pose_design_page(design: PoseDesign) -> Page:
             Section(title="Expected standard errors", tables=(_expected(design),)),
             Section(title="Poses", tables=(_poses(design),), folded=True),
         ),
-        footer=footer(),
     )
 
 
@@ -75,11 +73,14 @@ def _indices(design: PoseDesign) -> Table:
 
 
 def _expected(design: PoseDesign) -> Table:
-    rows: list[tuple[Cell, ...]] = []
-    for item, error in zip(design.parameters, design.expected, strict=True):
-        unit, factor = item.shown
-        rows.append((item.name, factor * float(error) if np.isfinite(error) else None, unit))
-    return Table(headings=("parameter", "expected standard error", "unit"), rows=tuple(rows))
+    return table_of(
+        zip(design.parameters, design.expected.tolist(), strict=True),
+        {
+            "parameter": lambda pair: pair[0].name,
+            "expected standard error": lambda pair: finite(pair[0].shown[1] * pair[1]),
+            "unit": lambda pair: pair[0].shown[0],
+        },
+    )
 
 
 def _poses(design: PoseDesign) -> Table:

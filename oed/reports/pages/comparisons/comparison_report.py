@@ -21,9 +21,9 @@ from oed.reports.pictures.comparison_pictures import (
     friction_runs_picture,
     significance_picture,
 )
-from oed.reports.rendering.page import Cell, Fact, Page, Section, Table
+from oed.reports.rendering.page import Cell, Fact, Page, Section, Table, page_of
 from oed.reports.rendering.picture import Picture
-from oed.reports.rendering.provenance import Recording, footer
+from oed.reports.rendering.provenance import Recording
 from oed.reports.rendering.saving import save_page
 from robots.common.files import ResultFolder
 
@@ -44,12 +44,11 @@ def comparison_page(comparison: ModelComparison) -> Page:
     """
     damaged, last = comparison.damaged, len(comparison.runs) - 1
     parts = {name for run in comparison.compared for name in comparison.parts(run)}
-    return Page(
+    return page_of(
+        comparison,
         title="Comparison of models",
         robot=comparison.robot_name,
-        verdict=comparison.conclusion,
         logs=tuple(Recording(name=run.label, start=run.date) for run in comparison.runs),
-        findings=comparison.remarks,
         facts=(
             Fact(label="Runs", value=len(comparison.runs), note=f"order: {comparison.order}"),
             Fact(label="Parts that differ", value=len(parts)),
@@ -92,7 +91,6 @@ def comparison_page(comparison: ModelComparison) -> Page:
                 folded=True,
             ),
         ),
-        footer=footer(),
     )
 
 

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from estimation.actuators import Actuators, DriveValue
 from oed.reports.pictures.drive_pictures import drive_error_picture, drive_motion_picture, drive_parameter_picture
-from oed.reports.rendering.page import Cell, Fact, Page, Section, Table
+from oed.reports.rendering.page import Fact, Page, Section, Table, page_of, table_of
 from oed.reports.rendering.picture import Picture
-from oed.reports.rendering.provenance import footer, recordings_of
+from oed.reports.rendering.provenance import recordings_of
 from oed.reports.rendering.saving import save_page
 from robots.common.files import ResultFolder
 from robots.common.plain import significant
@@ -21,12 +21,11 @@ def actuators_page(result: Actuators) -> Page:
     """Builds the page: motion, errors, parameters with intervals, what is not determined, and the next motion."""
     before, after = 1e3 * result.described_error, 1e3 * result.held_out_error
     motion = [drive_motion_picture(trace, result.joints) for trace in result.traces[:1]]
-    return Page(
+    return page_of(
+        result,
         title="Drives",
         robot=result.robot,
-        verdict=result.conclusion,
         logs=recordings_of(result.provenance.get("logs", ())),
-        findings=result.remarks,
         facts=(
             Fact(label="Held-out error", value=f"{after:.3g} mrad", note="RMS, mean of the joints"),
             Fact(label="As described", value=f"{before:.3g} mrad"),
@@ -55,7 +54,6 @@ def actuators_page(result: Actuators) -> Page:
             ),
             Section(title="Next motion", paragraphs=(result.next_motion,)),
         ),
-        footer=footer(),
     )
 
 
@@ -69,21 +67,19 @@ def _parameter_pictures(result: Actuators) -> tuple[Picture, ...]:
 
 
 def _table(result: Actuators) -> Table:
-    rows: list[tuple[Cell, ...]] = [
-        (
-            value.parameter,
-            value.group,
-            significant(value.value, value.standard_error),
-            _interval(value),
-            value.unit,
-            significant(value.described, value.standard_error),
-            value.status + (f"; only together with {', '.join(value.partners)}" if value.partners else ""),
-        )
-        for value in result.parameters
-    ]
-    return Table(
-        headings=("parameter", "joint or class", "value", "95 % interval", "unit", "described", "status"),
-        rows=tuple(rows),
+    return table_of(
+        result.parameters,
+        {
+            "parameter": lambda value: value.parameter,
+            "joint or class": lambda value: value.group,
+            "value": lambda value: significant(value.value, value.standard_error),
+            "95 % interval": _interval,
+            "unit": lambda value: value.unit,
+            "described": lambda value: significant(value.described, value.standard_error),
+            "status": lambda value: (
+                value.status + (f"; only together with {', '.join(value.partners)}" if value.partners else "")
+            ),
+        },
     )
 
 

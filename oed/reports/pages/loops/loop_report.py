@@ -9,11 +9,11 @@ import numpy as np
 from oed.campaigns.loops.result import LoopResult
 from oed.campaigns.loops.state import Experiment, Verdict, name_of
 from oed.exports import read_trajectory
-from oed.reports.pictures.trajectory_pictures import trajectory_picture
-from oed.reports.rendering.page import Cell, Fact, Page, Section, Table
+from oed.reports.pictures.trajectory_pictures import motion_picture
+from oed.reports.rendering.page import Cell, Fact, Page, Section, Table, page_of
 from oed.reports.rendering.palette import joint_role
 from oed.reports.rendering.picture import Panel, Picture, Series
-from oed.reports.rendering.provenance import Recording, footer
+from oed.reports.rendering.provenance import Recording
 from oed.reports.rendering.saving import save_page
 from robots.common.files import ResultFolder
 from robots.common.plain import two_digits
@@ -30,17 +30,16 @@ def save_loop_report(result: LoopResult, folder: ResultFolder, *, png: bool = Fa
 def loop_page(result: LoopResult) -> Page:
     """Builds the page: the end, the errors over the experiments, and a section for each experiment."""
     last, rows = result.diagnosis, sum(_rows(experiment) for experiment in result.experiments)
-    return Page(
+    return page_of(
+        result,
         title="Loop of experiments",
         robot=result.robot.title or result.robot.name,
-        verdict=result.conclusion,
         logs=tuple(
             Recording(name=run.recorded.log)
             for experiment in result.experiments
             for run in experiment.runs
             if run.recorded is not None
         ),
-        findings=result.remarks,
         facts=(
             Fact(label="Experiments", value=len(result.experiments), note=f"{rows} rows of feedback"),
             Fact(label="Effects found", value=len(last.findings), note=", ".join(last.causes)),
@@ -51,7 +50,6 @@ def loop_page(result: LoopResult) -> Page:
             ),
         ),
         sections=(_course(result), *(_section(result, k) for k in range(len(result.experiments)))),
-        footer=footer(),
     )
 
 
@@ -109,18 +107,7 @@ def _section(result: LoopResult, index: int) -> Section:
             f"{experiment.why[:1].upper()}{experiment.why[1:]}.{chance}",
             f"Diagnosis: {verdict.verdict}. Files: {verdict.folder}.",
         ),
-        pictures=(
-            trajectory_picture(
-                motion.t,
-                motion.q,
-                motion.dq,
-                motion.ddq,
-                limits=robot.limits,
-                joint_names=robot.joint_names,
-                kinds=robot.chain.kinds,
-                name=f"trajectory_{index + 1}",
-            ),
-        ),
+        pictures=(motion_picture(robot, motion, name=f"trajectory_{index + 1}"),),
         tables=(
             Table(
                 headings=("cause", "p-value", "held-out error [%]", "with it [%]", "what it does"),

@@ -8,9 +8,9 @@ from estimation.monitoring import MonitorResult
 from estimation.monitoring.findings import LIGHTS
 from estimation.monitoring.result import HEAT_WORDS
 from oed.reports.pictures.monitor_pictures import trend_picture
-from oed.reports.rendering.page import Cell, Fact, Page, Section, Status, Table
+from oed.reports.rendering.page import Cell, Fact, Page, Section, Status, Table, page_of, table_of
 from oed.reports.rendering.picture import Picture
-from oed.reports.rendering.provenance import Recording, footer
+from oed.reports.rendering.provenance import Recording
 from oed.reports.rendering.saving import save_page
 from robots.common.files import ResultFolder
 
@@ -27,14 +27,13 @@ def monitor_page(result: MonitorResult) -> Page:
     """Builds the page: findings, trends of all joints, and the logs."""
     low, high = result.heat_range
     left_out = [row for row in result.logs if not row.used]
-    return Page(
+    return page_of(
+        result,
         title="Monitoring",
         robot=result.robot,
-        verdict=result.conclusion,
         logs=tuple(
             Recording(name=row.name, start=row.start, duration=row.end - row.start) for row in result.logs if row.used
         ),
-        findings=result.remarks,
         facts=(
             Fact(label="Light", value=result.light, status=STATUS[result.light]),
             Fact(label="Findings", value=len(result.findings)),
@@ -62,17 +61,22 @@ def monitor_page(result: MonitorResult) -> Page:
             Section(title="Logs", tables=(_logs(result),), folded=len(result.logs) > 40),
             *_change_points(result),
         ),
-        footer=footer(),
     )
 
 
 def findings_table(result: MonitorResult) -> Table:
     """A row per finding."""
-    rows: list[tuple[Cell, ...]] = [
-        (LIGHTS[f.severity], f.kind, f.joint, f.sentence(result.origin), f.log or None, f.advice())
-        for f in result.findings
-    ]
-    return Table(headings=("light", "kind", "joint", "finding", "log", "what to do"), rows=tuple(rows))
+    return table_of(
+        result.findings,
+        {
+            "light": lambda f: LIGHTS[f.severity],
+            "kind": lambda f: f.kind,
+            "joint": lambda f: f.joint,
+            "finding": lambda f: f.sentence(result.origin),
+            "log": lambda f: f.log or None,
+            "what to do": lambda f: f.advice(),
+        },
+    )
 
 
 def trends(result: MonitorResult, name: str = "trends") -> Picture:
@@ -103,11 +107,15 @@ def trends(result: MonitorResult, name: str = "trends") -> Picture:
 
 
 def _logs(result: MonitorResult) -> Table:
-    rows: list[tuple[Cell, ...]] = []
-    for row in result.logs:
-        start = result.since(row.start) if np.isfinite(row.start) else None
-        rows.append((row.name, start, "used" if row.used else "left out", ", ".join(row.findings) or row.note or None))
-    return Table(headings=("log", "start", "", "findings"), rows=tuple(rows))
+    return table_of(
+        result.logs,
+        {
+            "log": lambda row: row.name,
+            "start": lambda row: result.since(row.start) if np.isfinite(row.start) else None,
+            "": lambda row: "used" if row.used else "left out",
+            "findings": lambda row: ", ".join(row.findings) or row.note or None,
+        },
+    )
 
 
 def _change_points(result: MonitorResult) -> tuple[Section, ...]:
