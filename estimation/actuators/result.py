@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -23,6 +23,7 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 
 MOTION = "motion.parquet"
+_REMEDY = "give an actuators.json of oed actuators"
 _UNEXPLAINED = 3.0
 """A joint whose held-out error is so many times the median of all joints is named as unexplained."""
 
@@ -342,18 +343,30 @@ def load_actuators(path: str | Path) -> Actuators:
     Raises:
         InputError: a missing file, or one that holds no drives.
     """
-    file, remedy = Path(path), f"give an {Actuators.FILE} of oed actuators"
+    file = Path(path)
     file = file / Actuators.FILE if file.is_dir() else file
-    data = read_json(file, Actuators.FORMAT, Actuators.FORMAT_VERSION, remedy=remedy)
-    drives = read(list[_Law], data.get("joints"), file=file, remedy=remedy)
+    data = read_json(file, Actuators.FORMAT, Actuators.FORMAT_VERSION, remedy=_REMEDY)
+    return replace(actuators_of(data, file), traces=_traces(file.parent / MOTION, data))
+
+
+def actuators_of(data: Mapping[str, Any], file: str | Path | None = None) -> Actuators:
+    """Reads the content of an `actuators.json`, without the motion beside it.
+
+    Args:
+        data: plain data.
+        file: in which they were found, for messages.
+
+    Raises:
+        InputError: data that are damaged.
+    """
+    drives = read(list[_Law], data.get("joints"), file=file, remedy=_REMEDY)
     return Actuators.from_dict(
         data,
         file=file,
-        remedy=remedy,
+        remedy=_REMEDY,
         joints=tuple(drive.name for drive in drives),
         law=tuple(drive.law for drive in drives),
         values=tuple(drive.values for drive in drives),
-        traces=_traces(file.parent / MOTION, len(drives), str(data.get("held_out"))),
     )
 
 
@@ -364,7 +377,8 @@ class _Law:
     values: Mapping[str, float]
 
 
-def _traces(path: Path, n: int, name: str) -> tuple[Trace, ...]:
+def _traces(path: Path, data: Mapping[str, Any]) -> tuple[Trace, ...]:
+    n, name = len(data["joints"]), str(data["held_out"])
     if not path.is_file():
         return ()
     import pandas as pd
