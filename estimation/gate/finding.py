@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal, get_args
 
+from estimation.gate.explanations import CODES
 from robots.common.records import Record
 
 Severity = Literal["info", "warning", "refuse"]
@@ -27,6 +28,8 @@ class Finding(Record):
         row: at which it begins, counted from 1, if it has a place.
     """
 
+    ENTRIES = ("*", "code")
+
     name: str
     severity: Severity
     text: str
@@ -36,6 +39,11 @@ class Finding(Record):
     column: str | None = None
     joint: int | None = None
     row: int | None = None
+
+    @property
+    def code(self) -> str | None:
+        """Code under which `oed explain` explains it; None of a finding that has none."""
+        return CODES.get(self.name)
 
     def __str__(self) -> str:
         named = (("joint", self.joint), ("column", self.column), ("row", self.row))

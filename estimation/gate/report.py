@@ -204,12 +204,12 @@ class GateReport(Result):
 
     @property
     def spike_rows(self) -> NDArray[np.intp]:
-        """Rows with a spike, counted from 1."""
+        """Rows (K,) with a spike, counted from 1."""
         return self.spikes + 1
 
     @property
     def stale_rows(self) -> NDArray[np.intp]:
-        """Rows that repeat the one before, counted from 1."""
+        """Rows (K,) that repeat the one before, counted from 1."""
         return self.stale + 1
 
     def summary(self) -> str:
@@ -218,7 +218,12 @@ class GateReport(Result):
         verdict = "refused" if self.refused else "no torque, its motion is usable" if lacks_torque else "usable"
         rate = 1.0 / self.period if self.period > 0 else float("nan")
         head = f"{self.log or 'log'}: {verdict}; {self.samples} samples, {self.duration:.4g} s at {rate:.4g} Hz"
-        return "\n".join([head, *(f"  {finding.severity}: {finding}" for finding in self.findings)])
+        return "\n".join(
+            [
+                head,
+                *(f"  {finding.severity} {finding.code or ''}".rstrip() + f": {finding}" for finding in self.findings),
+            ]
+        )
 
     def to_frame(self) -> pd.DataFrame:
         """Tabulates the findings, one a row."""

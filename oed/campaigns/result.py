@@ -148,6 +148,9 @@ class Campaign(Planned, format="robot-oed campaign", tool=True):
 
         Args:
             digests: SHA-256 of each stage's file, by the stage's name, where the files are written.
+
+        Returns:
+            An entry for each stage, as `campaign.json` has it.
         """
         return [
             stage.to_dict(limits=self.robot.limits)
