@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from estimation.actuators.search import LoopFinding
 from robots.common.errors import InputError
-from robots.common.records import Finding, Result, findings_of, read, read_json
+from robots.common.records import Finding, Result, axes_for, findings_of, read, read_json
 from robots.drives import Drive
 from robots.robot import Robot
 
@@ -298,9 +298,7 @@ class Actuators(Result, format="robot-oed actuators"):
         Args:
             ax: where to draw; a new figure by default.
         """
-        from matplotlib.figure import Figure
-
-        axes = ax if ax is not None else Figure(figsize=(7, 4)).subplots()
+        axes = axes_for(ax, (7, 4))
         place = np.arange(len(self.errors))
         for shift, key, label in ((-0.2, "held_out_described", "as described"), (0.2, "held_out", "identified")):
             axes.bar(place + shift, [1e3 * getattr(error, key) for error in self.errors], width=0.4, label=label)
@@ -309,17 +307,8 @@ class Actuators(Result, format="robot-oed actuators"):
         axes.legend()
         return axes
 
-    def save(self, folder: str | Path, *, force: bool = False) -> None:
-        """Writes `actuators.json` and `motion.parquet` into a folder that is there.
-
-        Args:
-            folder: an existing one.
-            force: replace files that are there.
-
-        Raises:
-            InputError: a file is there, and force is not given.
-        """
-        super().save(folder, force=force)
+    def _save_beside(self, folder: Path, *, force: bool) -> None:
+        """Writes `motion.parquet`."""
         if self.traces:
             import pandas as pd
 
@@ -328,7 +317,7 @@ class Actuators(Result, format="robot-oed actuators"):
             names = {"q": "measured", "qref": "command", "described": "described", "identified": "identified"}
             for prefix, key in names.items():
                 columns |= {f"{prefix}{j + 1}": getattr(trace, key)[:, j] for j in range(len(self.joints))}
-            target = Path(folder) / MOTION
+            target = folder / MOTION
             if target.exists() and not force:
                 raise InputError("the file exists", file=target, remedy="use --force")
             pd.DataFrame(columns).to_parquet(target, index=False)

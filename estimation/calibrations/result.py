@@ -16,7 +16,7 @@ from estimation.calibrations.selection import KindTrial
 from estimation.calibrations.undetermined import Undetermined
 from estimation.models.robot_in_file import build_robot, describe_robot
 from robots.common.errors import InputError
-from robots.common.records import Finding, Record, Result, findings_of, read_json
+from robots.common.records import Finding, Record, Result, axes_for, findings_of, read_json
 from robots.geometry_errors.terms import error_term
 from robots.geometry_errors.terms.base import shown_unit
 from robots.robot import Robot
@@ -310,10 +310,8 @@ class Calibration(Result, format="robot-oed calibration"):
         Args:
             ax: where to draw; a new figure by default.
         """
-        from matplotlib.figure import Figure
-
         unit, factor = SHOWN[self.unit]
-        axes = ax if ax is not None else Figure(figsize=(7, 4)).subplots()
+        axes = axes_for(ax, (7, 4))
         place = np.arange(1, len(self.poses.line) + 1)
         for values, label in ((self.poses.before, "description"), (self.poses.held_out, "calibrated, held out")):
             axes.plot(place, factor * values, "o", markersize=4, label=label)

@@ -19,7 +19,7 @@ from estimation.comparisons.merging import MergedModel
 from estimation.comparisons.part_names import grouped, listed
 from estimation.comparisons.payload_differences import PayloadDifference
 from estimation.comparisons.runs import Run
-from robots.common.records import Finding, Result, findings_of, plain
+from robots.common.records import Finding, Result, axes_for, findings_of, plain
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -297,9 +297,7 @@ class ModelComparison(Result, format="robot-oed comparison", shares=("labels", "
         Args:
             ax: where to draw; a new figure by default.
         """
-        from matplotlib.figure import Figure
-
-        axes = ax if ax is not None else Figure(figsize=(7, 4)).subplots()
+        axes = axes_for(ax, (7, 4))
         x = np.arange(len(self.runs)) if self.hours is None else self.hours
         for curve in self.curves:
             base = abs(curve.level[0]) or 1.0
@@ -311,15 +309,6 @@ class ModelComparison(Result, format="robot-oed comparison", shares=("labels", "
         axes.legend()
         return axes
 
-    def save(self, folder: str | Path, *, force: bool = False) -> None:
-        """Writes `compare.json` and the merged `model.json` into a folder that is there.
-
-        Args:
-            folder: an existing one.
-            force: replace files that are there.
-
-        Raises:
-            InputError: a file is there, and force is not given.
-        """
-        super().save(folder, force=force)
-        self.merged.model.save(Path(folder) / MODEL, force=force)
+    def _save_beside(self, folder: Path, *, force: bool) -> None:
+        """Writes the merged `model.json`."""
+        self.merged.model.save(folder / MODEL, force=force)

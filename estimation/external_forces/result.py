@@ -160,20 +160,15 @@ class ForceEstimate(Result, format="robot-oed forces", version=2):
 
         return pd.DataFrame(self._columns())
 
-    def save(self, folder: str | Path, *, force: bool = False) -> None:
-        """Writes ``forces.csv`` and ``forces.json`` into a folder.
+    def _save_beside(self, folder: Path, *, force: bool) -> None:
+        """Writes ``forces.csv``.
 
         The table has t, contact (0 or 1, from when the statistic passes the threshold until it has been below for the
         observer's memory), statistic (1 is the threshold), extrapolates, the force fx.. at the tool if
         there is no moment, force and moment wfx.., wmx.., each with _sd, and the external joint torques tau_ext1..
-
-        Raises:
-            InputError: a file is there, and force is not given.
         """
-        folder = Path(folder)
         units = {"t": "s", **{f"f{k}{end}": "N" for k in AXES for end in ("", "_sd")}}
         write_table(folder / "forces.csv", self._columns(), {"content": "external forces"}, units=units, force=force)
-        super().save(folder, force=force)
 
     def _columns(self) -> dict[str, Array]:
         columns = {"t": self.t, "contact": self.flagged.astype(float), "statistic": self.statistic}

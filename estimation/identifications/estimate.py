@@ -14,7 +14,7 @@ from estimation.gate import GateReport
 from estimation.identifications.choices import Choice
 from estimation.models.model import Model
 from robots.common.plain import percent, place_of
-from robots.common.records import Finding, Result
+from robots.common.records import Finding, Result, axes_for
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -255,9 +255,7 @@ class Estimate(Result):
         Args:
             ax: where to draw; a new figure by default.
         """
-        from matplotlib.figure import Figure
-
-        axes = ax if ax is not None else Figure(figsize=(5, 5)).subplots()
+        axes = axes_for(ax, (5, 5))
         for joint in self.joints:
             scale = joint.torque_rms or 1.0
             index = joint.joint - 1

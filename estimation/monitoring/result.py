@@ -211,14 +211,9 @@ class MonitorResult(Result, format="robot-oed monitoring", shares=("origin",)):
             }
         )
 
-    def save(self, folder: str | Path, *, force: bool = False) -> None:
-        """Writes `monitor.json` and `trends.csv` into a folder.
-
-        Raises:
-            InputError: a file is there, and force is not given.
-        """
-        super().save(folder, force=force)
-        write_atomic(Path(folder) / "trends.csv", self.to_frame().to_csv(index=False), force=force)
+    def _save_beside(self, folder: Path, *, force: bool) -> None:
+        """Writes `trends.csv`."""
+        write_atomic(folder / "trends.csv", self.to_frame().to_csv(index=False), force=force)
 
     def rows_of(self, log: int) -> Sequence[int]:
         """Indices of the windows of a log, counted from 0."""

@@ -15,7 +15,7 @@ from estimation.payloads.body import DAMAGED, FORMAT, FORMAT_VERSION, Body, body
 from estimation.payloads.determination import determined
 from estimation.payloads.intervals import Quantity, quantities
 from robots.common.plain import two_digits
-from robots.common.records import Finding, Result, findings_of
+from robots.common.records import Finding, Result, axes_for, findings_of
 from robots.terms.situations.sensitivities import moved_body
 
 if TYPE_CHECKING:
@@ -226,9 +226,7 @@ class PayloadEstimate(Result, format=FORMAT, version=FORMAT_VERSION):
         Args:
             ax: where to draw; a new figure by default.
         """
-        from matplotlib.figure import Figure
-
-        axes = ax if ax is not None else Figure(figsize=(6, 4)).subplots()
+        axes = axes_for(ax, (6, 4))
         place = np.arange(len(self.joints))
         errors = np.array([_errors(joint) for joint in self.joints]).T
         for shift, values, label in zip((-0.2, 0.2), errors, ("without payload", "with payload"), strict=True):

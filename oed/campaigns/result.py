@@ -25,7 +25,7 @@ from oed.exports import read_trajectory, write_trajectory
 from robots.collision import Surroundings
 from robots.common.errors import InputError
 from robots.common.files import existing_file, sha256
-from robots.common.records import Finding, findings_of, plain, read, write_json
+from robots.common.records import Finding, axes_for, findings_of, plain, read, write_json
 from robots.loading import load_robot
 from robots.robot import Robot
 from robots.thermal import KnownThermal, SecondOrder
@@ -252,9 +252,7 @@ class Campaign(Planned, format="robot-oed campaign", tool=True):
 
     def plot(self, ax: Axes | None = None) -> Axes:
         """Draws on `ax` the expected temperatures where heat is produced; without a thermal model, the heat so far."""
-        from matplotlib.figure import Figure
-
-        axes = ax if ax is not None else Figure(figsize=(9, 4)).subplots()
+        axes = axes_for(ax, (9, 4))
         if (temperatures := self.temperatures) is not None:
             t, values, label = temperatures.t, temperatures.T1, "expected temperature [degC]"
         else:

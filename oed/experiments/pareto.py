@@ -17,7 +17,7 @@ from oed.experiments.designing import design
 from oed.experiments.quality import excitation_findings
 from oed.experiments.results.result import Design
 from robots.common.errors import InputError
-from robots.common.records import Finding, Result
+from robots.common.records import Finding, Result, axes_for
 from robots.robot import Robot
 
 if TYPE_CHECKING:
@@ -132,9 +132,7 @@ class ParetoFront(Result, format="robot-oed pareto front"):
         Args:
             ax: where to draw; a new figure by default.
         """
-        from matplotlib.figure import Figure
-
-        axes = ax if ax is not None else Figure(figsize=(6, 5)).subplots()
+        axes = axes_for(ax, (6, 5))
         for efficient, marker in ((True, "o"), (False, "x")):
             chosen = self.efficient == efficient
             axes.plot(self.values[chosen, 0], self.values[chosen, 1], marker, label="efficient" if efficient else "not")
@@ -143,21 +141,12 @@ class ParetoFront(Result, format="robot-oed pareto front"):
         axes.legend()
         return axes
 
-    def save(self, folder: str | Path, *, force: bool = False) -> None:
-        """Writes `pareto.json`, and each design in a folder of its own.
-
-        Args:
-            folder: an existing one.
-            force: replace files that are there.
-
-        Raises:
-            InputError: a file is there, and force is not given.
-        """
+    def _save_beside(self, folder: Path, *, force: bool) -> None:
+        """Writes each design in a folder of its own."""
         for point, saved in enumerate(self.designs, start=1):
-            own = Path(folder) / folder_of(point)
+            own = folder / folder_of(point)
             own.mkdir(exist_ok=True)
             saved.save(own, force=force)
-        super().save(folder, force=force)
 
 
 def pareto(

@@ -19,7 +19,7 @@ from estimation.diagnosis.simulations.simulation_result import Simulation
 from estimation.diagnosis.validations.prediction_settings import all_row_errors
 from estimation.models.model import Model, load_model
 from robots.common.records import Finding as Remark
-from robots.common.records import Result, effect_code, findings_of, read, read_json
+from robots.common.records import Result, axes_for, effect_code, findings_of, read, read_json
 from robots.terms.base import length_unit
 
 if TYPE_CHECKING:
@@ -264,9 +264,7 @@ class Diagnosis(Result):
 
     def plot(self, ax: Axes | None = None) -> Axes:
         """Plots the held-out error of each joint for both models, on `ax` or on a new figure; returns the axes."""
-        from matplotlib.figure import Figure
-
-        axes = ax if ax is not None else Figure(figsize=(6, 4)).subplots()
+        axes = axes_for(ax, (6, 4))
         joints = np.arange(1, len(self.baseline) + 1)
         axes.bar(joints - 0.2, 100 * self.baseline, 0.4, label="base model")
         axes.bar(joints + 0.2, 100 * self.extended, 0.4, label="extended model")
@@ -275,18 +273,9 @@ class Diagnosis(Result):
         axes.legend()
         return axes
 
-    def save(self, folder: str | Path, *, force: bool = False) -> None:
-        """Writes `diagnosis.json` and `model.json` into an existing folder.
-
-        Args:
-            folder: the folder.
-            force: whether existing files are replaced.
-
-        Raises:
-            InputError: a file exists, and `force` is not set.
-        """
-        super().save(folder, force=force)
-        self.model.save(Path(folder) / MODEL, force=force)
+    def _save_beside(self, folder: Path, *, force: bool) -> None:
+        """Writes `model.json`."""
+        self.model.save(folder / MODEL, force=force)
 
     @staticmethod
     def load(folder: str | Path) -> Diagnosis:

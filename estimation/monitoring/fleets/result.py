@@ -111,11 +111,6 @@ class FleetResult(Result, format="robot-oed fleet"):
             ]
         )
 
-    def save(self, folder: str | Path, *, force: bool = False) -> None:
-        """Writes `fleet.json` and `fleet.csv` into a folder.
-
-        Raises:
-            InputError: a file is there, and force is not given.
-        """
-        super().save(folder, force=force)
-        write_atomic(Path(folder) / TABLE, self.to_frame().to_csv(index=False), force=force)
+    def _save_beside(self, folder: Path, *, force: bool) -> None:
+        """Writes `fleet.csv`."""
+        write_atomic(folder / TABLE, self.to_frame().to_csv(index=False), force=force)

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from estimation.models.model import Model
 from estimation.thermal.results.estimate import ThermalEstimate
 from estimation.thermal.torque import ThermalTorqueModel
-from robots.common.records import Finding, Result, findings_of
+from robots.common.records import Finding, Result, axes_for, findings_of
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -121,9 +121,7 @@ class CampaignEstimate(Result):
 
     def plot(self, ax: Axes | None = None) -> Axes:
         """Draws each joint's friction over that at T0 against time."""
-        from matplotlib.figure import Figure
-
-        axes = ax if ax is not None else Figure(figsize=(7, 4)).subplots()
+        axes = axes_for(ax, (7, 4))
         for j, fit in enumerate(self.thermal):
             for run in fit.runs if fit is not None else ():
                 if run.channel == "friction":

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from estimation.thermal.results.estimate import RunFit, ThermalEstimate
-from robots.common.records import Record
+from robots.common.records import Record, axes_for
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -119,9 +119,7 @@ class ThermalChoice(Record):
 
     def plot(self, ax: Axes | None = None) -> Axes:
         """Draws each model's error against time, at the largest power."""
-        from matplotlib.figure import Figure
-
-        axes = ax if ax is not None else Figure(figsize=(7, 4)).subplots()
+        axes = axes_for(ax, (7, 4))
         for item in self.candidates:
             if item.estimate is not None:
                 run = max(item.estimate.runs, key=lambda run: (run.channel == "friction", run.power))

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from estimation.thermal.results.derived import SPAN, Quantity
 from robots.common.errors import InputError
-from robots.common.records import Result, read, read_json
+from robots.common.records import Result, axes_for, read, read_json
 from robots.thermal import ThermalModel, build_thermal_model
 
 if TYPE_CHECKING:
@@ -187,9 +187,7 @@ class ThermalEstimate(Result, format="robot-oed thermal model"):
         Args:
             ax: where to draw; a new figure by default.
         """
-        from matplotlib.figure import Figure
-
-        axes = ax if ax is not None else Figure(figsize=(7, 4)).subplots()
+        axes = axes_for(ax, (7, 4))
         shown = [run for run in self.runs if run.channel == "friction"] or list(self.runs)
         for run in shown:
             minutes = (run.t - run.t[0]) / 60.0

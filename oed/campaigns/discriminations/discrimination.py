@@ -253,14 +253,8 @@ class Discrimination(
             *findings_of("experiment.unsure", [text] if self.resolves < _SURE else []),
         )
 
-    def save(self, folder: str | Path, *, force: bool = False) -> None:
-        """Writes the trajectories and `design.json`.
-
-        Args:
-            folder: an existing one; trajectories that are there are replaced.
-            force: replace a `design.json` that is there.
-        """
-        target = Path(folder)
+    def _save_beside(self, folder: Path, *, force: bool) -> None:
+        """Writes the trajectories."""
         written: set[str] = set()
         for file, run in zip(self.files, self.runs, strict=True):
             if file not in written:
@@ -270,9 +264,8 @@ class Discrimination(
                     "collisions": freedom_text(self.freedom),
                     "tool": f"robot-oed {VERSION}",
                 }
-                write_trajectory(target / file, run.motion, stated, kinds=self.robot.chain.kinds, force=True)
+                write_trajectory(folder / file, run.motion, stated, kinds=self.robot.chain.kinds, force=True)
                 written.add(file)
-        super().save(folder, force=force)
 
     def summary(self) -> str:
         """Describes the experiment and its alternatives in a few lines."""

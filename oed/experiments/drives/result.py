@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from oed.exports.trajectory_checks import UNKNOWN_COLLISIONS
 from robots.common.errors import InputError
 from robots.common.files import existing_file
-from robots.common.records import Finding, Result, findings_of, read_json
+from robots.common.records import Finding, Result, axes_for, findings_of, read_json
 from robots.common.tables.table_files import write_table
 
 if TYPE_CHECKING:
@@ -130,9 +130,7 @@ class DriveDesign(Result, format="robot-oed drive design"):
         Args:
             ax: where to draw; a new figure by default.
         """
-        from matplotlib.figure import Figure
-
-        axes = ax if ax is not None else Figure(figsize=(8, 4)).subplots()
+        axes = axes_for(ax, (8, 4))
         for j, name in enumerate(self.joints):
             axes.plot(self.t, self.command[:, j], label=name)
         axes.set_xlabel("time [s]")
@@ -140,21 +138,11 @@ class DriveDesign(Result, format="robot-oed drive design"):
         axes.legend(fontsize="small")
         return axes
 
-    def save(self, folder: str | Path, *, force: bool = False) -> None:
-        """Writes `commands.csv` (``t,qref1..qrefn``) and `design.json` into a folder that is there.
-
-        Args:
-            folder: an existing one.
-            force: replace files that are there.
-
-        Raises:
-            InputError: a file is there, and force is not given.
-        """
-        place = Path(folder)
+    def _save_beside(self, folder: Path, *, force: bool) -> None:
+        """Writes `commands.csv` (``t,qref1..qrefn``)."""
         columns = {"t": self.t} | {f"qref{j + 1}": self.command[:, j] for j in range(len(self.joints))}
         metadata = {"robot": self.robot, "joints": list(self.joints), "collisions": self.collisions}
-        write_table(place / COMMANDS, columns, metadata, force=force)
-        super().save(folder, force=force)
+        write_table(folder / COMMANDS, columns, metadata, force=force)
 
     @classmethod
     def load(cls, folder: str | Path) -> DriveDesign:

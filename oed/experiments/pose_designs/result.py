@@ -14,7 +14,7 @@ from oed.experiments.pose_designs.observability import observability_indices
 from oed.experiments.results.planned import OF_ROBOT, Planned
 from oed.experiments.safety_checks.freedom import freedom_text, is_free
 from oed.exports import write_trajectory
-from robots.common.records import Finding, findings_of, read, read_json
+from robots.common.records import Finding, axes_for, findings_of, read, read_json
 from robots.common.tables.table_files import write_table
 from robots.geometry_errors.terms import ErrorParameter
 from robots.robot import Robot
@@ -178,9 +178,7 @@ class PoseDesign(Planned, format="robot-oed pose design", tool=True):
         Args:
             ax: where to draw; a new figure by default.
         """
-        from matplotlib.figure import Figure
-
-        axes = ax if ax is not None else Figure(figsize=(6, 4)).subplots()
+        axes = axes_for(ax, (6, 4))
         for values, label in ((self.eigenvalues, "designed"), (self.random_eigenvalues, "random")):
             axes.semilogy(np.sqrt(np.maximum(values, 0.0))[::-1], "o-", markersize=3, label=label)
         axes.set_xlabel("direction")
@@ -188,32 +186,24 @@ class PoseDesign(Planned, format="robot-oed pose design", tool=True):
         axes.legend()
         return axes
 
-    def save(self, folder: str | Path, *, force: bool = False) -> None:
-        """Writes `design.json`, `poses.csv` and `trajectory.csv` into a folder that is there.
-
-        Args:
-            folder: an existing one.
-            force: replace files that are there.
-
-        Raises:
-            InputError: a file is there, and force is not given.
-        """
-        place = Path(folder)
-        super().save(folder, force=force)
+    def _save_beside(self, folder: Path, *, force: bool) -> None:
+        """Writes `poses.csv` and `trajectory.csv`."""
         rests = [segment for segment in self.segments if segment["kind"] == "pose"]
         columns: dict[str, Any] = {"pose": np.arange(1, len(self.q) + 1)}
         columns |= {f"q{i + 1}": values for i, values in enumerate(self.q.T)}
         columns |= {"start": np.array([r["start"] for r in rests]), "end": np.array([r["end"] for r in rests])}
         columns |= {name: np.full(len(self.q), np.nan) for name in self.settings["columns"]}
         units = {f"q{i + 1}": self.robot.limits.unit(i) for i in range(self.robot.n)} | {"start": "s", "end": "s"}
-        write_table(place / POSES, columns, {"robot": self.robot.stated or self.robot.origin}, units=units, force=force)
+        write_table(
+            folder / POSES, columns, {"robot": self.robot.stated or self.robot.origin}, units=units, force=force
+        )
         stated = {
             "robot": self.robot.stated or self.robot.origin or self.robot.name,
             "criterion": self.criterion,
             "collisions": freedom_text(self.freedom),
             "tool_version": VERSION,
         }
-        write_trajectory(place / TRAJECTORY, self.motion, stated, kinds=self.robot.chain.kinds, force=force)
+        write_trajectory(folder / TRAJECTORY, self.motion, stated, kinds=self.robot.chain.kinds, force=force)
 
 
 def load_pose_design(folder: str | Path, robot: Robot | None = None) -> PoseDesign:

@@ -294,19 +294,10 @@ class Design(Planned, format="robot-oed design", tool=True, shares=("limits=robo
         """
         return plot_velocities(self.motion, self.robot.limits, ax)
 
-    def save(self, folder: str | Path, *, force: bool = False) -> None:
-        """Writes `trajectory.csv` and `design.json` into a folder that is there.
-
-        Args:
-            folder: an existing one.
-            force: replace files that are there.
-
-        Raises:
-            InputError: a file is there, and force is not given.
-        """
+    def _save_beside(self, folder: Path, *, force: bool) -> None:
+        """Writes `trajectory.csv`."""
         kinds = self.robot.chain.kinds
-        write_trajectory(Path(folder) / TRAJECTORY, self.motion, self.metadata(), kinds=kinds, force=force)
-        super().save(folder, force=force)
+        write_trajectory(folder / TRAJECTORY, self.motion, self.metadata(), kinds=kinds, force=force)
 
     @classmethod
     def load(cls, folder: str | Path, robot: Robot | None = None, criterion: str | Criterion | None = None) -> Design:

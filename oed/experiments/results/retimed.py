@@ -191,24 +191,15 @@ class RetimedExperiment(Planned, format="robot-oed design", tool=True, shares=("
         """
         return plot_velocities(self.motion, self.robot.limits, ax)
 
-    def save(self, folder: str | Path, *, force: bool = False) -> None:
-        """Writes `trajectory.csv` and `design.json` into a folder that is there.
-
-        Args:
-            folder: an existing one.
-            force: replace files that are there.
-
-        Raises:
-            InputError: a file is there, and force is not given.
-        """
+    def _save_beside(self, folder: Path, *, force: bool) -> None:
+        """Writes `trajectory.csv`."""
         metadata = {
             "robot": self.robot.origin or self.robot.name,
             "period": self.robot.period,
             "collisions": freedom_text(self.freedom),
             "tool": f"robot-oed {VERSION}",
         }
-        write_trajectory(Path(folder) / TRAJECTORY, self.motion, metadata, kinds=self.robot.chain.kinds, force=force)
-        super().save(folder, force=force)
+        write_trajectory(folder / TRAJECTORY, self.motion, metadata, kinds=self.robot.chain.kinds, force=force)
 
     @classmethod
     def load(cls, folder: str | Path, robot: Robot | None = None) -> RetimedExperiment:

@@ -21,13 +21,16 @@ from __future__ import annotations
 
 from os import PathLike
 from pathlib import Path
-from typing import Any, ClassVar, Self, cast
+from typing import TYPE_CHECKING, Any, ClassVar, Self, cast
 
 from robots.common.records.entries import value_at, written
 from robots.common.records.files import write_json
 from robots.common.records.findings import Finding
 from robots.common.records.reading import Reader
 from robots.version import VERSION
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
 
 
 class Record:
@@ -125,18 +128,36 @@ class Result(Record):
         raise NotImplementedError
 
     def save(self, folder: str | Path, *, force: bool = False) -> None:
-        """Writes the JSON file into a folder that is there.
+        """Writes the files of the result into a folder that is there: JSON, and tables beside it.
 
         Args:
             folder: an existing one.
-            force: replace a file that is there.
+            force: replace files that are there.
 
         Raises:
-            InputError: the file is there, and force is not given.
+            InputError: a file is there, and force is not given.
         """
+        self._save_beside(Path(folder), force=force)
         write_json(Path(folder) / self.FILE, self.to_dict(), force=force)
+
+    def _save_beside(self, folder: Path, *, force: bool) -> None:
+        """Writes what belongs to the JSON file; nothing by default."""
 
     def _repr_html_(self) -> str:
         from html import escape
 
         return f"<pre>{escape(self.summary())}</pre>"
+
+
+def axes_for(ax: Axes | None, size: tuple[float, float]) -> Axes:
+    """Gives where to draw: the axes that a caller has, or those of a new figure.
+
+    Args:
+        ax: the caller's; None for a new figure.
+        size: width and height of the new figure [inch].
+    """
+    if ax is not None:
+        return ax
+    from matplotlib.figure import Figure
+
+    return Figure(figsize=size).subplots()

@@ -176,7 +176,7 @@ def test_files_that_are_no_calibrations_are_refused(tmp_path):
     with pytest.raises(InputError, match="not a calibration file"):
         load_calibration(other)
     other.write_text('{"format": "robot-oed calibration"}')
-    with pytest.raises(InputError, match="damaged"):
+    with pytest.raises(InputError, match="damaged|format version None"):
         load_calibration(other)
 
 
