@@ -175,8 +175,8 @@ def test_files_that_are_no_calibrations_are_refused(tmp_path):
     other.write_text("{}")
     with pytest.raises(InputError, match="not a calibration file"):
         load_calibration(other)
-    other.write_text('{"format": "robot-oed calibration"}')
-    with pytest.raises(InputError, match="damaged|format version None"):
+    other.write_text('{"format": "robot-oed calibration", "format_version": 1}')
+    with pytest.raises(InputError, match="damaged"):
         load_calibration(other)
 
 
