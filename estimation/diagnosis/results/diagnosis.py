@@ -175,7 +175,6 @@ class Diagnosis(Result):
         if standing != "sound":
             text = standing_text(self.verdict, *self._errors, self.limits)
             found += findings_of(f"diagnosis.{standing}", [text])
-        found += findings_of("diagnosis.unexplained", [f.sentence for f in self.findings if f.pattern])
         if self.verdict == "unexplained" and not any(item.code == "diagnosis.unexplained" for item in found):
             found += findings_of("diagnosis.unexplained", ["Part of the residual is not noise and has no known cause."])
         if self.verdict == "ambiguous":

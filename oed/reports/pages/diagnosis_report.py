@@ -64,9 +64,6 @@ def diagnosis_page(diagnosis: Diagnosis, animation: Animation | None = None) -> 
     sections += [_finding(diagnosis, index) for index in range(len(diagnosis.findings))]
     if diagnosis.simulation is not None:
         sections.append(simulation_section(diagnosis.simulation, robot.joint_names, robot.chain.kinds))
-    left = tuple(finding.sentence for finding in diagnosis.findings if finding.pattern)
-    if left:
-        sections.append(Section(title="Unexplained residual", paragraphs=left))
     sections.append(_next(diagnosis))
     sections.append(limits_section(diagnosis.limits, folded=bool(diagnosis.findings)))
     return page_of(
@@ -220,7 +217,6 @@ def _finding(diagnosis: Diagnosis, index: int) -> Section:
     )
     return Section(
         title=f"Finding {index + 1}: {finding.title}, {place}",
-        paragraphs=(finding.sentence,),
         pictures=(picture,),
         tables=tuple(tables),
     )

@@ -91,8 +91,6 @@ def estimate_page(estimate: Estimate, methods: MethodTable | None = None) -> Pag
     ]
     if methods is not None:
         sections.insert(1, Section(title="Estimators", tables=(_methods(methods),)))
-    if any(gate.findings for gate in estimate.gates):
-        sections.insert(len(sections) - 1, Section(title="The logs", tables=(_gates(estimate),)))
     return page_of(
         estimate,
         title="Identified dynamics",
@@ -225,12 +223,6 @@ def _methods(methods: MethodTable) -> Table:
             "best estimator."
         ),
     )
-
-
-def _gates(estimate: Estimate) -> Table:
-    rows = tuple((gate.log, finding.severity, str(finding)) for gate in estimate.gates for finding in gate.findings)
-    caption = "Result of the data checks before the fit, and the action taken."
-    return Table(headings=("log", "severity", "finding"), rows=rows, caption=caption)
 
 
 def _parameter_pictures(estimate: Estimate) -> tuple[Picture, ...]:

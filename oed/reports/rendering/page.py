@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Literal, TypeVar
 
 from oed.reports.animations.animation import Animation
@@ -133,6 +133,15 @@ class Page:
         for name in names:
             if names.count(name) > 1:
                 raise InputError(f"two pictures named {name!r} in one page", allowed="names that differ")
+
+    @property
+    def listed(self) -> tuple[Finding, ...]:
+        """The findings as rows: what the verdict states already is not said again."""
+        return tuple(
+            replace(finding, action="" if finding.action in self.verdict else finding.action)
+            for finding in self.findings
+            if finding.text.rstrip(".") not in self.verdict
+        )
 
     @property
     def level(self) -> Level:

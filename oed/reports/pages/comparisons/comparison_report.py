@@ -116,7 +116,7 @@ def _friction(comparison: ModelComparison, last: int) -> tuple[Section, ...]:
     shown = np.unique(np.linspace(0, last, min(CURVES, last + 1)).round().astype(int))
     joints = [curve.joint for curve in curves]
     base = [100 / np.maximum(np.abs(curve.torque[0]), 1e-12) for curve in curves]
-    sentences = tuple(item.sentence() for item in comparison.friction if item.run == last)
+    sentences = tuple(item.sentence() for item in comparison.friction if item.run == last and item.kind != "own")
     rows: list[tuple[Cell, ...]] = [
         (
             comparison.labels[item.run],

@@ -98,6 +98,8 @@ def _course(result: LoopResult) -> Section:
 
 def _section(result: LoopResult, index: int) -> Section:
     experiment, robot = result.experiments[index], result.robot
+    # What the last one shows stands among the findings.
+    earlier = index + 1 < len(result.experiments)
     verdict = _seen(experiment)
     chance = "" if experiment.resolves is None else f" Stated probability: {100 * experiment.resolves:.0f} %."
     motion, _ = read_trajectory(Path(result.folder) / experiment.runs[0].trajectory, n=robot.n)
@@ -110,8 +112,17 @@ def _section(result: LoopResult, index: int) -> Section:
         pictures=(motion_picture(robot, motion, name=f"trajectory_{index + 1}"),),
         tables=(
             Table(
-                headings=("cause", "p-value", "held-out error [%]", "with it [%]", "what it does"),
-                rows=tuple(_finding(finding) for finding in verdict.findings),
+                headings=(
+                    "cause",
+                    "p-value",
+                    "held-out error [%]",
+                    "with it [%]",
+                    *(("what it does",) if earlier else ()),
+                ),
+                rows=tuple(
+                    (*_finding(finding), *((str(finding.get("sentence", "")),) if earlier else ()))
+                    for finding in verdict.findings
+                ),
                 caption="What the logs up to here show beyond the base model.",
             ),
             Table(
@@ -128,7 +139,7 @@ def _finding(finding: dict[str, object]) -> tuple[Cell, ...]:
     assert isinstance(gain, dict)
     chance = "-" if not isinstance(p, float) else f"{p:.2g}" if p >= CHANCE else f"< {CHANCE:g}"
     before, after = (None if gain[key] is None else 100 * gain[key] for key in ("nrmse_before", "nrmse_after"))
-    return name_of(finding), chance, before, after, str(finding.get("sentence", ""))
+    return name_of(finding), chance, before, after
 
 
 def _run(experiment: Experiment, index: int) -> tuple[Cell, ...]:

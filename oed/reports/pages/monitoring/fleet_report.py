@@ -77,9 +77,7 @@ def _robots(result: FleetResult) -> Table:
         {
             "light": lambda row: row.light,
             "robot": lambda row: row.name,
-            "finding": lambda row: row.text,
             "since": lambda row: row.since or None,
-            "what to do": lambda row: row.advice or None,
             "logs used": lambda row: f"{len(row.logs) - row.left_out} of {len(row.logs)}",
             "by temperature": lambda row: f"{row.heat[0]:+.0f} to {row.heat[1]:+.0f} %" if row.trend.hours else None,
         },

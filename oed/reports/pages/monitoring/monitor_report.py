@@ -72,9 +72,10 @@ def findings_table(result: MonitorResult) -> Table:
             "light": lambda f: LIGHTS[f.severity],
             "kind": lambda f: f.kind,
             "joint": lambda f: f.joint,
-            "finding": lambda f: f.sentence(result.origin),
+            "size": lambda f: f"{f.size:+.3g} {f.unit}".rstrip() if f.unit else None,
+            "95 %": lambda f: f"{f.low:+.3g} to {f.high:+.3g}" if f.unit else None,
+            "since": lambda f: f.date(result.origin),
             "log": lambda f: f.log or None,
-            "what to do": lambda f: f.advice(),
         },
     )
 

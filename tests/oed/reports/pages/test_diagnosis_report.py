@@ -25,6 +25,7 @@ from robots.common.errors import InputError
 from robots.plants.closed_loop import Loop
 from robots.signals import Motion
 from robots.terms.effects import EFFECTS
+from tests.oed.reports.said_once import said_twice
 
 N = 400
 LIMITS = tuple(
@@ -102,6 +103,21 @@ def test_the_page_tells_all(found):
     assert "chosen from a list of usual values" in text
     assert "Record constant speeds" in text
     assert "two <joints>" not in text
+
+
+def test_a_finding_is_said_once(found):
+    """One finding stands in the verdict, several stand in rows; sections show the evidence without their sentences."""
+    (one,) = found.findings
+    other = replace(one, effect="spring", sentence="A spring acts on joint 2 that is stiffer than the gear.")
+    pattern = replace(
+        one, effect="unexplained", pattern="p", sentence="A pattern repeats with the position of joint 1."
+    )
+    trace = replace(found.trace, coordinate=found.trace.coordinate * 3)
+    several = replace(found, findings=(one, other, pattern), trace=trace)
+    for verdict in ("named", "unexplained", "ambiguous"):
+        assert said_twice(diagnosis_page(replace(several, verdict=verdict))) == []
+    assert said_twice(diagnosis_page(found)) == []
+    assert one.sentence in diagnosis_page(found).verdict
 
 
 @pytest.mark.slow
