@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from oed.experiments.pose_designs import PoseDesign, observability_indices
-from oed.experiments.safety_checks.freedom import freedom_text
+from oed.experiments.safety_checks.freedom import freedom_text, is_free
 from oed.reports.animations.building import animate
 from oed.reports.rendering.page import Cell, Fact, Page, Section, Table, page_of, table_of
 from oed.reports.rendering.picture import Panel, Picture, Series
@@ -33,7 +33,10 @@ def pose_design_page(design: PoseDesign) -> Page:
         sections=(
             Section(
                 title="Motion",
-                paragraphs=("The robot rests at each pose while it is measured.", freedom_text(design.freedom)),
+                paragraphs=(
+                    "The robot rests at each pose while it is measured.",
+                    *([freedom_text(design.freedom)] if is_free(design.freedom) else []),
+                ),
                 animation=animate(design.robot, design.motion, margins=(), source="tour of the poses"),
             ),
             Section(title="Observability", pictures=(_picture(design),), tables=(_indices(design),)),

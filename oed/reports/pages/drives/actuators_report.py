@@ -47,7 +47,6 @@ def actuators_page(result: Actuators) -> Page:
                 paragraphs=(
                     "The intervals hold the truth with 95 %, if the drive is of this form. They allow for correlated "
                     "noise.",
-                    *result.notes[-1:],
                 ),
                 pictures=_parameter_pictures(result),
                 tables=(_table(result),),
