@@ -126,7 +126,7 @@ def study(folder: Path, name: str) -> str:
     q = made.motion.q[::STEP]
     met = judge.meet(q)[:, ~built]
     height = judge.lowest(q[::4], True) - judge.lowest(q[:1], False)
-    cond = made.optimised.to_dict()["cond_Y"]
+    cond = made.optimised.cond
     worst = ""
     if met.any():
         i, j = np.array(judge.pairs)[~built][met.mean(axis=0).argmax()]

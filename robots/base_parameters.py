@@ -59,6 +59,11 @@ class BaseParameters:
         """The kept columns' names (b,)."""
         return tuple(column.name for column in self.columns)
 
+    @property
+    def units(self) -> tuple[str, ...]:
+        """Units of the parameters (b,)."""
+        return tuple(column.unit for column in self.columns)
+
     @cached_property
     def classes(self) -> tuple[str, ...]:
         """Each standard parameter's class (p,) after the thesis, section 1.1.

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from robots.common.errors import InputError
+from robots.common.records import read_null_as
 from robots.joints.velocity_ramps import VelocityRamp
 from robots.signals import FloatArray, Motion
 
@@ -48,12 +49,24 @@ class Margin:
             there is no limit, 0 on it, negative beyond it.
     """
 
+    ENTRIES = ("quantity", "joint", "unit?", "value", "limit", "time", "slack_fraction")
+
     quantity: str
     joint: int
     value: float
-    limit: float
+    limit: float = field(metadata=read_null_as(np.inf))
     time: float
     slack_fraction: float
+
+    def unit(self, limits: Limits | None = None) -> str | None:
+        """Unit of the value, by the limits of the joints; None where they are not given."""
+        return None if limits is None else limits.unit(self.joint - 1, self.quantity)
+
+    @property
+    def text(self) -> str:
+        """Quantity, joint and time, such as "velocity of joint 3 at 1.204 s"."""
+        quantity = "position" if self.quantity in ("lower", "upper") else self.quantity
+        return f"{quantity} of joint {self.joint} at {self.time:.3f} s"
 
     @property
     def slack(self) -> float:

@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, field
-from html import escape
+from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -14,8 +12,7 @@ from numpy.typing import NDArray
 
 from estimation.actuators.search import LoopFinding
 from robots.common.errors import InputError
-from robots.common.files import existing_file, write_atomic
-from robots.common.plain import finite, number
+from robots.common.records import Finding, Result, axes_for, findings_of, read, read_json
 from robots.drives import Drive
 from robots.robot import Robot
 
@@ -25,8 +22,10 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
-FILE, MOTION = "actuators.json", "motion.parquet"
-FORMAT, FORMAT_VERSION = "robot-oed actuators", 1
+MOTION = "motion.parquet"
+_REMEDY = "give an actuators.json of oed actuators"
+_UNEXPLAINED = 3.0
+"""A joint whose held-out error is so many times the median of all joints is named as unexplained."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -106,7 +105,7 @@ class Trace:
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Actuators:
+class Actuators(Result, format="robot-oed actuators"):
     """Identified drives of a robot.
 
     Attributes:
@@ -126,6 +125,20 @@ class Actuators:
         robots: the chains; empty if the result was loaded.
         drives: the drives with the identified values; empty if the result was loaded.
     """
+
+    FILE = "actuators.json"
+    ENTRIES = (
+        "robot",
+        "joints=laws",
+        "parameters",
+        "errors",
+        "findings",
+        "notes",
+        "held_out",
+        "written_error",
+        "success",
+        "provenance",
+    )
 
     robot: str
     joints: tuple[str, ...]
@@ -175,6 +188,77 @@ class Actuators:
         known = ", ".join(dict.fromkeys(item.parameter for item in self.parameters))
         raise InputError(f"{parameter} of {joint} was not identified", allowed=f"{known} of {', '.join(self.joints)}")
 
+    @property
+    def laws(self) -> list[dict[str, Any]]:
+        """Name, law and values of each joint's drive, as plain data."""
+        return [
+            {"name": name, "law": law, "values": values}
+            for name, law, values in zip(self.joints, self.law, self.values, strict=True)
+        ]
+
+    @property
+    def conclusion(self) -> str:
+        """How well the simulated motion is, as identified and as described."""
+        return (
+            f"The simulated motion misses the measured one by {1e3 * self.held_out_error:.3g} mrad on {self.held_out}; "
+            f"as described, by {1e3 * self.described_error:.3g} mrad."
+        )
+
+    @property
+    def remarks(self) -> tuple[Finding, ...]:
+        """Effects that were found, joints that stay unexplained, and what is not determined."""
+        found = [
+            Finding(
+                code="drives.effect",
+                subject=item.name,
+                text=f"{item.title}: {item.states}. Held-out error {1e3 * item.before:.3g} -> {1e3 * item.after:.3g} "
+                "mrad.",
+            )
+            for item in self.findings
+        ]
+        middle = float(np.median([error.held_out for error in self.errors]))
+        for error in self.errors:
+            if error.held_out > _UNEXPLAINED * middle and len(self.errors) > 1:
+                found.append(
+                    Finding(
+                        code="drives.unexplained",
+                        subject=error.name,
+                        text=f"{1e3 * error.held_out:.3g} mrad remain, with no effect of the catalogue to explain "
+                        "them.",
+                        action="look at its motion below; compare the joint with its like",
+                    )
+                )
+        open_ = self.undetermined
+        if open_:
+            names = ", ".join(value.name for value in open_[:6]) + (", ..." if len(open_) > 6 else "")
+            found.append(
+                Finding(
+                    code="drives.undetermined",
+                    text=f"The motion does not determine {len(open_)} of {len(self.parameters)} parameters: {names}.",
+                    action=self.next_motion,
+                )
+            )
+        return (*found, *findings_of("drives.note", self.notes))
+
+    @property
+    def next_motion(self) -> str:
+        """Says which motion would determine the rest."""
+        kinds = {value.parameter for value in self.undetermined}
+        parts = []
+        if kinds & {"armature", "delay"}:
+            parts.append("faster motion (steps, or sines of several Hz), which shows inertia and delay")
+        if kinds & {"viscous", "coulomb", "stribeck"}:
+            parts.append(
+                "constant speeds from slow to fast in both directions, which separate viscous and dry friction"
+            )
+        if kinds & {"torque_offset", "encoder_zero", "mass_factor"}:
+            parts.append("holds at poses with different gravity load")
+        if kinds & {"kp", "kd", "kv", "kr", "ki"}:
+            parts.append("a known payload, whose weight fixes the scale of gains")
+        if not parts:
+            return "All parameters are determined. To check them, play another motion and give its log as --held-out."
+        return f"Log a motion with {'; '.join(parts)}."
+
     def summary(self) -> str:
         """Lists errors of the simulated motion, findings, parameters, and what is not determined."""
         lines = [
@@ -214,9 +298,7 @@ class Actuators:
         Args:
             ax: where to draw; a new figure by default.
         """
-        from matplotlib.figure import Figure
-
-        axes = ax if ax is not None else Figure(figsize=(7, 4)).subplots()
+        axes = axes_for(ax, (7, 4))
         place = np.arange(len(self.errors))
         for shift, key, label in ((-0.2, "held_out_described", "as described"), (0.2, "held_out", "identified")):
             axes.bar(place + shift, [1e3 * getattr(error, key) for error in self.errors], width=0.4, label=label)
@@ -225,52 +307,8 @@ class Actuators:
         axes.legend()
         return axes
 
-    def _repr_html_(self) -> str:
-        return f"<pre>{escape(self.summary())}</pre>"
-
-    def to_dict(self) -> dict[str, Any]:
-        """Writes the result as plain data for `actuators.json`."""
-        return {
-            "format": FORMAT,
-            "format_version": FORMAT_VERSION,
-            "robot": self.robot,
-            "joints": [
-                {"name": name, "law": law, "values": dict(values)}
-                for name, law, values in zip(self.joints, self.law, self.values, strict=True)
-            ],
-            "parameters": [
-                {
-                    **asdict(value),
-                    "joints": list(value.joints),
-                    "standard_error": finite(value.standard_error),
-                    "lower": finite(value.lower),
-                    "upper": finite(value.upper),
-                    "partners": list(value.partners),
-                }
-                for value in self.parameters
-            ],
-            "errors": [asdict(error) for error in self.errors],
-            "findings": [asdict(finding) | {"rivals": [list(r) for r in finding.rivals]} for finding in self.findings],
-            "notes": list(self.notes),
-            "held_out": self.held_out,
-            "written_error": finite(self.written_error),
-            "success": self.success,
-            "provenance": dict(self.provenance),
-        }
-
-    def save(self, folder: str | Path, *, force: bool = False) -> None:
-        """Writes `actuators.json` and `motion.parquet` into a folder that is there.
-
-        Args:
-            folder: an existing one.
-            force: replace files that are there.
-
-        Raises:
-            InputError: a file is there, and force is not given.
-        """
-        place = Path(folder)
-        text = json.dumps(self.to_dict(), indent=2, allow_nan=False) + "\n"
-        write_atomic(place / FILE, text, force=force)
+    def _save_beside(self, folder: Path, *, force: bool) -> None:
+        """Writes `motion.parquet`."""
         if self.traces:
             import pandas as pd
 
@@ -279,7 +317,7 @@ class Actuators:
             names = {"q": "measured", "qref": "command", "described": "described", "identified": "identified"}
             for prefix, key in names.items():
                 columns |= {f"{prefix}{j + 1}": getattr(trace, key)[:, j] for j in range(len(self.joints))}
-            target = place / MOTION
+            target = folder / MOTION
             if target.exists() and not force:
                 raise InputError("the file exists", file=target, remedy="use --force")
             pd.DataFrame(columns).to_parquet(target, index=False)
@@ -294,44 +332,42 @@ def load_actuators(path: str | Path) -> Actuators:
     Raises:
         InputError: a missing file, or one that holds no drives.
     """
-    place = Path(path)
-    file = existing_file(place / FILE if place.is_dir() else place)
-    try:
-        data = json.loads(file.read_text(encoding="utf-8"))
-    except (UnicodeDecodeError, json.JSONDecodeError) as error:
-        raise InputError(f"is no JSON ({error})", file=file) from error
-    if not isinstance(data, dict) or data.get("format") != FORMAT:
-        raise InputError("holds no drives", file=file, allowed=f"a file of the format {FORMAT!r}")
-    try:
-        joints = tuple(joint["name"] for joint in data["joints"])
-        return Actuators(
-            robot=data["robot"],
-            joints=joints,
-            law=tuple(joint["law"] for joint in data["joints"]),
-            values=tuple(joint["values"] for joint in data["joints"]),
-            parameters=tuple(_value(value) for value in data["parameters"]),
-            errors=tuple(MotionError(**error) for error in data["errors"]),
-            findings=tuple(
-                LoopFinding(**finding | {"rivals": tuple((r[0], r[1]) for r in finding["rivals"])})
-                for finding in data["findings"]
-            ),
-            notes=tuple(data["notes"]),
-            held_out=data["held_out"],
-            written_error=number(data["written_error"]),
-            success=data["success"],
-            provenance=data["provenance"],
-            traces=_traces(file.parent / MOTION, len(joints), data["held_out"]),
-        )
-    except (KeyError, TypeError, ValueError) as error:
-        raise InputError(f"is damaged ({type(error).__name__}: {error})", file=file) from error
+    file = Path(path)
+    file = file / Actuators.FILE if file.is_dir() else file
+    data = read_json(file, Actuators.FORMAT, Actuators.FORMAT_VERSION, remedy=_REMEDY)
+    return replace(actuators_of(data, file), traces=_traces(file.parent / MOTION, data))
 
 
-def _value(value: dict[str, Any]) -> DriveValue:
-    unknown = {key: np.nan for key in ("standard_error", "lower", "upper") if value[key] is None}
-    return DriveValue(**value | unknown | {key: tuple(value[key]) for key in ("joints", "partners")})
+def actuators_of(data: Mapping[str, Any], file: str | Path | None = None) -> Actuators:
+    """Reads the content of an `actuators.json`, without the motion beside it.
+
+    Args:
+        data: plain data.
+        file: in which they were found, for messages.
+
+    Raises:
+        InputError: data that are damaged.
+    """
+    drives = read(list[_Law], data.get("joints"), file=file, remedy=_REMEDY)
+    return Actuators.from_dict(
+        data,
+        file=file,
+        remedy=_REMEDY,
+        joints=tuple(drive.name for drive in drives),
+        law=tuple(drive.law for drive in drives),
+        values=tuple(drive.values for drive in drives),
+    )
 
 
-def _traces(path: Path, n: int, name: str) -> tuple[Trace, ...]:
+@dataclass(frozen=True, kw_only=True)
+class _Law:
+    name: str
+    law: str
+    values: Mapping[str, float]
+
+
+def _traces(path: Path, data: Mapping[str, Any]) -> tuple[Trace, ...]:
+    n, name = len(data["joints"]), str(data["held_out"])
     if not path.is_file():
         return ()
     import pandas as pd

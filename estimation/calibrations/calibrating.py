@@ -255,7 +255,6 @@ def _parameters(fit: GeometryFit) -> tuple[CalibratedParameter, ...]:
             lower=float(values[k] - width * spread[k]),
             upper=float(values[k] + width * spread[k]),
             unit=item.unit,
-            shown=item.shown,
         )
         for k, item in enumerate(fit.parameters)
         if k in kept

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, field
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -17,9 +16,9 @@ from estimation.calibrations.selection import KindTrial
 from estimation.calibrations.undetermined import Undetermined
 from estimation.models.robot_in_file import build_robot, describe_robot
 from robots.common.errors import InputError
-from robots.common.files import existing_file, write_atomic
-from robots.common.plain import all_finite, finite
+from robots.common.records import Finding, Record, Result, axes_for, findings_of, read_json
 from robots.geometry_errors.terms import error_term
+from robots.geometry_errors.terms.base import shown_unit
 from robots.robot import Robot
 
 if TYPE_CHECKING:
@@ -28,14 +27,11 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
-FILE = "calibration.json"
-FORMAT = "robot-oed calibration"
-FORMAT_VERSION = 1
 SHOWN = {"m": ("mm", 1e3), "rad": ("mrad", 1e3), "px": ("px", 1.0)}
 
 
 @dataclass(frozen=True, kw_only=True)
-class CalibratedParameter:
+class CalibratedParameter(Record):
     """One error with its interval.
 
     Attributes:
@@ -47,8 +43,9 @@ class CalibratedParameter:
         lower: of the 95 % interval.
         upper: of the 95 % interval.
         unit: in SI.
-        shown: unit for people, and how many of them are one in SI.
     """
+
+    ENTRIES = ("name", "kind", "joint", "value", "standard_error", "ci95=lower,upper", "unit")
 
     name: str
     kind: str
@@ -58,7 +55,11 @@ class CalibratedParameter:
     lower: float
     upper: float
     unit: str
-    shown: tuple[str, float]
+
+    @property
+    def shown(self) -> tuple[str, float]:
+        """Unit for people, and how many of them are one in SI."""
+        return shown_unit(self.unit)
 
     @property
     def text(self) -> str:
@@ -111,7 +112,7 @@ class PoseErrors:
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Calibration:
+class Calibration(Result, format="robot-oed calibration"):
     """A robot whose geometry was fitted to measured poses.
 
     Attributes:
@@ -134,6 +135,29 @@ class Calibration:
         warnings: about the use of the result.
         provenance: file, options, tool version.
     """
+
+    FILE = "calibration.json"
+    ENTRIES = (
+        "robot=described_robot",
+        "corrected=described_correction",
+        "measurement",
+        "unit",
+        "kinds",
+        "joint_zeros",
+        "parameters",
+        "setup",
+        "noise",
+        "levels",
+        "poses",
+        "trials",
+        "undetermined",
+        "outliers",
+        "repeatability",
+        "check",
+        "causes",
+        "warnings",
+        "provenance",
+    )
 
     robot: Robot
     corrected: Robot
@@ -159,9 +183,6 @@ class Calibration:
         before, after = factor * self.levels.before, factor * self.levels.held_out
         return f"Calibration({self.robot.name!r}, {before:.3g} -> {after:.3g} {unit} on held-out poses)"
 
-    def _repr_html_(self) -> str:
-        return f"<pre>{self.summary()}</pre>"
-
     @property
     def success(self) -> bool:
         """Whether the calibrated robot predicts held-out poses better than the description, without doubts."""
@@ -178,6 +199,16 @@ class Calibration:
         found = {item.joint: item.value for item in self.parameters if item.kind == "joint_zero"}
         return {name: found.get(i + 1, 0.0) for i, name in enumerate(self.robot.joint_names)}
 
+    @property
+    def described_robot(self) -> dict[str, Any]:
+        """The robot as it was described, as plain data."""
+        return describe_robot(self.robot)
+
+    @property
+    def described_correction(self) -> dict[str, Any]:
+        """The corrected robot, as plain data."""
+        return describe_robot(self.corrected)
+
     def shown(self, value: float) -> str:
         """Writes an error for people.
 
@@ -186,6 +217,36 @@ class Calibration:
         """
         unit, factor = SHOWN[self.unit]
         return f"{factor * value:.3g} {unit}"
+
+    @property
+    def conclusion(self) -> str:
+        """How well the calibrated robot predicts poses that it has not seen."""
+        levels = self.levels
+        if not levels.held_out < levels.before:
+            return "The poses do not support a calibration: the description predicts held-out poses as well."
+        return (
+            f"The calibrated robot predicts poses that it has not seen to {self.shown(levels.held_out)} instead of "
+            f"{self.shown(levels.before)}."
+        )
+
+    @property
+    def remarks(self) -> tuple[Finding, ...]:
+        """Doubts, causes, and poses that were left out."""
+        found = list(findings_of("calibration.doubtful", self.warnings))
+        found += [
+            Finding(code="calibration.cause", text=cause["sentence"], action=cause.get("action", ""))
+            for cause in self.causes.get("findings", ())
+        ]
+        found += [
+            Finding(
+                code="calibration.outlier",
+                subject=f"Pose {item.pose}:",
+                text=f"line {item.line} of the file is off by {self.shown(item.error)}; it was left out.",
+                action="Measure it again, or remove it.",
+            )
+            for item in self.outliers
+        ]
+        return tuple(found)
 
     def summary(self) -> str:
         """Lists errors before and after, what was fitted, and what is left open."""
@@ -223,14 +284,14 @@ class Calibration:
         ranked = sorted(self.errors, key=lambda item: -abs(item.value) / max(item.standard_error, 1e-300))
         lines += [f"    {item.name:22} {item.text}" for item in ranked[:12]]
         if len(ranked) > 12:
-            lines.append(f"    and {len(ranked) - 12} more in {FILE}")
+            lines.append(f"    and {len(ranked) - 12} more in {self.FILE}")
         for cause in self.causes.get("findings", ()):
             lines.append(f"  cause: {cause['sentence']}")
         lines += [f"  outlier: pose {o.pose} (line {o.line}) is off by {self.shown(o.error)}" for o in self.outliers]
         open_ = [item for item in self.undetermined if item.reason == "poses"]
         lines += [f"  not determined: {item.sentence()}" for item in open_[:6]]
         if len(open_) > 6:
-            lines.append(f"  not determined: {len(open_) - 6} more in {FILE}")
+            lines.append(f"  not determined: {len(open_) - 6} more in {self.FILE}")
         lines += [f"  {warning}" for warning in self.warnings]
         return "\n".join(lines)
 
@@ -249,10 +310,8 @@ class Calibration:
         Args:
             ax: where to draw; a new figure by default.
         """
-        from matplotlib.figure import Figure
-
         unit, factor = SHOWN[self.unit]
-        axes = ax if ax is not None else Figure(figsize=(7, 4)).subplots()
+        axes = axes_for(ax, (7, 4))
         place = np.arange(1, len(self.poses.line) + 1)
         for values, label in ((self.poses.before, "description"), (self.poses.held_out, "calibrated, held out")):
             axes.plot(place, factor * values, "o", markersize=4, label=label)
@@ -260,64 +319,6 @@ class Calibration:
         axes.set_ylabel(f"error [{unit}]")
         axes.legend()
         return axes
-
-    def to_dict(self) -> dict[str, Any]:
-        """Writes the result as plain data for `calibration.json`."""
-        poses = self.poses
-        return {
-            "format": FORMAT,
-            "format_version": FORMAT_VERSION,
-            "robot": describe_robot(self.robot),
-            "corrected": describe_robot(self.corrected),
-            "measurement": self.measurement,
-            "unit": self.unit,
-            "kinds": list(self.kinds),
-            "joint_zeros": self.joint_zeros,
-            "parameters": [
-                {
-                    "name": item.name,
-                    "kind": item.kind,
-                    "joint": item.joint,
-                    "value": item.value,
-                    "standard_error": item.standard_error,
-                    "ci95": [item.lower, item.upper],
-                    "unit": item.unit,
-                }
-                for item in self.parameters
-            ],
-            "setup": dict(self.setup),
-            "noise": dict(self.noise),
-            "levels": _plain(self.levels),
-            "poses": {
-                "line": poses.line.tolist(),
-                "q": poses.q.tolist(),
-                "before": all_finite(poses.before),
-                "after": all_finite(poses.after),
-                "held_out": all_finite(poses.held_out),
-                "used": poses.used.tolist(),
-            },
-            "trials": [asdict(trial) for trial in self.trials],
-            "undetermined": [asdict(item) for item in self.undetermined],
-            "outliers": [asdict(item) for item in self.outliers],
-            "repeatability": None if self.repeatability is None else asdict(self.repeatability),
-            "check": None if self.check is None else _plain(self.check),
-            "causes": dict(self.causes),
-            "warnings": list(self.warnings),
-            "provenance": dict(self.provenance),
-        }
-
-    def save(self, folder: str | Path, *, force: bool = False) -> None:
-        """Writes `calibration.json` into a folder that is there.
-
-        Args:
-            folder: an existing one.
-            force: replace a file that is there.
-
-        Raises:
-            InputError: the file is there, and force is not given.
-        """
-        text = json.dumps(self.to_dict(), indent=2, allow_nan=False) + "\n"
-        write_atomic(Path(folder) / FILE, text, force=force)
 
 
 def load_calibration(path: str | Path) -> Calibration:
@@ -332,55 +333,14 @@ def load_calibration(path: str | Path) -> Calibration:
     Raises:
         InputError: a missing file, or one that is no calibration.
     """
-    from robots.geometry_errors.terms.base import shown_unit
-
-    file = Path(path) / FILE if Path(path).is_dir() else existing_file(path)
+    file, remedy = Path(path), f"give a {Calibration.FILE} of oed calibrate"
+    file = file / Calibration.FILE if file.is_dir() else file
+    data = read_json(file, Calibration.FORMAT, Calibration.FORMAT_VERSION, remedy=remedy)
     try:
-        data = json.loads(existing_file(file).read_text(encoding="utf-8"))
-    except (UnicodeDecodeError, json.JSONDecodeError) as error:
-        raise InputError("is no JSON file", file=file, remedy=f"give a {FILE} of oed calibrate") from error
-    if not isinstance(data, dict) or data.get("format") != FORMAT:
-        raise InputError("is no calibration", file=file, remedy=f"give a {FILE} of oed calibrate")
-    try:
-        poses = data["poses"]
-        return Calibration(
-            robot=build_robot(data["robot"]),
-            corrected=build_robot(data["corrected"]),
-            measurement=data["measurement"],
-            unit=data["unit"],
-            kinds=tuple(data["kinds"]),
-            parameters=tuple(
-                CalibratedParameter(
-                    **{key: item[key] for key in ("name", "kind", "joint", "value", "standard_error", "unit")},
-                    lower=item["ci95"][0],
-                    upper=item["ci95"][1],
-                    shown=shown_unit(item["unit"]),
-                )
-                for item in data["parameters"]
-            ),
-            setup=data["setup"],
-            noise=data["noise"],
-            levels=_levels(data["levels"]),
-            poses=PoseErrors(
-                line=np.array(poses["line"], dtype=np.int64),
-                q=np.array(poses["q"], dtype=float),
-                used=np.array(poses["used"], dtype=bool),
-                **{key: np.array(poses[key], dtype=float) for key in ("before", "after", "held_out")},
-            ),
-            trials=tuple(KindTrial(**item) for item in data["trials"]),
-            undetermined=tuple(
-                Undetermined(**{**item, "partners": tuple(item["partners"]), "joints": tuple(item["joints"])})
-                for item in data["undetermined"]
-            ),
-            outliers=tuple(OutlierPose(**item) for item in data["outliers"]),
-            repeatability=None if data["repeatability"] is None else Repeatability(**data["repeatability"]),
-            check=None if data["check"] is None else _levels(data["check"]),
-            causes=data["causes"],
-            warnings=tuple(data["warnings"]),
-            provenance=data["provenance"],
-        )
+        robot, corrected = build_robot(data["robot"]), build_robot(data["corrected"])
     except (KeyError, TypeError, ValueError, AttributeError) as error:
-        raise InputError(f"is damaged ({type(error).__name__}: {error})", file=file) from error
+        raise InputError(f"is damaged ({type(error).__name__}: {error})", file=file, remedy=remedy) from error
+    return Calibration.from_dict(data, file=file, remedy=remedy, robot=robot, corrected=corrected)
 
 
 def error_words(kind: str) -> str:
@@ -401,12 +361,3 @@ def _ranges(result: Calibration, levels: ErrorLevels) -> str:
     if not np.isfinite(levels.outside):
         return ""
     return f" ({result.shown(levels.inside)} within the fitted range, {result.shown(levels.outside)} outside it)"
-
-
-def _plain(levels: ErrorLevels) -> dict[str, Any]:
-    return {key: finite(value) for key, value in asdict(levels).items()}
-
-
-def _levels(data: Mapping[str, Any]) -> ErrorLevels:
-    values: dict[str, Any] = {key: float("nan") if value is None else value for key, value in data.items()}
-    return ErrorLevels(**{**values, "outside_count": int(values["outside_count"])})

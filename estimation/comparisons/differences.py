@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from estimation.comparisons.common_parameters import CommonParameters
 from estimation.comparisons.friction_curves import FrictionCurves
 from estimation.comparisons.hypothesis_tests import adjust_holm, agreement_test
-from robots.common.plain import finite
+from robots.common.records import Record
 from robots.terms import Column
 
 Array = NDArray[np.float64]
@@ -25,7 +25,7 @@ LEVELS = 3
 
 
 @dataclass(frozen=True, kw_only=True)
-class Difference:
+class Difference(Record):
     """One test of agreement.
 
     Attributes:
@@ -44,6 +44,23 @@ class Difference:
         friction: whether it is of a friction curve or one of its coefficients.
     """
 
+    ENTRIES = (
+        "level",
+        "name",
+        "joint",
+        "run=labels[run]",
+        "reference",
+        "chi_square=statistic",
+        "dof",
+        "p_value",
+        "adjusted_p_value=adjusted",
+        "significant",
+        "change",
+        "standard_error=error",
+        "percent",
+        "unit=unit?",
+    )
+
     level: Level
     name: str
     joint: int | None
@@ -58,24 +75,13 @@ class Difference:
     unit: str = ""
     friction: bool = False
 
-    def to_dict(self, labels: Sequence[str], alpha: float) -> dict[str, Any]:
-        """Gives plain data."""
-        return {
-            "level": self.level,
-            "name": self.name,
-            "joint": self.joint,
-            "run": None if self.run is None else labels[self.run],
-            "reference": None if self.run is None else labels[0],
-            "chi_square": self.statistic,
-            "dof": self.dof,
-            "p_value": self.p_value,
-            "adjusted_p_value": self.adjusted,
-            "significant": self.adjusted < alpha,
-            "change": finite(self.change),
-            "standard_error": finite(self.error),
-            "percent": finite(self.percent),
-            "unit": self.unit or None,
-        }
+    def reference(self, labels: Sequence[str]) -> str | None:
+        """Label of the first run; None where all runs are compared with each other."""
+        return None if self.run is None else labels[0]
+
+    def significant(self, alpha: float) -> bool:
+        """Whether the difference is real at a chance alpha of any false alarm."""
+        return self.adjusted < alpha
 
 
 def part_of(column: Column) -> str:

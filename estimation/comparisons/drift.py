@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,7 +13,7 @@ from estimation.comparisons.common_parameters import CommonParameters
 from estimation.comparisons.friction_curves import LEVEL_SHARE, FrictionCurves
 from estimation.comparisons.hypothesis_tests import adjust_holm
 from estimation.uncertainty.quantiles import normal_limit
-from robots.common.plain import finite
+from robots.common.records import Record
 
 Array = NDArray[np.float64]
 
@@ -25,7 +24,7 @@ LAST_SHARE = 1 / 3
 
 
 @dataclass(frozen=True, kw_only=True)
-class Drift:
+class Drift(Record):
     """Course of one quantity over the runs.
 
     Attributes:
@@ -43,6 +42,21 @@ class Drift:
         percent: first value minus the final one, in per cent of the final one.
     """
 
+    ENTRIES = (
+        "name",
+        "joint",
+        "unit",
+        "values",
+        "standard_errors=errors",
+        "slope",
+        "slope_standard_error=slope_error",
+        "slope_adjusted_p_value=adjusted",
+        "slope_significant=significant",
+        "settled_from=labels[settled]",
+        "final",
+        "first_minus_final_percent=percent",
+    )
+
     name: str
     joint: int
     unit: str
@@ -55,22 +69,9 @@ class Drift:
     final: float
     percent: float
 
-    def to_dict(self, labels: Sequence[str], alpha: float) -> dict[str, Any]:
-        """Gives plain data."""
-        return {
-            "name": self.name,
-            "joint": self.joint,
-            "unit": self.unit,
-            "values": self.values.tolist(),
-            "standard_errors": self.errors.tolist(),
-            "slope": self.slope,
-            "slope_standard_error": self.slope_error,
-            "slope_adjusted_p_value": self.adjusted,
-            "slope_significant": self.adjusted < alpha,
-            "settled_from": None if self.settled is None else labels[self.settled],
-            "final": self.final,
-            "first_minus_final_percent": finite(self.percent),
-        }
+    def significant(self, alpha: float) -> bool:
+        """Whether there is a trend at a chance alpha of any false alarm."""
+        return self.adjusted < alpha
 
 
 def find_drifts(

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from estimation.comparisons.common_parameters import CommonParameters
 from estimation.comparisons.friction_curves import FrictionCurves
 from estimation.uncertainty.quantiles import NORMAL_95, normal_limit
-from robots.common.plain import finite
+from robots.common.records import Record
 
 Array = NDArray[np.float64]
 Kind = Literal["unchanged", "common", "own", "unequal", "changed"]
@@ -69,7 +69,7 @@ def curve_difference(curve: FrictionCurves, run: int, unit: str) -> CurveDiffere
 
 
 @dataclass(frozen=True, kw_only=True)
-class FrictionChange:
+class FrictionChange(Record):
     """Change of one joint's friction between two runs, mean over the speeds.
 
     Attributes:
@@ -86,6 +86,18 @@ class FrictionChange:
             too few joints to decide.
     """
 
+    ENTRIES = (
+        "joint",
+        "run=labels[run]",
+        "reference=labels[0]",
+        "kind",
+        "total=total_percent",
+        "common=common_percent",
+        "own=own_percent",
+        "curve",
+        "sentence",
+    )
+
     joint: int
     run: int
     total: float
@@ -96,6 +108,21 @@ class FrictionChange:
     own_scatter: float
     kind: Kind
     curve: CurveDifference | None = None
+
+    @property
+    def total_percent(self) -> dict[str, Any]:
+        """The change with its 95 % interval, in per cent."""
+        return _with_interval(self.total, self.total_error)
+
+    @property
+    def common_percent(self) -> float:
+        """What the other joints share, in per cent."""
+        return _percent(self.common)
+
+    @property
+    def own_percent(self) -> dict[str, Any]:
+        """What this joint has alone, with its 95 % interval, in per cent."""
+        return _with_interval(self.own, self.own_scatter)
 
     @property
     def differs(self) -> bool:
@@ -117,27 +144,6 @@ class FrictionChange:
         if self.kind == "unequal":
             return f"{head}; {others}. Unequal heating may explain the difference, {own}."
         return f"{head}; {others}: no difference beyond the errors."
-
-    def to_dict(self, labels: Sequence[str]) -> dict[str, Any]:
-        """Gives plain data; changes in per cent."""
-
-        def shown(value: float, error: float) -> dict[str, Any]:
-            return {
-                "percent": finite(_percent(value)),
-                "ci95": [finite(_percent(value + sign * NORMAL_95 * error)) for sign in (-1, 1)],
-            }
-
-        return {
-            "joint": self.joint,
-            "run": labels[self.run],
-            "reference": labels[0],
-            "kind": self.kind,
-            "total": shown(self.total, self.total_error),
-            "common": finite(_percent(self.common)),
-            "own": shown(self.own, self.own_scatter),
-            "curve": None if self.curve is None else vars(self.curve),
-            "sentence": self.sentence(),
-        }
 
 
 def friction_changes(
@@ -253,3 +259,7 @@ def interval_of(log_ratio: float, error: float) -> str:
 
 def _percent(log_ratio: float) -> float:
     return float(100 * np.expm1(min(log_ratio, 50.0)))
+
+
+def _with_interval(value: float, error: float) -> dict[str, Any]:
+    return {"percent": _percent(value), "ci95": [_percent(value + sign * NORMAL_95 * error) for sign in (-1, 1)]}

@@ -13,7 +13,7 @@ from estimation.comparisons.common_parameters import CommonParameters, friction_
 from estimation.comparisons.runs import Run
 from estimation.linear_algebra.scaled import square_root
 from estimation.uncertainty.quantiles import NORMAL_95
-from robots.common.plain import all_finite
+from robots.common.records import Record
 
 Array = NDArray[np.float64]
 
@@ -26,7 +26,7 @@ DRAWS, BAND_SEED = 4000, 0
 
 
 @dataclass(frozen=True, kw_only=True)
-class FrictionCurves:
+class FrictionCurves(Record):
     """Friction of one joint in all runs.
 
     Attributes:
@@ -42,6 +42,8 @@ class FrictionCurves:
         mean_row: weights (b,) that give the mean friction over the speeds from the parameters.
     """
 
+    ENTRIES = ("joint", "speed", "runs=by_run")
+
     joint: int
     speed: Array
     torque: Array
@@ -53,27 +55,23 @@ class FrictionCurves:
     level_error: Array
     mean_row: Array
 
-    def to_dict(self, labels: Sequence[str]) -> dict[str, Any]:
-        """Gives plain data.
+    def by_run(self, labels: Sequence[str]) -> list[dict[str, Any]]:
+        """Gives the curves run by run.
 
         Args:
             labels: of the runs.
         """
-        return {
-            "joint": self.joint,
-            "speed": self.speed.tolist(),
-            "runs": [
-                {
-                    "run": label,
-                    "torque": self.torque[k].tolist(),
-                    "standard_error": self.error[k].tolist(),
-                    "difference": self.difference[k].tolist(),
-                    "difference_standard_error": all_finite(self.difference_error[k]),
-                    "simultaneous_factor95": all_finite(self.simultaneous[k : k + 1])[0],
-                }
-                for k, label in enumerate(labels)
-            ],
-        }
+        return [
+            {
+                "run": label,
+                "torque": self.torque[k],
+                "standard_error": self.error[k],
+                "difference": self.difference[k],
+                "difference_standard_error": self.difference_error[k],
+                "simultaneous_factor95": self.simultaneous[k],
+            }
+            for k, label in enumerate(labels)
+        ]
 
 
 def common_speeds(runs: Sequence[Run]) -> Array:

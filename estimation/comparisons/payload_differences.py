@@ -18,7 +18,7 @@ from estimation.payloads.intervals import Quantity, quantities
 from estimation.payloads.physical import physical_body
 from estimation.uncertainty.quantiles import normal_limit
 from robots.base_parameters import find_base_parameters
-from robots.common.plain import finite
+from robots.common.records import Record
 from robots.geometry.inertia import SIZE
 from robots.terms.situations.flange_body import FLANGE, link_columns
 from robots.terms.situations.sensitivities import moved_body
@@ -32,7 +32,7 @@ OPEN = 100.0
 
 
 @dataclass(frozen=True, kw_only=True)
-class PayloadDifference:
+class PayloadDifference(Record):
     """A body that one of two runs carries on the flange and the other does not.
 
     Attributes:
@@ -44,6 +44,15 @@ class PayloadDifference:
         change: of the parameters by the body (b,).
         covariance: of that change (b, b).
     """
+
+    ENTRIES = (
+        "run=labels[run]",
+        "reference=labels[0]",
+        "carried_by=carrier",
+        "quantities=stated_quantities",
+        "explained_share=explained",
+        "sentence",
+    )
 
     run: int
     removed: bool
@@ -66,24 +75,22 @@ class PayloadDifference:
             f"y {centre[1]}, z {centre[2]} m in the flange frame."
         )
 
-    def to_dict(self, labels: Sequence[str]) -> dict[str, Any]:
-        """Gives plain data."""
-        return {
-            "run": labels[self.run],
-            "reference": labels[0],
-            "carried_by": labels[0] if self.removed else labels[self.run],
-            "quantities": [
-                {
-                    "name": item.name,
-                    "value": item.value if known else None,
-                    "ci95": [finite(item.lower), finite(item.upper)] if known else None,
-                    "unit": item.unit,
-                }
-                for item, known in zip(self.found, self.determined, strict=True)
-            ],
-            "explained_share": self.explained,
-            "sentence": self.sentence(labels),
-        }
+    def carrier(self, labels: Sequence[str]) -> str:
+        """Label of the run that carries the body."""
+        return labels[0] if self.removed else labels[self.run]
+
+    @property
+    def stated_quantities(self) -> list[dict[str, Any]]:
+        """The quantities, with a value and an interval where the models determine them."""
+        return [
+            {
+                "name": item.name,
+                "value": item.value if known else None,
+                "ci95": [item.lower, item.upper] if known else None,
+                "unit": item.unit,
+            }
+            for item, known in zip(self.found, self.determined, strict=True)
+        ]
 
     @property
     def _shown(self) -> list[tuple[Quantity, bool]]:

@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,7 +19,7 @@ from estimation.comparisons.merging import MergedModel
 from estimation.comparisons.part_names import grouped, listed
 from estimation.comparisons.payload_differences import PayloadDifference
 from estimation.comparisons.runs import Run
-from robots.common.files import write_atomic
+from robots.common.records import Finding, Result, axes_for, findings_of, plain
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -29,13 +28,12 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 
 COMPARISON, MODEL = "compare.json", "model.json"
-FORMAT, FORMAT_VERSION = "robot-oed comparison", 1
 # Parts and parameters that the summary lists of each run.
 LISTED = 8
 
 
 @dataclass(frozen=True, kw_only=True)
-class ModelComparison:
+class ModelComparison(Result, format="robot-oed comparison", shares=("labels", "alpha")):
     """Runs against each other.
 
     Attributes:
@@ -54,6 +52,25 @@ class ModelComparison:
         warnings: limitations.
     """
 
+    FILE = COMPARISON
+    ENTRIES = (
+        "robot=robot_name",
+        "verdict",
+        "alpha",
+        "correction",
+        "order",
+        "hours",
+        "runs",
+        "payloads",
+        "differences",
+        "friction",
+        "friction_curves=curves",
+        "drift=drifts",
+        "merged.model=merged_file",
+        "merged.scatter_between_runs=scatter",
+        "warnings",
+    )
+
     runs: tuple[Run, ...]
     order: str
     hours: Array | None
@@ -68,6 +85,9 @@ class ModelComparison:
     merged: MergedModel
     warnings: tuple[str, ...]
 
+    correction = "Holm within each of three families, Bonferroni between them"
+    merged_file = MODEL
+
     def __repr__(self) -> str:
         return f"ModelComparison({len(self.runs)} runs of {self.robot_name!r}, {len(self.significant)} significant)"
 
@@ -75,6 +95,11 @@ class ModelComparison:
     def robot_name(self) -> str:
         """Name of the first model's robot."""
         return self.runs[0].model.robot.name
+
+    @property
+    def scatter(self) -> dict[str, float]:
+        """Scatter of each parameter between the runs."""
+        return dict(zip((column.name for column in self.common.columns), self.merged.scatter.tolist(), strict=True))
 
     @property
     def labels(self) -> tuple[str, ...]:
@@ -123,6 +148,36 @@ class ModelComparison:
                 for joint, change in changes.items()
             ),
         )
+
+    @property
+    def conclusion(self) -> str:
+        """What differs."""
+        return self.verdict()
+
+    @property
+    def remarks(self) -> tuple[Finding, ...]:
+        """Changes of one joint alone, payloads, parts that differ, and warnings."""
+        found = [
+            Finding(
+                code="difference.joint",
+                subject=f"{self.labels[item.run]}:",
+                text=item.sentence(),
+            )
+            for item in self.damaged
+        ]
+        found += [
+            Finding(code="difference.payload", subject=f"{self.labels[item.run]}:", text=item.sentence(self.labels))
+            for item in self.payloads
+        ]
+        runs: dict[str, list[str]] = {}
+        for run in range(1, len(self.runs)):
+            for name in self.parts(run):
+                runs.setdefault(name, []).append(self.labels[run])
+        found += [
+            Finding(code="difference", subject=f"{name}:", text=f"differs from {self.labels[0]} in {', '.join(those)}.")
+            for name, those in runs.items()
+        ]
+        return (*found, *findings_of("comparison.note", self.warnings))
 
     def verdict(self) -> str:
         """Says in one or two sentences what differs."""
@@ -234,34 +289,7 @@ class ModelComparison:
         """Gives a row per test."""
         import pandas as pd
 
-        return pd.DataFrame([item.to_dict(self.labels, self.alpha) for item in self.differences])
-
-    def to_dict(self) -> dict[str, Any]:
-        """Gives the whole comparison as plain data."""
-        labels = self.labels
-        return {
-            "format": FORMAT,
-            "format_version": FORMAT_VERSION,
-            "robot": self.robot_name,
-            "verdict": self.verdict(),
-            "alpha": self.alpha,
-            "correction": "Holm within each of three families, Bonferroni between them",
-            "order": self.order,
-            "hours": None if self.hours is None else self.hours.tolist(),
-            "runs": [run.to_dict() for run in self.runs],
-            "payloads": [item.to_dict(labels) for item in self.payloads],
-            "differences": [item.to_dict(labels, self.alpha) for item in self.differences],
-            "friction": [item.to_dict(labels) for item in self.friction],
-            "friction_curves": [curve.to_dict(labels) for curve in self.curves],
-            "drift": [item.to_dict(labels, self.alpha) for item in self.drifts],
-            "merged": {
-                "model": MODEL,
-                "scatter_between_runs": dict(
-                    zip((column.name for column in self.common.columns), self.merged.scatter.tolist(), strict=True)
-                ),
-            },
-            "warnings": list(self.warnings),
-        }
+        return pd.DataFrame(plain(self.differences, labels=self.labels, alpha=self.alpha))
 
     def plot(self, ax: Axes | None = None) -> Axes:
         """Draws each run's friction at 0.6 of the largest speed, relative to the first run.
@@ -269,9 +297,7 @@ class ModelComparison:
         Args:
             ax: where to draw; a new figure by default.
         """
-        from matplotlib.figure import Figure
-
-        axes = ax if ax is not None else Figure(figsize=(7, 4)).subplots()
+        axes = axes_for(ax, (7, 4))
         x = np.arange(len(self.runs)) if self.hours is None else self.hours
         for curve in self.curves:
             base = abs(curve.level[0]) or 1.0
@@ -283,16 +309,6 @@ class ModelComparison:
         axes.legend()
         return axes
 
-    def save(self, folder: str | Path, *, force: bool = False) -> None:
-        """Writes `compare.json` and the merged `model.json` into a folder that is there.
-
-        Args:
-            folder: an existing one.
-            force: replace files that are there.
-
-        Raises:
-            InputError: a file is there, and force is not given.
-        """
-        text = json.dumps(self.to_dict(), indent=2, allow_nan=False) + "\n"
-        write_atomic(Path(folder) / COMPARISON, text, force=force)
-        self.merged.model.save(Path(folder) / MODEL, force=force)
+    def _save_beside(self, folder: Path, *, force: bool) -> None:
+        """Writes the merged `model.json`."""
+        self.merged.model.save(folder / MODEL, force=force)

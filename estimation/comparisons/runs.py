@@ -16,7 +16,8 @@ from scipy.linalg import block_diag
 
 from estimation.models.model import Model, load_model
 from robots.common.errors import InputError
-from robots.common.plain import all_finite, finite, number
+from robots.common.plain import number
+from robots.common.records import Record
 from robots.terms import PositionTorque
 
 Array = NDArray[np.float64]
@@ -27,7 +28,7 @@ _DATE = re.compile(r"(?<!\d)(20\d\d)[-_.]?([01]\d)[-_.]?([0-3]\d)(?:[T_ -]?([0-2
 
 
 @dataclass(frozen=True, kw_only=True)
-class Run:
+class Run(Record):
     """One identified model among those compared.
 
     Attributes:
@@ -39,6 +40,8 @@ class Run:
         ambient: mean ambient temperature [degC], NaN where unknown.
         file: where the model or log was read from.
     """
+
+    ENTRIES = ("label", "file", "date=date_text?", "start", "temperature", "ambient", "logs")
 
     label: str
     model: Model
@@ -53,17 +56,10 @@ class Run:
         """The date as text, empty where it is unknown."""
         return "" if self.date is None else f"{datetime.fromtimestamp(self.date, UTC):%Y-%m-%d %H:%M}"
 
-    def to_dict(self) -> dict[str, Any]:
-        """Gives label, file, date and temperatures as plain data."""
-        return {
-            "label": self.label,
-            "file": self.file,
-            "date": self.date_text or None,
-            "start": self.start,
-            "temperature": None if self.temperature is None else all_finite(self.temperature),
-            "ambient": finite(self.ambient),
-            "logs": [log.get("name") for log in self.model.provenance.get("logs", ())],
-        }
+    @property
+    def logs(self) -> list[str | None]:
+        """Names of the logs that the model was fitted to."""
+        return [log.get("name") for log in self.model.provenance.get("logs", ())]
 
 
 def run_of(model: Model, label: str, file: str | Path = "") -> Run:

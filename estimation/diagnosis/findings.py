@@ -4,27 +4,27 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
-from typing import Any
+from dataclasses import dataclass, field
 
 import numpy as np
 
-from robots.common.plain import finite, number
+from robots.common.records import Record, read_null_as
+from robots.terms.effects import EFFECTS
 
 # Number of parameters of one finding that a summary lists.
 MOST_LISTED = 8
 
 
 @dataclass(frozen=True, kw_only=True)
-class Parameter:
+class Parameter(Record):
     """A parameter of an effect.
 
     Attributes:
         name: as the effect names it.
         value: the estimate.
         unit: its unit.
-        standard_error: NaN if the data do not determine it.
         ci95: 95 % interval; infinite if the data do not determine it.
+        standard_error: NaN if the data do not determine it.
         determined: whether the data determine it well. The standard error of a coefficient is then below half of the
             effect's largest one. The 95 % interval of a shape parameter is within a fifth of its value, that of a
             change time within 0.2 s.
@@ -33,8 +33,8 @@ class Parameter:
     name: str
     value: float
     unit: str
+    ci95: tuple[float, float] = field(metadata=read_null_as(-np.inf, np.inf))
     standard_error: float
-    ci95: tuple[float, float]
     determined: bool
 
     @property
@@ -49,17 +49,6 @@ class Parameter:
         # Enough digits to distinguish the ends of a narrow interval.
         digits = max(3, 1 + math.ceil(math.log10(max(abs(low), abs(high)) / (high - low))))
         return f"{self.name} ({low:.{digits}g} to {high:.{digits}g}{unit})"
-
-    def to_dict(self) -> dict[str, Any]:
-        """Returns plain data, with None for infinite values and NaN."""
-        return {
-            "name": self.name,
-            "value": self.value,
-            "unit": self.unit,
-            "ci95": [finite(bound) for bound in self.ci95],
-            "standard_error": finite(self.standard_error),
-            "determined": self.determined,
-        }
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -80,7 +69,7 @@ class Gain:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Finding:
+class Finding(Record):
     """One cause.
 
     Attributes:
@@ -99,6 +88,20 @@ class Finding:
             the link's position, over the standard deviation of the gear's deflection.
     """
 
+    ENTRIES = (
+        "effect",
+        "joint",
+        "parameters",
+        "p_value",
+        "delta_bic",
+        "gain",
+        "rivals",
+        "sentence",
+        "visible",
+        "pattern?",
+        "measured_by?",
+    )
+
     effect: str
     joint: int | None
     parameters: tuple[Parameter, ...]
@@ -113,74 +116,22 @@ class Finding:
     measured_by: str = ""
 
     @property
+    def named(self) -> bool:
+        """Whether it is an effect of the catalogue, not a pattern without a known cause."""
+        return self.effect in EFFECTS
+
+    @property
+    def title(self) -> str:
+        """What it is, in words."""
+        return EFFECTS[self.effect].title if self.named else "a pattern without a known cause"
+
+    @property
     def elsewhere(self) -> str:
         """Names the joints of the gain, with a leading space; empty if they are the finding's own."""
         joints = self.gain.joints
         if self.joint is None or joints in ((), (self.joint,)):
             return ""
         return f" of joint{'s' if len(joints) > 1 else ''} {', '.join(map(str, joints))}"
-
-    def to_dict(self) -> dict[str, Any]:
-        """Returns plain data."""
-        return {
-            "effect": self.effect,
-            "joint": self.joint,
-            "parameters": [parameter.to_dict() for parameter in self.parameters],
-            "p_value": self.p_value,
-            "delta_bic": self.delta_bic,
-            "gain": {
-                "nrmse_before": self.gain.nrmse_before,
-                "nrmse_after": self.gain.nrmse_after,
-                "ci95": list(self.gain.ci95),
-                "joints": list(self.gain.joints),
-            },
-            "rivals": [[name, worse] for name, worse in self.rivals],
-            "sentence": self.sentence,
-            "visible": self.visible,
-            **({"pattern": self.pattern} if self.pattern else {}),
-            **({"measured_by": self.measured_by} if self.measured_by else {}),
-        }
-
-
-def read_finding(item: dict[str, Any]) -> Finding:
-    """Reads the result of `Finding.to_dict`.
-
-    Args:
-        item: plain data of one finding.
-    """
-    parameters = tuple(
-        Parameter(
-            name=p["name"],
-            value=float(p["value"]),
-            unit=p["unit"],
-            standard_error=number(p["standard_error"]),
-            ci95=(
-                -np.inf if p["ci95"][0] is None else float(p["ci95"][0]),
-                np.inf if p["ci95"][1] is None else float(p["ci95"][1]),
-            ),
-            determined=bool(p["determined"]),
-        )
-        for p in item["parameters"]
-    )
-    gain = item["gain"]
-    return Finding(
-        effect=item["effect"],
-        joint=item["joint"],
-        parameters=parameters,
-        p_value=float(item["p_value"]),
-        delta_bic=float(item["delta_bic"]),
-        gain=Gain(
-            nrmse_before=float(gain["nrmse_before"]),
-            nrmse_after=float(gain["nrmse_after"]),
-            ci95=(float(gain["ci95"][0]), float(gain["ci95"][1])),
-            joints=tuple(int(joint) for joint in gain.get("joints", ())),
-        ),
-        rivals=tuple((str(name), float(worse)) for name, worse in item["rivals"]),
-        sentence=item["sentence"],
-        visible=float(item["visible"]),
-        pattern=item.get("pattern", ""),
-        measured_by=item.get("measured_by", ""),
-    )
 
 
 def list_parameters(texts: Sequence[str]) -> str:

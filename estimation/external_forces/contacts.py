@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,7 +13,7 @@ from estimation.external_forces.thresholds.calibrations import Calibration
 from estimation.external_forces.thresholds.observations import Observed
 from estimation.external_forces.wrenches import tool_load
 from estimation.uncertainty.quantiles import NORMAL_95
-from robots.common.plain import all_finite, finite
+from robots.common.records import Record
 from robots.common.stretches import joined_spans
 from robots.geometry.chain import Chain
 
@@ -25,7 +24,7 @@ MOST_ROWS = 400
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Contact:
+class Contact(Record):
     """One contact.
 
     Attributes:
@@ -41,6 +40,24 @@ class Contact:
         extrapolates: whether the model extrapolates at that time.
     """
 
+    ENTRIES = (
+        "detected",
+        "start",
+        "end",
+        "peak_over_threshold=peak",
+        "peak_time",
+        "force",
+        "force_standard_deviation=force_deviation",
+        "magnitude",
+        "magnitude_standard_deviation=magnitude_deviation",
+        "magnitude_interval95=magnitude_interval",
+        "torque",
+        "link=place.link",
+        "reacting_joints=place.reacting",
+        "tool=place.tool",
+        "extrapolates",
+    )
+
     detected: float
     start: float
     end: float
@@ -51,6 +68,11 @@ class Contact:
     torque: Array
     place: Place
     extrapolates: bool
+
+    @property
+    def force_deviation(self) -> Array:
+        """Standard deviation of the force's components (3,) [N]."""
+        return np.asarray(np.sqrt(np.diag(self.covariance)))
 
     @property
     def magnitude(self) -> float:
@@ -70,26 +92,6 @@ class Contact:
         """95 % interval of the size [N]."""
         half = NORMAL_95 * self.magnitude_deviation
         return max(self.magnitude - half, 0.0), self.magnitude + half
-
-    def to_dict(self) -> dict[str, Any]:
-        """Writes it as plain data."""
-        return {
-            "detected": self.detected,
-            "start": self.start,
-            "end": self.end,
-            "peak_over_threshold": self.peak,
-            "peak_time": self.peak_time,
-            "force": self.force.tolist(),
-            "force_standard_deviation": all_finite(np.sqrt(np.diag(self.covariance))),
-            "magnitude": self.magnitude,
-            "magnitude_standard_deviation": finite(self.magnitude_deviation),
-            "magnitude_interval95": [finite(value) for value in self.magnitude_interval],
-            "torque": self.torque.tolist(),
-            "link": self.place.link,
-            "reacting_joints": list(self.place.reacting),
-            "tool": self.place.tool,
-            "extrapolates": self.extrapolates,
-        }
 
 
 def find_contacts(

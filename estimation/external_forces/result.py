@@ -2,18 +2,17 @@
 
 from __future__ import annotations
 
-import json
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from estimation.external_forces.contacts import Contact
 from estimation.external_forces.thresholds.calibrations import Calibration
-from robots.common.files import write_atomic
 from robots.common.plain import percent
+from robots.common.records import Finding, Result, findings_of
 from robots.common.tables.table_files import write_table
 
 if TYPE_CHECKING:
@@ -21,13 +20,11 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
-FORMAT = "robot-oed forces"
-FORMAT_VERSION = 2
 AXES = ("x", "y", "z")
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class ForceEstimate:
+class ForceEstimate(Result, format="robot-oed forces", version=2):
     """External forces of one log.
 
     Attributes:
@@ -49,6 +46,20 @@ class ForceEstimate:
         warnings: limitations of the result.
     """
 
+    FILE = "forces.json"
+    ENTRIES = (
+        "robot",
+        "samples=t.size",
+        "duration",
+        "contacts",
+        "flagged=flagged.mean",
+        "extrapolates=extrapolates.mean",
+        "false_alarm_rate=calibration.check.summary",
+        "force_standard_deviation=median_deviation",
+        "calibration",
+        "warnings",
+    )
+
     robot: str
     joint_names: tuple[str, ...]
     t: Array
@@ -67,6 +78,12 @@ class ForceEstimate:
     warnings: tuple[str, ...] = ()
 
     @property
+    def median_deviation(self) -> Array:
+        """Median standard deviation of the force's components (3,) [N]; NaN where the joints never feel one."""
+        known = np.where(np.isfinite(self.force_deviation), self.force_deviation, np.nan)
+        return np.array([np.nan if np.isnan(column).all() else float(np.nanmedian(column)) for column in known.T])
+
+    @property
     def duration(self) -> float:
         """From the first to the last sample [s]."""
         return float(self.t[-1] - self.t[0])
@@ -78,6 +95,33 @@ class ForceEstimate:
         rate = "the false-alarm rate is the model's claim: no healthy log tests it" if check is None else check.text()
         share = percent(float(self.extrapolates.mean()))
         return f"{rate}\n{share} of the samples extrapolate from the fitted motions: the threshold is higher there"
+
+    @property
+    def conclusion(self) -> str:
+        """Whether there is a contact, and which is the largest."""
+        largest = max(self.contacts, key=lambda contact: contact.magnitude, default=None)
+        if largest is None:
+            return "No contact was found in this log."
+        count, alone = len(self.contacts), len(self.contacts) == 1
+        return (
+            f"Check the robot's surroundings: {'one contact' if alone else f'{count} contacts'}, "
+            f"{'at' if alone else 'the largest at'} {largest.start:.4g} s with {largest.magnitude:.3g} N at the tool."
+        )
+
+    @property
+    def remarks(self) -> tuple[Finding, ...]:
+        """The contacts, and warnings."""
+        contacts = (
+            Finding(
+                code="contact",
+                subject=f"{contact.start:.4g} s:",
+                text=f"contact at {contact.place.text(self.joint_names)}, {contact.magnitude:.3g} N, for "
+                f"{contact.end - contact.start:.2g} s.",
+                action="Check what the robot touched.",
+            )
+            for contact in self.contacts
+        )
+        return (*contacts, *findings_of("force.note", self.warnings))
 
     def summary(self) -> str:
         """Says what was found, a line per contact."""
@@ -110,47 +154,21 @@ class ForceEstimate:
             lines.append("the joints do not feel all directions of a force at the tool, so its size is not known")
         return "\n".join([*lines, *self.warnings])
 
-    def to_dict(self) -> dict[str, Any]:
-        """Gives contacts and settings as plain data."""
-        finite = np.where(np.isfinite(self.force_deviation), self.force_deviation, np.nan)
-        return {
-            "format": FORMAT,
-            "format_version": FORMAT_VERSION,
-            "robot": self.robot,
-            "samples": len(self.t),
-            "duration": self.duration,
-            "contacts": [contact.to_dict() for contact in self.contacts],
-            "flagged": float(self.flagged.mean()),
-            "extrapolates": float(self.extrapolates.mean()),
-            "false_alarm_rate": None if self.calibration.check is None else self.calibration.check.summary(),
-            "force_standard_deviation": [
-                None if np.isnan(column).all() else float(np.nanmedian(column)) for column in finite.T
-            ],
-            "calibration": self.calibration.to_dict(),
-            "warnings": list(self.warnings),
-        }
-
     def to_frame(self) -> pd.DataFrame:
         """Gives the samples as a table, see `save`."""
         import pandas as pd
 
         return pd.DataFrame(self._columns())
 
-    def save(self, folder: str | Path, *, force: bool = False) -> None:
-        """Writes ``forces.csv`` and ``forces.json`` into a folder.
+    def _save_beside(self, folder: Path, *, force: bool) -> None:
+        """Writes ``forces.csv``.
 
         The table has t, contact (0 or 1, from when the statistic passes the threshold until it has been below for the
         observer's memory), statistic (1 is the threshold), extrapolates, the force fx.. at the tool if
         there is no moment, force and moment wfx.., wmx.., each with _sd, and the external joint torques tau_ext1..
-
-        Raises:
-            InputError: a file is there, and force is not given.
         """
-        folder = Path(folder)
         units = {"t": "s", **{f"f{k}{end}": "N" for k in AXES for end in ("", "_sd")}}
         write_table(folder / "forces.csv", self._columns(), {"content": "external forces"}, units=units, force=force)
-        text = json.dumps(self.to_dict(), indent=2, allow_nan=False) + "\n"
-        write_atomic(folder / "forces.json", text, force=force)
 
     def _columns(self) -> dict[str, Array]:
         columns = {"t": self.t, "contact": self.flagged.astype(float), "statistic": self.statistic}

@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass
-from typing import Any, Literal, get_args
+from dataclasses import dataclass
+from typing import Literal, get_args
+
+from estimation.gate.explanations import CODES
+from robots.common.records import Record
 
 Severity = Literal["info", "warning", "refuse"]
 SEVERITIES: tuple[Severity, ...] = get_args(Severity)
 
 
 @dataclass(frozen=True, kw_only=True)
-class Finding:
+class Finding(Record):
     """One finding of a check.
 
     Attributes:
@@ -25,6 +28,8 @@ class Finding:
         row: at which it begins, counted from 1, if it has a place.
     """
 
+    ENTRIES = ("*", "code")
+
     name: str
     severity: Severity
     text: str
@@ -35,11 +40,12 @@ class Finding:
     joint: int | None = None
     row: int | None = None
 
+    @property
+    def code(self) -> str | None:
+        """Code under which `oed explain` explains it; None of a finding that has none."""
+        return CODES.get(self.name)
+
     def __str__(self) -> str:
         named = (("joint", self.joint), ("column", self.column), ("row", self.row))
         place = ", ".join(f"{word} {value}" for word, value in named if value is not None)
         return f"{place}: {self.text}; {self.action}" if place else f"{self.text}; {self.action}"
-
-    def to_dict(self) -> dict[str, Any]:
-        """Gives the fields, for JSON."""
-        return asdict(self)

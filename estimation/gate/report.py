@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Collection
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,7 +15,7 @@ from estimation.gate.measurements.outliers import interpolated
 from estimation.gate.measurements.timing import FEWEST
 from estimation.logs.torque_source import NO_TORQUE
 from robots.common.errors import InputError, NotIdentifiableError
-from robots.common.plain import all_finite, finite
+from robots.common.records import Result
 from robots.signals import Log
 
 if TYPE_CHECKING:
@@ -46,7 +46,7 @@ NO_INFORMATION = frozenset({"badly_excited"})
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class GateReport:
+class GateReport(Result):
     """The findings on one log.
 
     Attributes:
@@ -72,6 +72,23 @@ class GateReport:
         information: inertia or friction power of each joint over its standard error, the larger of the two (n,);
             NaN without torque.
     """
+
+    ENTRIES = (
+        "robot",
+        "log",
+        "refused",
+        "samples",
+        "duration",
+        "period",
+        "spikes=spike_rows",
+        "stale=stale_rows",
+        "parts",
+        "delay",
+        "delay_error",
+        "unexplained",
+        "information",
+        "findings",
+    )
 
     robot: str
     log: str
@@ -199,41 +216,34 @@ class GateReport:
         ]
         return replace(self, findings=worst_first(mild), parts=self.motion_parts)
 
+    @property
+    def spike_rows(self) -> NDArray[np.intp]:
+        """Rows (K,) with a spike, counted from 1."""
+        return self.spikes + 1
+
+    @property
+    def stale_rows(self) -> NDArray[np.intp]:
+        """Rows (K,) that repeat the one before, counted from 1."""
+        return self.stale + 1
+
     def summary(self) -> str:
         """Gives the verdict and lists the findings, the worst first."""
         lacks_torque = any(finding.name == NO_TORQUE for finding in self.findings)
         verdict = "refused" if self.refused else "no torque, its motion is usable" if lacks_torque else "usable"
         rate = 1.0 / self.period if self.period > 0 else float("nan")
         head = f"{self.log or 'log'}: {verdict}; {self.samples} samples, {self.duration:.4g} s at {rate:.4g} Hz"
-        return "\n".join([head, *(f"  {finding.severity}: {finding}" for finding in self.findings)])
+        return "\n".join(
+            [
+                head,
+                *(f"  {finding.severity} {finding.code or ''}".rstrip() + f": {finding}" for finding in self.findings),
+            ]
+        )
 
     def to_frame(self) -> pd.DataFrame:
         """Tabulates the findings, one a row."""
         import pandas as pd
 
-        return pd.DataFrame([finding.to_dict() for finding in self.findings], columns=list(Finding.__annotations__))
-
-    def to_dict(self) -> dict[str, Any]:
-        """Gives everything, for JSON: NaN becomes None."""
-        arrays = ("delay", "delay_error", "unexplained", "information")
-        return {
-            "robot": self.robot,
-            "log": self.log,
-            "refused": self.refused,
-            "samples": self.samples,
-            "duration": self.duration,
-            "period": self.period,
-            "spikes": [int(row) + 1 for row in self.spikes],
-            "stale": [int(row) + 1 for row in self.stale],
-            "parts": [list(part) for part in self.parts],
-            **{name: all_finite(getattr(self, name)) for name in arrays},
-            "findings": [{**finding.to_dict(), "value": finite(finding.value)} for finding in self.findings],
-        }
-
-    def _repr_html_(self) -> str:
-        import html
-
-        return f"<pre>{html.escape(self.summary())}</pre>"
+        return pd.DataFrame(list(self.findings), columns=list(Finding.__annotations__))
 
 
 def worst_first(findings: list[Finding]) -> tuple[Finding, ...]:

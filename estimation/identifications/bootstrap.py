@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from functools import reduce
 from itertools import pairwise
 from operator import add
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,6 +22,7 @@ from estimation.uncertainty.blocks import circular_block_counts
 from robots.base_parameters import find_base_parameters
 from robots.common.errors import InputError, NotIdentifiableError
 from robots.common.parallel import one_blas_thread, threaded
+from robots.common.records import Record
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -41,7 +42,7 @@ METHODS = ("wls", "ols")
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Bootstrap:
+class Bootstrap(Record):
     """The scatter of refits to resampled data.
 
     Attributes:
@@ -53,6 +54,8 @@ class Bootstrap:
         kind: what was resampled: ``logs``, ``periods`` or ``blocks``.
         blocks: how many of them the data hold.
     """
+
+    ENTRIES = ("kind", "blocks", "ratio", "names", "bootstrap=errors", "stated", "determined")
 
     names: tuple[str, ...]
     errors: Array
@@ -81,18 +84,6 @@ class Bootstrap:
 
         columns = {"bootstrap": self.errors, "stated": self.stated, "determined": self.determined}
         return pd.DataFrame(columns, index=pd.Index(self.names, name="parameter"))
-
-    def to_dict(self) -> dict[str, Any]:
-        """Gives both errors as plain data."""
-        return {
-            "kind": self.kind,
-            "blocks": self.blocks,
-            "ratio": self.ratio,
-            "names": list(self.names),
-            "bootstrap": self.errors.tolist(),
-            "stated": self.stated.tolist(),
-            "determined": self.determined.tolist(),
-        }
 
 
 @one_blas_thread()

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from itertools import chain, repeat
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,7 +14,8 @@ from estimation.gate import GateReport
 from estimation.identifications.choices import Choice
 from estimation.models.model import Model
 from estimation.recordings import Recording
-from robots.common.plain import finite, percent
+from robots.common.plain import percent, place_of
+from robots.common.records import Finding, Result, axes_for
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -44,6 +46,20 @@ class JointFit:
         identified: whether the left-out error is clearly below that of a constant.
     """
 
+    ENTRIES = (
+        "joint",
+        "name",
+        "identified",
+        "torque_rms",
+        "residual_rms",
+        "held_out_rms",
+        "held_out_nrmse=nrmse",
+        "constant_rms=torque_spread",
+        "nominal_rms",
+        "noise_floor",
+        "band95=band",
+    )
+
     joint: int
     name: str
     torque_rms: float
@@ -62,7 +78,7 @@ class JointFit:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Estimate:
+class Estimate(Result):
     """An identified model and the evidence for it.
 
     Attributes:
@@ -80,6 +96,8 @@ class Estimate:
         fitted_rows: number of fitted rows, where the arrays hold evenly spread stretches of a log that was read in
             pieces; None where they hold all.
     """
+
+    ENTRIES = ("success", "warnings", "joints", "model")
 
     model: Model
     choice: Choice
@@ -176,6 +194,35 @@ class Estimate:
             f"{percent(worst.nrmse)} with it)"
         )
 
+    @property
+    def conclusion(self) -> str:
+        """What to do with the model, in one sentence."""
+        lost = [joint.joint for joint in self.joints if not joint.identified]
+        if lost:
+            return f"Record more motion of {place_of(lost)} and identify again: these logs do not determine it."
+        if self.choice.contradiction is not None:
+            return "State the payload or base of each log, or run oed diagnose: the logs contradict each other."
+        error = 100 * np.median([joint.nrmse for joint in self.joints])
+        return f"Use model.json: it predicts held-out torque to {error:.1f} % of the torque RMS (median joint)."
+
+    @property
+    def remarks(self) -> tuple[Finding, ...]:
+        """What the estimate warns of, and the findings in its logs."""
+        # `Estimate.warnings` begins with these three, as far as they apply, in this order.
+        urgent = (
+            ("joint.not_identified", not all(joint.identified for joint in self.joints)),
+            ("logs.contradict", self.choice.contradiction is not None),
+            ("parameters.undetermined", not self.model.determined.all()),
+        )
+        codes = chain((code for code, applies in urgent if applies), repeat("model.warning"))
+        found = [Finding(code=code, text=text) for code, text in zip(codes, self.warnings, strict=False)]
+        found += [
+            Finding(code=f"log.{finding.severity}", subject=f"{gate.log}:", text=f"{finding}.")
+            for gate in self.gates
+            for finding in gate.findings
+        ]
+        return tuple(found)
+
     def summary(self) -> str:
         """Lists the torque errors of each joint, and warnings."""
         model = self.model
@@ -219,39 +266,13 @@ class Estimate:
         """Gives a row per parameter, see `Model.to_frame`."""
         return self.model.to_frame()
 
-    def to_dict(self) -> dict[str, Any]:
-        """Gives what machines want to know of it."""
-        return {
-            "success": self.success,
-            "warnings": list(self.warnings),
-            "joints": [
-                {
-                    "joint": joint.joint,
-                    "name": joint.name,
-                    "identified": joint.identified,
-                    "torque_rms": joint.torque_rms,
-                    "residual_rms": joint.residual_rms,
-                    "held_out_rms": joint.held_out_rms,
-                    "held_out_nrmse": finite(joint.nrmse),
-                    "constant_rms": joint.torque_spread,
-                    "nominal_rms": finite(joint.nominal_rms),
-                    "noise_floor": joint.noise_floor,
-                    "band95": joint.band,
-                }
-                for joint in self.joints
-            ],
-            "model": self.model.to_dict(),
-        }
-
     def plot(self, ax: Axes | None = None) -> Axes:
         """Draws measured against predicted torque of all joints, each over its RMS.
 
         Args:
             ax: where to draw; a new figure by default.
         """
-        from matplotlib.figure import Figure
-
-        axes = ax if ax is not None else Figure(figsize=(5, 5)).subplots()
+        axes = axes_for(ax, (5, 5))
         for joint in self.joints:
             scale = joint.torque_rms or 1.0
             index = joint.joint - 1

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from typing import Literal
 
 from robots.common.errors import InputError
+from robots.common.records import Record
 
 MEANINGS = ("current", "motor", "without-gravity")
 KEY = "torque_is"
@@ -15,7 +16,7 @@ NO_TORQUE = "no_torque"
 
 
 @dataclass(frozen=True, kw_only=True)
-class TorqueSource:
+class TorqueSource(Record):
     """Where a log's torques or currents are from.
 
     Attributes:
@@ -33,17 +34,6 @@ class TorqueSource:
     measured: bool
     meaning: str
     instead: str | None = None
-
-    def to_dict(self) -> dict[str, object]:
-        """Gives plain values, for the metadata of a log."""
-        return {
-            "format": self.format,
-            "columns": self.columns,
-            "quantity": self.quantity,
-            "measured": self.measured,
-            "meaning": self.meaning,
-            "instead": self.instead,
-        }
 
     def note(self, rows: int) -> dict[str, object]:
         """Gives a note of the reader, which the check of the log reports.

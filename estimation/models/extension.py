@@ -10,7 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from robots.common.errors import InputError
-from robots.common.plain import all_finite, finite
+from robots.common.plain import finite
+from robots.common.records import Record
 from robots.robot import Robot
 from robots.terms.discrepancies.patterns import build_pattern
 from robots.terms.effect_bases.capabilities import AtReversals, Reading
@@ -22,7 +23,7 @@ Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Extension:
+class Extension(Record):
     """One effect beside a base model.
 
     Attributes:
@@ -32,6 +33,8 @@ class Extension:
         coefficients: values of the linear ones (k,).
         covariance: of coefficients and shape together (k + s, k + s).
     """
+
+    ENTRIES = ("effect", "joint", "shape", "coefficients", "covariance", "parameters")
 
     effect: str
     joint: int | None
@@ -63,17 +66,6 @@ class Extension:
             for (name, unit), value, error in zip(described, values, errors, strict=True)
             if name
         ]
-
-    def to_dict(self, robot: Robot) -> dict[str, Any]:
-        """Writes it as plain data for `model.json`."""
-        return {
-            "effect": self.effect,
-            "joint": self.joint,
-            "shape": list(self.shape),
-            "coefficients": self.coefficients.tolist(),
-            "covariance": [all_finite(row) for row in self.covariance.tolist()],
-            "parameters": self.parameters(robot),
-        }
 
 
 def read_extension(data: Mapping[str, Any], robot: Robot) -> Extension:
@@ -111,17 +103,8 @@ def read_extension(data: Mapping[str, Any], robot: Robot) -> Extension:
     )
 
 
-def write_gear_load(bearing: ExtraGearLoad) -> dict[str, Any]:
-    """Writes what gears bear of a model's extensions as plain data for `model.json`."""
-    weights = [
-        {"effect": w.effect.name, "joint": w.joint, "shape": list(w.shape), "coefficients": w.coefficients.tolist()}
-        for w in bearing.sources
-    ]
-    return {"how": bearing.path, "weights": weights}
-
-
 def read_gear_load(data: Mapping[str, Any], robot: Robot) -> ExtraGearLoad:
-    """Reads what `write_gear_load` wrote.
+    """Reads what gears bear of the extensions, as `model.json` has it.
 
     Raises:
         InputError: an unknown way or effect, or values that do not fit it.

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
@@ -13,11 +12,11 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from estimation.logs.known_setup import require_known
-from estimation.models.extension import Extension, extension_torque, read_extension, read_gear_load, write_gear_load
+from estimation.models.extension import Extension, extension_torque, read_extension, read_gear_load
 from estimation.models.robot_in_file import build_robot, describe_robot, require_described
 from estimation.uncertainty.quantiles import normal_quantile
 from robots.common.errors import InputError
-from robots.common.files import write_atomic
+from robots.common.records import Record, read_json, write_json
 from robots.regressor import TorqueModel
 from robots.robot import Robot
 from robots.signals import Motion
@@ -33,12 +32,9 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
-FORMAT = "robot-oed model"
-FORMAT_VERSION = 1
-
 
 @dataclass(frozen=True, kw_only=True)
-class Model:
+class Model(Record, format="robot-oed model", shares=("robot",)):
     """A torque model with the parameters that the data determined.
 
     Attributes:
@@ -56,6 +52,18 @@ class Model:
         bearing: what of the extensions the gears bear, so that others feel it as load; None for nothing.
         since: moment from which the phase of an extension that vibrates counts [s]; None for the first of a motion.
     """
+
+    ENTRIES = (
+        "robot=described_robot",
+        "terms=described_terms",
+        "parameters=stated_parameters",
+        "covariance",
+        "provenance",
+        "extensions?",
+        "felt_by_extensions?=_extended.felt",
+        "phases_since?=_extended.since",
+        "borne_by_gears?=_extended.bearing",
+    )
 
     torque_model: TorqueModel
     columns: tuple[int, ...]
@@ -194,42 +202,39 @@ class Model:
         }
         return pd.DataFrame(columns, index=pd.Index(self.names, name="parameter"))
 
-    def to_dict(self) -> dict[str, Any]:
-        """Writes the model as plain data for `model.json`."""
-        robot, errors = self.robot, np.sqrt(np.diag(self.covariance))
-        parameters = [
+    @property
+    def described_robot(self) -> dict[str, Any]:
+        """All of the robot that a prediction needs, as plain data."""
+        return describe_robot(self.robot)
+
+    @property
+    def described_terms(self) -> list[dict[str, Any]]:
+        """The terms, as plain data."""
+        return [describe_term(term) for term in self.torque_model.terms]
+
+    @property
+    def stated_parameters(self) -> list[dict[str, Any]]:
+        """The parameters with standard errors, as plain data."""
+        return [
             {
                 "name": column.name,
                 "joint": column.joint,
                 "term": column.term,
                 "value": float(value),
                 "unit": column.unit,
-                # A number that is not finite cannot be written as JSON and is left out.
-                "standard_error": float(error) if known else None,
+                "standard_error": float(error),
                 "determined": bool(known),
                 "stands_for": formula,
             }
             for column, value, error, known, formula in zip(
-                self.parameters, self.values, errors, self.determined, self.formulas, strict=True
+                self.parameters, self.values, self.standard_errors, self.determined, self.formulas, strict=True
             )
         ]
-        return {
-            "format": FORMAT,
-            "format_version": FORMAT_VERSION,
-            "robot": describe_robot(robot),
-            "terms": [describe_term(term) for term in self.torque_model.terms],
-            "parameters": parameters,
-            "covariance": self.covariance.tolist(),
-            "provenance": dict(self.provenance),
-            **({"extensions": [extension.to_dict(robot) for extension in self.extensions]} if self.extensions else {}),
-            **({"felt_by_extensions": self.felt.tolist()} if self.extensions and self.felt is not None else {}),
-            **({"phases_since": self.since} if self.extensions and self.since is not None else {}),
-            **(
-                {"borne_by_gears": write_gear_load(self.bearing)}
-                if self.extensions and self.bearing is not None
-                else {}
-            ),
-        }
+
+    @property
+    def _extended(self) -> Model | None:
+        """The model; None without extensions."""
+        return self if self.extensions else None
 
     def save(self, path: Path, *, force: bool = False) -> None:
         """Writes `model.json`, whole or not at all.
@@ -241,7 +246,7 @@ class Model:
         Raises:
             InputError: the file is there, and force is not given.
         """
-        write_atomic(path, json.dumps(self.to_dict(), indent=2, allow_nan=False) + "\n", force=force)
+        write_json(path, self.to_dict(), force=force)
 
 
 def load_model(path: str | Path) -> Model:
@@ -252,18 +257,8 @@ def load_model(path: str | Path) -> Model:
     """
     file = Path(path)
     file = file / "model.json" if file.is_dir() else file
-    try:
-        data = json.loads(file.read_text(encoding="utf-8"))
-    except FileNotFoundError:
-        raise InputError("no such file", file=file, remedy="give a model.json, or the folder that holds one") from None
-    except (OSError, UnicodeDecodeError, json.JSONDecodeError) as error:
-        message = "give the model.json of oed identify or oed diagnose, or the folder that holds one"
-        raise InputError(f"is not a model file ({error})", file=file, remedy=message) from error
-    if not isinstance(data, dict) or data.get("format") != FORMAT:
-        raise InputError("is not a model file", file=file, allowed=f'"format": "{FORMAT}"')
-    version = data.get("format_version")
-    if not isinstance(version, int) or version > FORMAT_VERSION:
-        raise InputError(f"format version {version!r}", file=file, allowed=f"up to {FORMAT_VERSION}")
+    remedy = "give the model.json of oed identify or oed diagnose, or the folder that holds one"
+    data = read_json(file, Model.FORMAT, Model.FORMAT_VERSION, remedy=remedy)
     try:
         return model_from_dict(data)
     except InputError as error:

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from itertools import pairwise
-from typing import Any
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,22 +23,21 @@ DISTANCE = 0.5
 LEAST_NOISE = 1e-6
 
 
-@dataclass(frozen=True, kw_only=True)
-class ChangePoints:
-    """Change points of each joint's friction beyond what temperature explains.
+class ChangePoint(NamedTuple):
+    """A change of one joint's friction beyond what temperature explains.
 
     Attributes:
-        points: joint (from 1), time [s], and change [%] of each.
+        joint: counted from 1.
+        time: of the change [s].
+        percent: size of the change [%].
     """
 
-    points: tuple[tuple[int, float, float], ...]
-
-    def to_dict(self) -> list[dict[str, Any]]:
-        """Gives the points as plain data."""
-        return [{"joint": j, "time": time, "percent": percent} for j, time, percent in self.points]
+    joint: int
+    time: float
+    percent: float
 
 
-def find_change_points(history: dict[str, Array]) -> ChangePoints | None:
+def find_change_points(history: dict[str, Array]) -> tuple[ChangePoint, ...] | None:
     """Finds changes of the mean in the friction that temperature does not explain.
 
     The penalty is that of the BIC, 2 log N per change (its size and its place), times the long-run variance of the
@@ -55,7 +53,7 @@ def find_change_points(history: dict[str, Array]) -> ChangePoints | None:
         import ruptures
     except ImportError:
         return None
-    found: list[tuple[int, float, float]] = []
+    found: list[ChangePoint] = []
     for j in range(history["rest"].shape[1]):
         known = np.isfinite(history["rest"][:, j])
         t, y = history["start"][known], history["rest"][known, j]
@@ -74,10 +72,10 @@ def find_change_points(history: dict[str, Array]) -> ChangePoints | None:
         edges = [0, *ends]
         means = [float(y[a:b].mean()) for a, b in pairwise(edges)]
         found += [
-            (j + 1, float(t[edge]), float(100 * np.expm1(after - before)))
+            ChangePoint(j + 1, float(t[edge]), float(100 * np.expm1(after - before)))
             for edge, before, after in zip(edges[1:-1], means[:-1], means[1:], strict=True)
         ]
-    return ChangePoints(points=tuple(sorted(found, key=lambda item: item[1])))
+    return tuple(sorted(found, key=lambda item: item.time))
 
 
 def _noise(y: Array, step: float) -> float:

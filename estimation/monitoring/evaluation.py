@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -22,6 +22,7 @@ from estimation.monitoring.windows.baseline import Baseline
 from estimation.monitoring.windows.heat import HeatState
 from estimation.monitoring.windows.projection import HIGHEST_ORDER, Colour, Window, project
 from estimation.monitoring.windows.window_rows import WindowRows, rows_of_window
+from robots.common.records import Record, read
 from robots.terms.base import force_unit
 
 Array = NDArray[np.float64]
@@ -40,7 +41,7 @@ LONGEST = 1.0
 AGAIN = 0.25
 
 
-class Evaluation:
+class Evaluation(Record):
     """State of a monitor besides rows that wait.
 
     Args:
@@ -50,6 +51,34 @@ class Evaluation:
         begin: time of the first row [s].
     """
 
+    ENTRIES = (
+        "measured",
+        "begin",
+        "end",
+        "first",
+        "heat",
+        "quantities",
+        "history=history.rows",
+        "findings",
+        "event",
+        "forces",
+        "colour=colour_sum,colour_rows,colour_count",
+        "bursts",
+        "bursts_in_row",
+    )
+
+    end: float | None
+    first: float | None
+    quantities: list[Quantity]
+    findings: list[Finding]
+    event: Event | None
+    forces: list[tuple[float, float, int, int, float]]
+    colour_sum: Array
+    colour_rows: Array
+    colour_count: Array
+    bursts: BurstChart
+    bursts_in_row: int
+
     def __init__(self, baseline: Baseline, settings: MonitorSettings, *, measured: bool, begin: float) -> None:
         kind = settings.heat
         if kind == "auto":
@@ -57,13 +86,13 @@ class Evaluation:
         self.baseline, self.settings, self.measured, self.begin = baseline, settings, measured, begin
         self.heat = HeatState(kind, baseline)
         self.n = baseline.robot.n
-        self.end: float | None = None
-        self.first: float | None = None
-        self.quantities: list[Quantity] = []
+        self.end = None
+        self.first = None
+        self.quantities = []
         self.history = History(self.n)
-        self.findings: list[Finding] = []
-        self.event: Event | None = None
-        self.forces: list[tuple[float, float, int, int, float]] = []
+        self.findings = []
+        self.event = None
+        self.forces = []
         self.colour_sum = np.zeros((self.n, HIGHEST_ORDER + 1))
         self.colour_rows = np.zeros(self.n)
         self.colour_count = np.zeros(self.n)
@@ -259,40 +288,13 @@ class Evaluation:
         for q in self.quantities:
             q.chart.reset()
 
-    def to_dict(self) -> dict[str, Any]:
-        """Gives the state as plain data."""
-        event = self.event
-        return {
-            "measured": self.measured,
-            "begin": self.begin,
-            "end": self.end,
-            "first": self.first,
-            "heat": self.heat.to_dict(),
-            "quantities": [q.to_dict() for q in self.quantities],
-            "history": self.history.to_list(),
-            "findings": [f.to_state() for f in self.findings],
-            "event": None if event is None else [event.time, event.log, event.sources, event.windows],
-            "forces": [list(force) for force in self.forces],
-            "colour": [self.colour_sum.tolist(), self.colour_rows.tolist(), self.colour_count.tolist()],
-            "bursts": self.bursts.to_dict(),
-            "bursts_in_row": self.bursts_in_row,
-        }
-
     @classmethod
-    def from_dict(cls, data: dict[str, Any], baseline: Baseline, settings: MonitorSettings) -> Evaluation:
+    def restored(cls, data: Mapping[str, Any], baseline: Baseline, settings: MonitorSettings) -> Evaluation:
         """Reads `to_dict`."""
-        found = cls(baseline, settings, measured=data["measured"], begin=data["begin"])
-        found.end, found.first = data["end"], data["first"]
-        found.heat = HeatState.from_dict(data["heat"], baseline)
-        found.quantities = [Quantity.from_dict(item) for item in data["quantities"]]
-        found.history = History.from_list(found.n, data["history"])
-        found.findings = [Finding(**item) for item in data["findings"]]
-        found.event = None if data["event"] is None else Event(*data["event"])
-        found.forces = [tuple(force) for force in data["forces"]]
-        total, rows, count = data["colour"]
-        found.colour_sum, found.colour_rows = np.array(total, dtype=float), np.array(rows, dtype=float)
+        known = {name: data[name] for name in ("measured", "begin")}
+        found = cls.from_dict(data, whole=True, baseline=baseline, settings=settings, **known)
+        found.heat = HeatState.from_dict(data["heat"], kind=data["heat"]["kind"], baseline=baseline)
+        found.history.rows = read(list[list[float]], data["history"])
         # A state of an older version has one number for all joints.
-        found.colour_count = np.ones(found.n) * count
-        found.bursts = BurstChart(**data["bursts"])
-        found.bursts_in_row = data["bursts_in_row"]
+        found.colour_count = np.ones(found.n) * found.colour_count
         return found

@@ -6,10 +6,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from estimation.monitoring.findings import Finding
+from robots.common.records import Record
 
 
 @dataclass
-class Event:
+class Event(Record, as_list=True):
     """An alarm that is being confirmed.
 
     Attributes:

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from datetime import UTC, datetime
-from typing import Any, Literal
+from typing import Literal
 
 import numpy as np
 
 from estimation.uncertainty.quantiles import NORMAL_95
-from robots.common.plain import finite
+from robots.common.records import Record
 
 Kind = Literal["damage", "friction_decrease", "payload", "contact", "heat", "offset", "misfit", "unknown"]
 Severity = Literal["info", "watch", "act"]
@@ -44,7 +44,7 @@ DAY = 86_400.0
 
 
 @dataclass(frozen=True, kw_only=True)
-class Finding:
+class Finding(Record):
     """One change.
 
     Attributes:
@@ -63,6 +63,26 @@ class Finding:
         text: more of it, such as the centre of a payload.
         settled: whether more windows may still refine size and date.
     """
+
+    ENTRIES = (
+        "kind",
+        "effect",
+        "joint",
+        "severity",
+        "size",
+        "ci95=low,high",
+        "unit",
+        "time.earliest=earliest",
+        "time.latest=latest",
+        "time.detected=detected",
+        "since=date",
+        "sigmas",
+        "from_start",
+        "log",
+        "settled",
+        "sentence",
+        "advice",
+    )
 
     kind: Kind
     joint: int | None
@@ -137,30 +157,6 @@ class Finding:
             "identify it again.",
             "unknown": before[0].upper() + before[1:] + ".",
         }[self.kind]
-
-    def to_dict(self, origin: float = 0.0) -> dict[str, Any]:
-        """Gives the finding as plain data."""
-        return {
-            "kind": self.kind,
-            "effect": self.effect,
-            "joint": self.joint,
-            "severity": self.severity,
-            "size": finite(self.size),
-            "ci95": [finite(self.low), finite(self.high)],
-            "unit": self.unit,
-            "time": {"earliest": self.earliest, "latest": self.latest, "detected": self.detected},
-            "since": self.date(origin),
-            "sigmas": finite(self.sigmas),
-            "from_start": self.from_start,
-            "log": self.log,
-            "settled": self.settled,
-            "sentence": self.sentence(origin),
-            "advice": self.advice(),
-        }
-
-    def to_state(self) -> dict[str, Any]:
-        """Gives the fields, for a state file."""
-        return asdict(self)
 
 
 def when(time: float, origin: float) -> str:

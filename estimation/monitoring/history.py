@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 from numpy.typing import NDArray
 
@@ -50,14 +48,3 @@ class History:
             "misfit": data[:, -1],
             **{name: data[:, 3 + k * n : 3 + (k + 1) * n] for k, name in enumerate(names)},
         }
-
-    def to_list(self) -> list[list[Any]]:
-        """Gives the rows as plain data."""
-        return [[None if np.isnan(value) else float(value) for value in row] for row in self.rows]
-
-    @classmethod
-    def from_list(cls, n: int, rows: list[list[Any]]) -> History:
-        """Reads `to_list`."""
-        found = cls(n)
-        found.rows = [[np.nan if value is None else float(value) for value in row] for row in rows]
-        return found

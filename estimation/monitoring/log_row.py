@@ -2,18 +2,17 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass
-from typing import Any
+from dataclasses import dataclass
 
 import numpy as np
 
-from robots.common.plain import finite
+from robots.common.records import Record
 
 UNFIT = "does not fit the model: a log of another robot, or a robot after major service"
 
 
 @dataclass(frozen=True, kw_only=True)
-class LogRow:
+class LogRow(Record):
     """One log.
 
     Attributes:
@@ -43,13 +42,3 @@ class LogRow:
     def undecided(self) -> bool:
         """Whether it does not fit the model, and no later log shows why."""
         return not self.used and not self.digest and self.note == UNFIT
-
-    def to_dict(self) -> dict[str, Any]:
-        """Gives the row as plain data."""
-        return {**asdict(self), "start": finite(self.start), "end": finite(self.end), "findings": list(self.findings)}
-
-    @classmethod
-    def from_dict(cls, data: dict[str, Any]) -> LogRow:
-        """Reads `to_dict`."""
-        times = {key: np.nan if data[key] is None else float(data[key]) for key in ("start", "end")}
-        return cls(**{**data, **times, "findings": tuple(data["findings"])})

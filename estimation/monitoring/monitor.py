@@ -6,8 +6,6 @@ import copy
 import json
 from collections.abc import Iterable
 from os import PathLike
-from pathlib import Path
-from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -22,15 +20,14 @@ from estimation.monitoring.windows.projection import SLOWEST
 from estimation.monitoring.windows.stream_windows import StreamWindows
 from estimation.monitoring.windows.window_rows import settling
 from robots.common.errors import InputError
-from robots.common.files import existing_file, write_atomic
+from robots.common.files import write_atomic
 from robots.common.parallel import one_blas_thread
+from robots.common.records import Record, read, read_json
 
 Array = NDArray[np.float64]
 
-FORMAT, FORMAT_VERSION = "robot-oed monitor", 1
 
-
-class Monitor:
+class Monitor(Record, format="robot-oed monitor", whole=True):
     """Follows a robot beside its identified model, and reports changes that temperature does not explain.
 
     Results depend on the rows alone, not on how they are cut into chunks, nor on restarts.
@@ -45,6 +42,17 @@ class Monitor:
     Raises:
         InputError: settings that do not suit the model.
     """
+
+    ENTRIES = (
+        "model=baseline.source",
+        "settings",
+        "logs",
+        "rows",
+        "payload=_payload",
+        "gravity=_gravity",
+        "stream=_windows",
+        "evaluation=_evaluation",
+    )
 
     def __init__(self, baseline: Baseline, settings: MonitorSettings | None = None) -> None:
         self.baseline = baseline
@@ -185,28 +193,6 @@ class Monitor:
             parts.append(array)
         return np.column_stack(parts)
 
-    def to_dict(self) -> dict[str, Any]:
-        """Gives model, settings and state as plain data."""
-        s = self.settings
-        return {
-            "format": FORMAT,
-            "format_version": FORMAT_VERSION,
-            "model": dict(self.baseline.source),
-            "settings": {
-                "window": s.window,
-                "false_alarm_hours": s.false_alarm_hours,
-                "heat": s.heat,
-                "smallest": s.smallest,
-                "confirm": s.confirm,
-            },
-            "logs": self.logs,
-            "rows": [row.to_dict() for row in self.rows],
-            "payload": None if self._payload is None else self._payload.tolist(),
-            "gravity": None if self._gravity is None else self._gravity.tolist(),
-            "stream": self._windows.to_dict(),
-            "evaluation": None if self._evaluation is None else self._evaluation.to_dict(),
-        }
-
     def save(self, path: str | PathLike[str], *, force: bool = True) -> None:
         """Writes the state, whole or not at all; an older one is replaced.
 
@@ -226,25 +212,23 @@ class Monitor:
         Raises:
             InputError: a missing or damaged file.
         """
-        file = existing_file(Path(path))
+        remedy = "start the monitor anew from the logs"
         try:
-            data = json.loads(file.read_text(encoding="utf-8"))
-            if data["format"] != FORMAT or data["format_version"] > FORMAT_VERSION:
-                raise InputError("is not a state of a monitor of this version", file=file)
-            found = cls(baseline_of(model_from_dict(data["model"]), data["model"]), MonitorSettings(**data["settings"]))
-            found.logs = list(data["logs"])
+            data = read_json(path, cls.FORMAT, cls.FORMAT_VERSION, remedy=remedy)
+            found = cls(
+                baseline_of(model_from_dict(data["model"]), data["model"]), read(MonitorSettings, data["settings"])
+            )
+            found.logs = read(list[str], data["logs"])
             # A state of an older version has no rows.
             old = [LogRow(name=name) for name in found.logs]
-            found.rows = [LogRow.from_dict(row) for row in data["rows"]] if "rows" in data else old
-            found._payload = None if data["payload"] is None else np.array(data["payload"], dtype=float)
-            found._gravity = None if data["gravity"] is None else np.array(data["gravity"], dtype=float)
+            found.rows = read(list[LogRow], data["rows"]) if "rows" in data else old
+            found._payload = read(Array | None, data["payload"])
+            found._gravity = read(Array | None, data["gravity"])
             found._windows.restore(data["stream"])
             if data["evaluation"] is not None:
-                found._evaluation = Evaluation.from_dict(data["evaluation"], found.baseline, found.settings)
-        except (OSError, AttributeError, KeyError, TypeError, ValueError) as e:
-            raise InputError(
-                f"is not a state of a monitor, or is damaged ({type(e).__name__}: {e})",
-                file=file,
-                remedy="start the monitor anew from the logs",
-            ) from e
+                found._evaluation = Evaluation.restored(data["evaluation"], found.baseline, found.settings)
+        except (InputError, AttributeError, KeyError, TypeError, ValueError) as e:
+            reason = e.problem if isinstance(e, InputError) else f"{type(e).__name__}: {e}"
+            problem = f"is not a state of a monitor, or is damaged ({reason})"
+            raise InputError(problem, file=path, remedy=remedy) from e
         return found

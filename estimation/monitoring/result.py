@@ -2,19 +2,20 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
-from estimation.monitoring.change_points import ChangePoints, find_change_points
+from estimation.monitoring.change_points import ChangePoint, find_change_points
 from estimation.monitoring.findings import LIGHTS, Finding, Severity, when, worst
 from estimation.monitoring.log_row import UNFIT, LogRow
 from robots.common.files import write_atomic
+from robots.common.records import Finding as Remark
+from robots.common.records import Result, findings_of
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -24,7 +25,6 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 
 RESULT = "monitor.json"
-FORMAT, FORMAT_VERSION = "robot-oed monitoring", 1
 HEAT_WORDS = {
     "model": "the thermal model",
     "temperature": "measured joint temperatures",
@@ -34,7 +34,7 @@ HEAT_WORDS = {
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class MonitorResult:
+class MonitorResult(Result, format="robot-oed monitoring", shares=("origin",)):
     """What a monitor found in logs.
 
     Attributes:
@@ -50,6 +50,23 @@ class MonitorResult:
         change_points: of the stored logs; None without the package `ruptures`.
     """
 
+    FILE = RESULT
+    ENTRIES = (
+        "robot",
+        "light",
+        "severity",
+        "verdict",
+        "heat",
+        "heat_percent=heat_range",
+        "false_alarm_hours",
+        "hours",
+        "origin",
+        "findings",
+        "logs",
+        "notes",
+        "change_points",
+    )
+
     robot: str
     joint_names: tuple[str, ...]
     heat: str
@@ -59,7 +76,7 @@ class MonitorResult:
     notes: tuple[str, ...]
     history: dict[str, Array]
     origin: float
-    change_points: ChangePoints | None
+    change_points: tuple[ChangePoint, ...] | None
 
     @classmethod
     def of(cls, monitor: Monitor, notes: Sequence[str]) -> MonitorResult:
@@ -133,6 +150,27 @@ class MonitorResult:
             return self.headline.advice()
         return "Check which robot this log belongs to." if self.undecided else ""
 
+    @property
+    def conclusion(self) -> str:
+        """What to do about the most urgent findings."""
+        urgent = [f for f in self.findings if f.severity == self.severity != "info"]
+        if not urgent:
+            return "No change beyond what temperature explains."
+        return " ".join(dict.fromkeys(finding.advice() for finding in urgent))
+
+    @property
+    def remarks(self) -> tuple[Remark, ...]:
+        """The findings, logs that were left out, and notes."""
+        found = (
+            Remark(code=f"change.{f.severity}", text=f.sentence(self.origin), action=f.advice()) for f in self.findings
+        )
+        left_out = (
+            Remark(code="log.left_out", subject=f"{row.name}:", text=f"left out: {row.note}")
+            for row in self.logs
+            if not row.used
+        )
+        return (*found, *left_out, *findings_of("monitor.note", self.notes))
+
     def verdict(self) -> str:
         """Says in some sentences what was found, and how much temperature explains."""
         low, high = self.heat_range
@@ -156,26 +194,6 @@ class MonitorResult:
             lines.append("  Change points of the stored logs need the package ruptures: pip install ruptures.")
         return "\n".join(lines)
 
-    def to_dict(self) -> dict[str, Any]:
-        """Gives the result as plain data, without the trends."""
-        return {
-            "format": FORMAT,
-            "format_version": FORMAT_VERSION,
-            "robot": self.robot,
-            "light": self.light,
-            "severity": self.severity,
-            "verdict": self.verdict(),
-            "heat": self.heat,
-            "heat_percent": list(self.heat_range),
-            "false_alarm_hours": self.false_alarm_hours,
-            "hours": self.hours,
-            "origin": self.origin,
-            "findings": [f.to_dict(self.origin) for f in self.findings],
-            "logs": [row.to_dict() for row in self.logs],
-            "notes": list(self.notes),
-            "change_points": None if self.change_points is None else self.change_points.to_dict(),
-        }
-
     def to_frame(self) -> pd.DataFrame:
         """Gives the trends: a row per window and joint, changes in per cent of the model's friction."""
         import pandas as pd
@@ -193,16 +211,9 @@ class MonitorResult:
             }
         )
 
-    def save(self, folder: str | Path, *, force: bool = False) -> None:
-        """Writes `monitor.json` and `trends.csv` into a folder.
-
-        Raises:
-            InputError: a file is there, and force is not given.
-        """
-        place = Path(folder)
-        text = json.dumps(self.to_dict(), indent=2, allow_nan=False)
-        write_atomic(place / RESULT, text + "\n", force=force)
-        write_atomic(place / "trends.csv", self.to_frame().to_csv(index=False), force=force)
+    def _save_beside(self, folder: Path, *, force: bool) -> None:
+        """Writes `trends.csv`."""
+        write_atomic(folder / "trends.csv", self.to_frame().to_csv(index=False), force=force)
 
     def rows_of(self, log: int) -> Sequence[int]:
         """Indices of the windows of a log, counted from 0."""

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -12,6 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from robots.common.errors import InputError
+from robots.common.records import read, read_json
 from robots.consistency import normalised_eigenvalues
 from robots.geometry.inertia import SIZE, check_body, inertial_parameters, symmetric
 from robots.terms.situations.flange_body import point_mass
@@ -21,6 +21,7 @@ Array = NDArray[np.float64]
 
 FORMAT = "robot-oed payload"
 FORMAT_VERSION = 1
+DAMAGED = "identify the payload again with oed payload"
 EXAMPLE = "a payload.json, or KG,X,Y,Z: mass [kg] and centre of mass in the flange frame [m], such as 1.5,0,0,0.08"
 
 
@@ -145,18 +146,9 @@ def read_payload_file(path: str | Path) -> dict[str, Any]:
     """
     file = Path(path)
     file = file / "payload.json" if file.is_dir() else file
-    try:
-        data = json.loads(file.read_text(encoding="utf-8"))
-    except (FileNotFoundError, NotADirectoryError):
-        raise InputError(f"the payload {path}: no such file", allowed=EXAMPLE) from None
-    except (OSError, UnicodeDecodeError, json.JSONDecodeError) as error:
-        raise InputError(f"cannot be read as JSON: {error}", file=file) from error
-    if not isinstance(data, dict) or data.get("format") != FORMAT:
-        raise InputError("is not a payload file", file=file, allowed=f'"format": "{FORMAT}"')
-    version = data.get("format_version")
-    if not isinstance(version, int) or version > FORMAT_VERSION:
-        raise InputError(f"format version {version!r}", file=file, allowed=f"up to {FORMAT_VERSION}")
-    return data
+    if not file.exists():
+        raise InputError(f"the payload {path}: no such file", allowed=EXAMPLE)
+    return read_json(file, FORMAT, FORMAT_VERSION, remedy=f"give {EXAMPLE}")
 
 
 def body_from_dict(data: dict[str, Any], file: str | Path) -> Body:
@@ -165,10 +157,7 @@ def body_from_dict(data: dict[str, Any], file: str | Path) -> Body:
     Raises:
         InputError: numbers that are missing, or that no body has.
     """
-    try:
-        parameters = np.array(data["parameters"], dtype=float)
-    except (KeyError, TypeError, ValueError) as error:
-        raise InputError(f"is damaged ({type(error).__name__}: {error})", file=file) from error
+    parameters = read(Array, data.get("parameters"), file=file, remedy=DAMAGED)
     if parameters.shape != (SIZE,) or not np.isfinite(parameters).all():
         raise InputError(f"parameters of shape {parameters.shape}", file=file, allowed=f"{SIZE} finite numbers")
     if not parameters.any():

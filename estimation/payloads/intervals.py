@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from estimation.payloads.body import central_inertia
 from estimation.uncertainty.quantiles import NORMAL_95
+from robots.common.plain import significant
 
 Array = NDArray[np.float64]
 
@@ -38,6 +39,17 @@ class Quantity:
     lower: float
     upper: float
     unconstrained: float
+
+    @property
+    def text(self) -> str:
+        """The value, with the digits that are known."""
+        return significant(self.value, self.half_width / NORMAL_95)
+
+    @property
+    def interval_text(self) -> str:
+        """The 95 % interval, with the digits that are known."""
+        error = self.half_width / NORMAL_95
+        return f"{significant(self.lower, error)} to {significant(self.upper, error)}"
 
     @property
     def half_width(self) -> float:

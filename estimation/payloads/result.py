@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
@@ -12,11 +11,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from estimation.payloads.body import FORMAT, FORMAT_VERSION, Body, body_from_dict, read_payload_file
+from estimation.payloads.body import DAMAGED, FORMAT, FORMAT_VERSION, Body, body_from_dict, read_payload_file
 from estimation.payloads.determination import determined
 from estimation.payloads.intervals import Quantity, quantities
-from robots.common.files import write_atomic
-from robots.common.plain import finite, two_digits
+from robots.common.plain import two_digits
+from robots.common.records import Finding, Result, axes_for, findings_of
 from robots.terms.situations.sensitivities import moved_body
 
 if TYPE_CHECKING:
@@ -54,7 +53,7 @@ class JointEvidence:
 
 
 @dataclass(frozen=True, kw_only=True)
-class PayloadEstimate:
+class PayloadEstimate(Result, format=FORMAT, version=FORMAT_VERSION):
     """A payload, rigidly on the flange or on another link.
 
     Attributes:
@@ -71,6 +70,29 @@ class PayloadEstimate:
         provenance: logs, model, tool version.
         frame: pose (4, 4) of the frame that `quantities` refer to, in the flange frame.
     """
+
+    FILE = "payload.json"
+    ENTRIES = (
+        "robot",
+        "method",
+        "link",
+        "found",
+        "mass=seen.mass",
+        "centre_of_mass=seen.centre",
+        "inertia=seen.inertia",
+        "principal_moments=seen.principal[0]",
+        "principal_axes=seen.principal[1]",
+        "frame",
+        "quantities=stated_quantities",
+        "parameters=body.parameters",
+        "nearest",
+        "unconstrained=values",
+        "covariance",
+        "joints",
+        "rows",
+        "warnings",
+        "provenance",
+    )
 
     robot: str
     method: str
@@ -115,6 +137,20 @@ class PayloadEstimate:
         return determined(self.quantities)
 
     @property
+    def stated_quantities(self) -> list[dict[str, Any]]:
+        """The quantities, with an interval where the logs determine them."""
+        return [
+            {
+                "name": item.name,
+                "value": item.value,
+                "unit": item.unit,
+                "ci95": [item.lower, item.upper] if known else [None, None],
+                "determined": known,
+            }
+            for item, known in zip(self.quantities, self.determined, strict=True)
+        ]
+
+    @property
     def limit(self) -> str:
         """The largest mass that a payload may have where none was found, in words."""
         return f"at most {two_digits(self.quantities[0].upper)} kg at 95 %"
@@ -129,6 +165,23 @@ class PayloadEstimate:
     def seen_from(self, pose: ArrayLike) -> PayloadEstimate:
         """Gives the result in a frame with this pose (4, 4) in the flange frame."""
         return replace(self, frame=np.asarray(pose, dtype=float))
+
+    @property
+    def conclusion(self) -> str:
+        """What to enter as the payload, or the largest that there may be."""
+        if not self.found:
+            return f"No payload was found: {self.limit}."
+        mass, *centre = self.quantities[:4]
+        widest = max(centre, key=lambda item: item.half_width)
+        return (
+            f"Set the payload to {mass.text} kg ({mass.interval_text}); its centre of mass is known to "
+            f"{1000 * widest.half_width:.2g} mm or better."
+        )
+
+    @property
+    def remarks(self) -> tuple[Finding, ...]:
+        """Its warnings."""
+        return findings_of("payload.uncertain", self.warnings)
 
     def summary(self) -> str:
         """Lists the quantities with their 95 % intervals, the torque errors, and warnings."""
@@ -171,52 +224,13 @@ class PayloadEstimate:
         index = pd.Index([item.name for item in self.quantities], name="quantity")
         return pd.DataFrame(rows, columns=["value", "lower", "upper", "unit", "determined"], index=index)
 
-    def to_dict(self) -> dict[str, Any]:
-        """Writes the result as plain data for `payload.json`."""
-        seen = self.seen
-        moments, axes = seen.principal
-        return {
-            "format": FORMAT,
-            "format_version": FORMAT_VERSION,
-            "robot": self.robot,
-            "method": self.method,
-            "link": self.link,
-            "found": self.found,
-            "mass": seen.mass,
-            "centre_of_mass": seen.centre.tolist(),
-            "inertia": seen.inertia.tolist(),
-            "principal_moments": moments.tolist(),
-            "principal_axes": axes.tolist(),
-            "frame": self.frame.tolist(),
-            "quantities": [
-                {
-                    "name": item.name,
-                    "value": item.value,
-                    "unit": item.unit,
-                    "ci95": [finite(item.lower), finite(item.upper)] if known else [None, None],
-                    "determined": known,
-                }
-                for item, known in zip(self.quantities, self.determined, strict=True)
-            ],
-            "parameters": self.body.parameters.tolist(),
-            "nearest": self.nearest.tolist(),
-            "unconstrained": self.values.tolist(),
-            "covariance": self.covariance.tolist(),
-            "joints": [vars(joint) for joint in self.joints],
-            "rows": self.rows,
-            "warnings": list(self.warnings),
-            "provenance": dict(self.provenance),
-        }
-
     def plot(self, ax: Axes | None = None) -> Axes:
         """Draws each joint's torque error without and with the payload.
 
         Args:
             ax: where to draw; a new figure by default.
         """
-        from matplotlib.figure import Figure
-
-        axes = ax if ax is not None else Figure(figsize=(6, 4)).subplots()
+        axes = axes_for(ax, (6, 4))
         place = np.arange(len(self.joints))
         errors = np.array([_errors(joint) for joint in self.joints]).T
         for shift, values, label in zip((-0.2, 0.2), errors, ("without payload", "with payload"), strict=True):
@@ -226,19 +240,6 @@ class PayloadEstimate:
         axes.set_ylabel("torque error RMS [N m or N]")
         axes.legend()
         return axes
-
-    def save(self, folder: str | Path, *, force: bool = False) -> None:
-        """Writes `payload.json` into a folder that is there.
-
-        Args:
-            folder: an existing one.
-            force: replace a file that is there.
-
-        Raises:
-            InputError: the file is there, and force is not given.
-        """
-        text = json.dumps(self.to_dict(), indent=2, allow_nan=False) + "\n"
-        write_atomic(Path(folder) / FILE, text, force=force)
 
 
 def load_payload(path: str | Path) -> PayloadEstimate:
@@ -250,27 +251,8 @@ def load_payload(path: str | Path) -> PayloadEstimate:
     Raises:
         InputError: a missing file, or one that is no payload.
     """
-    from robots.common.errors import InputError
-
     data = read_payload_file(path)
-    body = body_from_dict(data, path)
-    try:
-        return PayloadEstimate(
-            robot=data["robot"],
-            method=data["method"],
-            body=body,
-            nearest=np.array(data["nearest"], dtype=float),
-            values=np.array(data["unconstrained"], dtype=float),
-            covariance=np.array(data["covariance"], dtype=float),
-            joints=tuple(JointEvidence(**joint) for joint in data["joints"]),
-            rows=data["rows"],
-            link=data.get("link"),
-            warnings=tuple(data["warnings"]),
-            provenance=data["provenance"],
-            frame=np.array(data["frame"], dtype=float),
-        )
-    except (KeyError, TypeError, ValueError) as error:
-        raise InputError(f"is damaged ({type(error).__name__}: {error})", file=path) from error
+    return PayloadEstimate.from_dict(data, file=path, remedy=DAMAGED, body=body_from_dict(data, path))
 
 
 def _errors(joint: JointEvidence) -> tuple[float, float]:

@@ -15,6 +15,7 @@ from estimation.identifications.identification import identify
 from estimation.predictions.prediction import predict
 from robots.common.errors import InputError, OedError
 from robots.common.progress import SILENT, Progress
+from robots.common.records import plain
 from robots.robot import Robot
 from robots.signals import Log
 
@@ -39,11 +40,18 @@ class MethodRow:
         problem: why it failed; empty where it did not.
     """
 
+    ENTRIES = ("method", "unseen=errors", "determined", "seconds", "problem")
+
     method: str
     unseen: Array
     determined: float
     seconds: float
     problem: str = ""
+
+    @property
+    def errors(self) -> Array | None:
+        """The errors; None where it failed."""
+        return None if self.problem else self.unseen
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -74,24 +82,11 @@ class MethodTable:
             )
         return "\n".join(lines)
 
-    def to_dict(self) -> list[dict[str, Any]]:
-        """Gives the rows as plain data."""
-        return [
-            {
-                "method": row.method,
-                "unseen": None if row.problem else row.unseen.tolist(),
-                "determined": row.determined,
-                "seconds": row.seconds,
-                "problem": row.problem,
-            }
-            for row in self.rows
-        ]
-
     def to_frame(self) -> pd.DataFrame:
         """Gives a row per estimator."""
         import pandas as pd
 
-        return pd.DataFrame(self.to_dict()).set_index("method")
+        return pd.DataFrame(plain(self.rows)).set_index("method")
 
 
 def compare_methods(

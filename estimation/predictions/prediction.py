@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,7 +21,8 @@ from estimation.preprocessing.smoothing import low_pass
 from estimation.regressions.preparation import torque_of
 from estimation.regressions.torque_meanings import as_joint_torque
 from robots.common.errors import InputError
-from robots.common.plain import all_finite, finite, joints_in_words, percent
+from robots.common.plain import joints_in_words, percent
+from robots.common.records import Finding, Result, findings_of
 from robots.common.tables.table_files import write_table
 from robots.signals import Log, Motion
 
@@ -38,7 +39,7 @@ MOSTLY = 0.5
 
 
 @dataclass(frozen=True, kw_only=True)
-class Prediction:
+class Prediction(Result):
     """Torques of a motion.
 
     Attributes:
@@ -57,6 +58,20 @@ class Prediction:
         rest: rows (N, n) in which the joint stands: friction may hold it with any torque, and the band is that wide.
             They do not count in the errors. None for none.
     """
+
+    ENTRIES = (
+        "samples=motion.t.size",
+        "extrapolates=extrapolated",
+        "at_rest",
+        "beyond_the_recorded=beyond",
+        "cutoff_hz=cutoff",
+        "gate",
+        "error_rms",
+        "nrmse",
+        "error_std_over_torque_std=relative_spread",
+        "error_std_over_torque_std_below_cutoff=band_limited_spread",
+        "band95_coverage=band_coverage",
+    )
 
     motion: Motion
     predicted: Array
@@ -113,6 +128,16 @@ class Prediction:
         return np.asarray((np.abs(self.measured - self.predicted) <= self.band).mean(axis=0))
 
     @property
+    def extrapolated(self) -> Array | None:
+        """Share of the samples in which each joint's model extrapolates (n,); None where it is not known."""
+        return None if self.extrapolates is None else np.asarray(self.extrapolates.mean(axis=0))
+
+    @property
+    def at_rest(self) -> Array | None:
+        """Share of the samples in which each joint rests (n,); None where it is not known."""
+        return None if self.rest is None else np.asarray(self.rest.mean(axis=0))
+
+    @property
     def _judged(self) -> Array:
         return np.ones(self.predicted.shape) if self.rest is None else (~self.rest).astype(float)
 
@@ -126,6 +151,26 @@ class Prediction:
         if scale is None:
             return error
         return np.divide(error, scale, out=np.full_like(error, np.nan), where=scale > 0)
+
+    @property
+    def conclusion(self) -> str:
+        """How well the model predicts the motion, where torque was logged."""
+        if self.measured is None:
+            return "The torques are predicted; the log has none to compare with."
+        return f"The model predicts this motion to {100 * np.median(self.nrmse):.1f} % of the torque RMS (median)."
+
+    @property
+    def remarks(self) -> tuple[Finding, ...]:
+        """What extrapolates, and what the gate found."""
+        share = self.extrapolated
+        texts = []
+        if share is not None and share.any():
+            texts = [f"{percent(float(share.mean()))} of the torques extrapolate: the fit has seen no such motion."]
+        gate = () if self.gate is None else self.gate.findings
+        return (
+            *findings_of("prediction.extrapolates", (*texts, *self.beyond)),
+            *(Finding(code=f"log.{finding.severity}", text=f"{finding}.") for finding in gate),
+        )
 
     def summary(self) -> str:
         """Gives the error per joint, where torque was logged."""
@@ -171,25 +216,6 @@ class Prediction:
             f"  {share} of the torques extrapolate: the parameters' errors matter more than in any recorded row",
             *(f"    {text}" for text in self.beyond),
         ]
-
-    def to_dict(self) -> dict[str, Any]:
-        """Gives the errors as plain data."""
-        quantities = {
-            "error_rms": self.error_rms,
-            "nrmse": self.nrmse,
-            "error_std_over_torque_std": self.relative_spread,
-            "error_std_over_torque_std_below_cutoff": self.band_limited_spread,
-            "band95_coverage": self.band_coverage,
-        }
-        return {
-            "samples": len(self.motion),
-            "extrapolates": None if self.extrapolates is None else self.extrapolates.mean(axis=0).tolist(),
-            "at_rest": None if self.rest is None else self.rest.mean(axis=0).tolist(),
-            "beyond_the_recorded": list(self.beyond),
-            "cutoff_hz": finite(self.cutoff),
-            "gate": None if self.gate is None else self.gate.to_dict(),
-            **{name: all_finite(values) for name, values in quantities.items()},
-        }
 
     def to_frame(self) -> pd.DataFrame:
         """Gives t, tau1.. as a table, and of a model with a band its limits and where it extrapolates."""

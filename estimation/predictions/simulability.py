@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,7 +17,7 @@ from estimation.models.model import Model
 from estimation.predictions.simulable_models import nearest_simulable
 from robots.base_parameters import BaseParameters, find_base_parameters
 from robots.common.errors import InputError
-from robots.common.plain import finite
+from robots.common.records import Record
 from robots.signals import Motion
 
 Array = NDArray[np.float64]
@@ -30,7 +29,7 @@ ALONG = 0.2
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class UnfitDirection:
+class UnfitDirection(Record):
     """Why a model cannot be simulated.
 
     Attributes:
@@ -47,6 +46,20 @@ class UnfitDirection:
         nearest: the nearest model that simulates.
         change: largest change of a determined parameter in it, in standard errors.
     """
+
+    ENTRIES = (
+        "q",
+        "direction",
+        "inertia",
+        "inertia_of_nearest=expected",
+        "link=body",
+        "rotor",
+        "parameter",
+        "value",
+        "value_of_nearest=needed",
+        "shift_in_standard_errors=shift",
+        "largest_change_in_standard_errors=change",
+    )
 
     q: Array
     direction: Array
@@ -66,22 +79,6 @@ class UnfitDirection:
         """The joints that move, from 1, the fastest first."""
         speed = np.abs(self.direction)
         return tuple(int(j) + 1 for j in np.argsort(-speed) if speed[j] >= ALONG * speed.max())
-
-    def to_dict(self) -> dict[str, Any]:
-        """Gives everything but the nearest model as plain data; null where the logs do not determine the parameter."""
-        return {
-            "q": self.q.tolist(),
-            "direction": self.direction.tolist(),
-            "inertia": self.inertia,
-            "inertia_of_nearest": self.expected,
-            "link": self.body,
-            "rotor": self.rotor,
-            "parameter": self.parameter,
-            "value": self.value,
-            "value_of_nearest": self.needed,
-            "shift_in_standard_errors": finite(self.shift),
-            "largest_change_in_standard_errors": self.change,
-        }
 
     def summary(self) -> str:
         """Names body, direction and remedy in a few sentences."""

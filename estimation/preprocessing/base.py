@@ -3,24 +3,27 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from typing import Any
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from estimation.preprocessing.resampling import Resampled
+from robots.common.records import Record
 from robots.signals import Motion
 
 Array = NDArray[np.float64]
 
 
-class Smoother(ABC):
+class Smoother(Record, ABC):
     """A way from sampled positions to position, velocity and acceleration without phase lag.
 
     Attributes:
         name: as results say it.
         cutoff: frequency [Hz] above which it passes nothing worth speaking of.
     """
+
+    ENTRIES: ClassVar[tuple[str, ...]] = ("kind=name", "cutoff_hz=cutoff")
 
     name: str
     cutoff: float
@@ -37,7 +40,3 @@ class Smoother(ABC):
     def text(self) -> str:
         """Says what it does in a few words."""
         return f"{self.name} at {self.cutoff:g} Hz"
-
-    def to_dict(self) -> dict[str, Any]:
-        """Describes it as plain data, for `provenance`."""
-        return {"kind": self.name, "cutoff_hz": self.cutoff}

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -29,6 +28,8 @@ class Harmonics(Smoother):
         period: [s].
         order: the highest harmonic.
     """
+
+    ENTRIES = ("kind=name", "cutoff_hz=cutoff", "period_s=period", "harmonics=order")
 
     period: float
     order: int
@@ -64,10 +65,6 @@ class Harmonics(Smoother):
     def text(self) -> str:
         """Says what it does in a few words."""
         return f"projection on {self.order} harmonics of the period of {self.period:.6g} s"
-
-    def to_dict(self) -> dict[str, Any]:
-        """Describes it as plain data."""
-        return {**super().to_dict(), "period_s": self.period, "harmonics": self.order}
 
     def _basis(self, t: Array, derivatives: int = 0) -> list[Array]:
         w = 2 * np.pi / self.period * np.arange(1, self.order + 1)

@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from estimation.models.model import Model
 from robots.common.errors import InputError
+from robots.common.records import Record
 from robots.signals import Motion
 from robots.thermal import ThermalModel, ThermalPath, build_thermal_model, simulate_motion
 
@@ -18,13 +19,15 @@ Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class ThermalTorqueModel:
+class ThermalTorqueModel(Record):
     """tau = rigid body + (alpha (T - T0) + beta) friction, each joint with its own temperature.
 
     Attributes:
         model: rigid body, rotor, offset and friction at T0.
         thermal: each joint's thermal model (n,); None for a joint whose friction does not change.
     """
+
+    ENTRIES = ("**model", "thermal.joints=thermal")
 
     model: Model
     thermal: tuple[ThermalModel | None, ...]
@@ -91,11 +94,6 @@ class ThermalTorqueModel:
             for j, thermal in enumerate(self.thermal)
         ]
         return np.asarray(rigid + np.stack(factors, axis=1) * cold)
-
-    def to_dict(self) -> dict[str, Any]:
-        """Writes `model.json` with one more entry, ``thermal``: a model per joint, or null."""
-        thermal = [None if model is None else model.to_dict() for model in self.thermal]
-        return {**self.model.to_dict(), "thermal": {"joints": thermal}}
 
 
 def thermal_from_dict(model: Model, data: Mapping[str, Any]) -> ThermalTorqueModel | None:

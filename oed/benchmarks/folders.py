@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from robots.common.errors import InputError
 from robots.common.files import existing_file
+from robots.common.records import Record
 from robots.common.tables.table_files import read_table
 
 FORMAT, CASE_FORMAT, VERSION = "oed-benchmark", "oed-benchmark-case", 1
@@ -55,7 +56,7 @@ class BlindCase:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Benchmark:
+class Benchmark(Record):
     """A benchmark without its answers.
 
     Attributes:
@@ -64,6 +65,8 @@ class Benchmark:
         commitment: SHA-256 of the file of sealed answers.
         cases: names of its cases.
     """
+
+    ENTRIES = ("folder", "id=identity", "cases", "commitment")
 
     folder: Path
     identity: str
@@ -94,15 +97,6 @@ class Benchmark:
     def summary(self) -> str:
         """Says what the benchmark is."""
         return f"benchmark {self.identity}: {len(self.cases)} cases, answers sealed by SHA-256 {self.commitment}"
-
-    def to_dict(self) -> dict[str, Any]:
-        """Gives the same as plain data."""
-        return {
-            "folder": str(self.folder),
-            "id": self.identity,
-            "cases": list(self.cases),
-            "commitment": self.commitment,
-        }
 
 
 def read_benchmark(folder: str | PathLike[str]) -> Benchmark:

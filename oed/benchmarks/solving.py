@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from functools import partial
 from os import PathLike
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -23,6 +24,7 @@ from robots.common.errors import InputError, OedError
 from robots.common.files import ResultFolder, write_atomic
 from robots.common.parallel import parallel_map
 from robots.common.progress import Progress
+from robots.common.records import Record
 from robots.version import VERSION
 
 METHODS: dict[str, Callable[[BlindCase], CaseAnswer]] = {
@@ -37,7 +39,7 @@ PARTS = ".parts"
 
 
 @dataclass(frozen=True, kw_only=True)
-class Answered:
+class Answered(Record):
     """What `answer_benchmark` did.
 
     Attributes:
@@ -46,9 +48,23 @@ class Answered:
         resumed: number of cases that an earlier run had answered.
     """
 
+    ENTRIES = (
+        "tool=answers.tool",
+        "version=answers.version",
+        "benchmark=answers.benchmark",
+        "cases=plain_cases",
+        "refused",
+        "resumed",
+    )
+
     answers: Answers
     refused: dict[str, str]
     resumed: int
+
+    @property
+    def plain_cases(self) -> dict[str, Any]:
+        """The answers, without the predictions."""
+        return {name: plain_case(answer) for name, answer in self.answers.cases.items()}
 
     def summary(self) -> str:
         """Says how many cases were answered, and how."""
@@ -61,17 +77,6 @@ class Answered:
             lines.append(f"{self.resumed} of them by an earlier run")
         lines += [f"{name} not answered: {reason}" for name, reason in self.refused.items()]
         return "\n".join(lines)
-
-    def to_dict(self) -> dict[str, object]:
-        """Gives the same as plain data, without the predictions."""
-        return {
-            "tool": self.answers.tool,
-            "version": self.answers.version,
-            "benchmark": self.answers.benchmark,
-            "cases": {name: plain_case(answer) for name, answer in self.answers.cases.items()},
-            "refused": self.refused,
-            "resumed": self.resumed,
-        }
 
 
 def answer_benchmark(

@@ -2,21 +2,21 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass
-from typing import Any
+from dataclasses import dataclass
 
 import numpy as np
 
 from oed.trajectories.sweeps import FRICTION_LEVELS, LONGEST_PLATEAU
 from oed.trajectories.warm_up import RANGE_FRACTION
 from robots.common.errors import InputError
+from robots.common.records import Record
 
 LONGEST = 7 * 24 * 3600.0
 """A campaign beyond a week is taken for a slip of the pen [s]."""
 
 
 @dataclass(frozen=True, kw_only=True)
-class Programme:
+class Programme(Record):
     """Power-on test, then for each duty cycle a run of heating cycles and a cooling test.
 
     A heating cycle is excitation, friction sweeps and warm-up (thesis section 2.4.1); in a cooling test the robot
@@ -101,10 +101,6 @@ class Programme:
         if self.cycles:
             names += [duty_name(duty) for duty in self.duties]
         return tuple(names)
-
-    def to_dict(self) -> dict[str, Any]:
-        """Writes plain data."""
-        return {**asdict(self), "duties": list(self.duties), "levels": list(self.levels)}
 
 
 def duty_name(duty: float) -> str:

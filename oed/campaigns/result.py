@@ -18,12 +18,14 @@ from oed.campaigns.heat import Temperatures, expected_temperatures, stage_heat
 from oed.campaigns.programme import Programme
 from oed.campaigns.stages import Stage
 from oed.campaigns.timetable import Slot
-from oed.experiments.safety_checks.freedom import freedom_text
-from oed.experiments.safety_checks.margins import assumed_values
+from oed.experiments.results.planned import OF_ROBOT, Planned
+from oed.experiments.safety_checks.freedom import collides, freedom_text
+from oed.experiments.safety_checks.margins import assumption_findings
 from oed.exports import read_trajectory, write_trajectory
 from robots.collision import Surroundings
 from robots.common.errors import InputError
-from robots.common.files import existing_file, sha256, write_atomic
+from robots.common.files import existing_file, sha256
+from robots.common.records import Finding, axes_for, findings_of, plain, read, write_json
 from robots.loading import load_robot
 from robots.robot import Robot
 from robots.thermal import KnownThermal, SecondOrder
@@ -39,7 +41,7 @@ CAMPAIGN = "campaign.json"
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Campaign:
+class Campaign(Planned, format="robot-oed campaign", tool=True):
     """A whole experiment, from the cold robot to the warm one and back.
 
     Attributes:
@@ -55,6 +57,28 @@ class Campaign:
         notes: what a user should know: what was shortened, what could not be checked.
         settings: options of the planning that show nowhere else, as plain data.
     """
+
+    FILE = CAMPAIGN
+    ENTRIES = (
+        *OF_ROBOT,
+        "assumed",
+        "period=robot.period",
+        "duration",
+        "cycles",
+        "samples",
+        "home",
+        "programme",
+        "torque_margin",
+        "settings",
+        "stages=stated_stages",
+        "timetable=slots",
+        "heat.by=heat_source",
+        "heat.unit=heat_unit",
+        "heat.total=total_heat",
+        "heat.per_cycle=cycle_heat",
+        "temperatures=_temperature_data",
+        "notes",
+    )
 
     robot: Robot
     programme: Programme
@@ -112,6 +136,28 @@ class Campaign:
                 total[slot.cycle - 1] += self.heat[slot.stage]
         return total
 
+    heat_source, heat_unit = "friction of the robot's description", "J"
+
+    @property
+    def total_heat(self) -> Array:
+        """Heat of the whole campaign by the described friction, (n,) [J]."""
+        return np.asarray(self.cycle_heat.sum(axis=0))
+
+    def stated_stages(self, digests: Mapping[str, str] | None = None) -> list[dict[str, Any]]:
+        """The stages with their heat.
+
+        Args:
+            digests: SHA-256 of each stage's file, by the stage's name, where the files are written.
+
+        Returns:
+            An entry for each stage, as `campaign.json` has it.
+        """
+        return [
+            stage.to_dict(limits=self.robot.limits)
+            | {"sha256": None if digests is None else digests[stage.name], "heat": self.heat[stage.name]}
+            for stage in self.stages
+        ]
+
     @cached_property
     def temperatures(self) -> Temperatures | None:
         """Temperatures to expect; None where no thermal model is known."""
@@ -132,6 +178,52 @@ class Campaign:
         """
         torque = TorqueCheck(self.robot, self.torque_margin)
         return tuple(checked(stage, self.robot, self.home, torque) for stage in self.stages)
+
+    @property
+    def conclusion(self) -> str:
+        """Whether to play the campaign, and how."""
+        codes = {finding.code for finding in self.remarks}
+        if "limit.exceeded" in codes:
+            return "Do not play this campaign: at least one stage exceeds a limit."
+        if "collision.found" in codes:
+            return "Do not play this campaign before its collisions are checked."
+        return (
+            f"Play {len(self.stages)} files in {self.cycles} cycles by the timetable below, "
+            f"{self.duration / 60:.1f} min in all."
+        )
+
+    @property
+    def remarks(self) -> tuple[Finding, ...]:
+        """Limits that are exceeded, collisions, notes, and what was assumed."""
+        found = [
+            Finding(
+                code="limit.exceeded",
+                subject=f"{stage.name}, joint {margin.joint}:",
+                text=f"the limit of {margin.quantity} is exceeded at {margin.time:.3f} s.",
+                action="Do not play it.",
+            )
+            for stage in self.stages
+            for margin in stage.margins
+            if margin.violated
+        ]
+        colliding = []
+        for stage in self.stages:
+            if collides(stage.freedom):
+                text = freedom_text(stage.freedom)
+                action = (
+                    "Design it again with oed design, which avoids collisions."
+                    if stage.kind == "excitation"
+                    else "Check it first."
+                )
+                found.append(Finding(code="collision.found", subject=f"{stage.name}:", text=text, action=action))
+                colliding.append(stage.name)
+        if self.success:
+            text = "Every stage respects all limits, and starts and ends at rest in the home pose."
+            found += findings_of("done", [text])
+        # The notes say the same of collisions.
+        own = tuple(f"COLLISION in the {name} stage" for name in colliding)
+        notes = [note for note in self.notes if not (own and note.startswith(own))]
+        return (*found, *findings_of("experiment.note", notes), *assumption_findings(self.robot))
 
     def summary(self) -> str:
         """Lists the stages, the expected heating, and notes."""
@@ -156,13 +248,11 @@ class Campaign:
         """Gives the timetable: start, end, stage, cycle, run, phase, duty, file."""
         import pandas as pd
 
-        return pd.DataFrame([slot.to_dict() for slot in self.slots])
+        return pd.DataFrame(plain(self.slots))
 
     def plot(self, ax: Axes | None = None) -> Axes:
         """Draws on `ax` the expected temperatures where heat is produced; without a thermal model, the heat so far."""
-        from matplotlib.figure import Figure
-
-        axes = ax if ax is not None else Figure(figsize=(9, 4)).subplots()
+        axes = axes_for(ax, (9, 4))
         if (temperatures := self.temperatures) is not None:
             t, values, label = temperatures.t, temperatures.T1, "expected temperature [degC]"
         else:
@@ -175,46 +265,6 @@ class Campaign:
         axes.set_ylabel(label)
         axes.legend(ncols=3)
         return axes
-
-    def to_dict(self, digests: Mapping[str, str] | None = None) -> dict[str, Any]:
-        """Writes everything but the samples as plain data for `campaign.json`.
-
-        Args:
-            digests: SHA-256 of each stage's file, by the stage's name, where the files are written.
-        """
-        per_cycle = self.cycle_heat
-        return {
-            "format": "robot-oed campaign",
-            "format_version": 1,
-            "tool_version": VERSION,
-            "robot": {"name": self.robot.name, "origin": self.robot.origin, "sha256": self.robot.digest},
-            "assumed": assumed_values(self.robot),
-            "period": self.robot.period,
-            "duration": self.duration,
-            "cycles": self.cycles,
-            "samples": self.samples,
-            "home": self.home.tolist(),
-            "programme": self.programme.to_dict(),
-            "torque_margin": self.torque_margin,
-            "settings": dict(self.settings),
-            "stages": [
-                {
-                    **stage.to_dict(self.robot.limits),
-                    "sha256": None if digests is None else digests[stage.name],
-                    "heat": self.heat[stage.name].tolist(),
-                }
-                for stage in self.stages
-            ],
-            "timetable": [slot.to_dict() for slot in self.slots],
-            "heat": {
-                "by": "friction of the robot's description",
-                "unit": "J",
-                "total": per_cycle.sum(axis=0).tolist(),
-                "per_cycle": per_cycle.tolist(),
-            },
-            "temperatures": self._temperature_data(),
-            "notes": list(self.notes),
-        }
 
     def save(self, folder: str | PathLike[str], *, force: bool = False) -> None:
         """Writes a CSV per stage and `campaign.json`.
@@ -237,8 +287,7 @@ class Campaign:
             }
             write_trajectory(folder / stage.file, stage.motion, metadata, kinds=self.robot.chain.kinds, force=force)
             digests[stage.name] = sha256(folder / stage.file)
-        text = json.dumps(self.to_dict(digests), indent=2, allow_nan=False) + "\n"
-        write_atomic(folder / CAMPAIGN, text, force=force)
+        write_json(folder / self.FILE, self.to_dict(digests=digests), force=force)
 
     @classmethod
     def load(cls, folder: str | PathLike[str], robot: Robot | None = None) -> Campaign:
@@ -262,7 +311,7 @@ class Campaign:
                 path = Path(folder) / entry["file"]
                 if sha256(path) != entry["sha256"]:
                     raise InputError("changed since the campaign wrote it", file=path, remedy="run oed campaign again")
-                stages.append(Stage.from_dict(entry, read_trajectory(path, n=known.n)[0]))
+                stages.append(Stage.from_dict(entry, file=file, motion=read_trajectory(path, n=known.n)[0]))
             expected = data["temperatures"]
             thermal = None
             if expected["models"] is not None:
@@ -270,10 +319,10 @@ class Campaign:
                 thermal = KnownThermal(models=models, sources=tuple(expected["sources"]))
             return cls(
                 robot=known,
-                programme=Programme(**data["programme"]),
+                programme=Programme.from_dict(data["programme"], file=file),
                 home=np.array(data["home"]),
                 stages=tuple(stages),
-                slots=tuple(Slot.from_dict(slot) for slot in data["timetable"]),
+                slots=read(tuple[Slot, ...], data["timetable"], file=file),
                 thermal=thermal,
                 ambient=expected["ambient"],
                 cold_friction=expected["cold_friction"],

@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from oed.experiments.safety_checks.margins import margin_data, margin_from
 from robots.common.errors import InputError
-from robots.limits import Limits, Margin
+from robots.common.records import Record
+from robots.limits import Margin
 from robots.signals import Motion
 
 Array = NDArray[np.float64]
@@ -20,7 +20,7 @@ STAGE_KINDS = ("power_on", "excitation", "friction", "warm_up")
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Stage:
+class Stage(Record):
     """A part of a campaign.
 
     Args:
@@ -37,6 +37,19 @@ class Stage:
     Raises:
         InputError: an unknown kind, or a motion that is not uniform in time from zero.
     """
+
+    ENTRIES = (
+        "name",
+        "kind",
+        "file",
+        "samples=motion.t.size",
+        "duration",
+        "segments",
+        "plateaus",
+        "details",
+        "smallest_margins=margins",
+        "collision=freedom",
+    )
 
     name: str
     kind: str
@@ -73,33 +86,3 @@ class Stage:
         """The limit that it comes closest to."""
         stated = (margin for margin in self.margins if np.isfinite(margin.limit))
         return min(stated, key=lambda margin: margin.slack_fraction, default=None)
-
-    def to_dict(self, limits: Limits | None = None) -> dict[str, Any]:
-        """Writes all but the samples as plain data."""
-        return {
-            "name": self.name,
-            "kind": self.kind,
-            "file": self.file,
-            "samples": len(self.motion),
-            "duration": self.duration,
-            "segments": [dict(segment) for segment in self.segments],
-            "plateaus": [dict(plateau) for plateau in self.plateaus],
-            "details": dict(self.details),
-            "smallest_margins": [margin_data(margin, limits) for margin in self.margins],
-            "collision": None if self.freedom is None else dict(self.freedom),
-        }
-
-    @classmethod
-    def from_dict(cls, data: Mapping[str, Any], motion: Motion) -> Stage:
-        """Reads what `to_dict` wrote, with the motion of its file."""
-        margins = tuple(margin_from(margin) for margin in data["smallest_margins"])
-        return cls(
-            name=data["name"],
-            kind=data["kind"],
-            motion=motion,
-            segments=tuple(data["segments"]),
-            plateaus=tuple(data["plateaus"]),
-            details=data["details"],
-            margins=margins,
-            freedom=data.get("collision"),
-        )

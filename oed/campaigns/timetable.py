@@ -3,18 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from itertools import pairwise
 from typing import Any
 
 from oed.campaigns.programme import Programme, duty_name
 from robots.common.errors import InputError
+from robots.common.records import Record
 
 PHASES = ("power_on", "heating", "cooling")
 
 
 @dataclass(frozen=True, kw_only=True)
-class Slot:
+class Slot(Record):
     """A line of the timetable.
 
     Args:
@@ -27,6 +28,8 @@ class Slot:
         duty: duty cycle of the run's warm-up; None outside of heating.
     """
 
+    ENTRIES = ("*", "file")
+
     start: float
     end: float
     stage: str | None
@@ -36,18 +39,14 @@ class Slot:
     duty: float | None = None
 
     @property
+    def file(self) -> str | None:
+        """The file to play; None for a rest."""
+        return None if self.stage is None else f"{self.stage}.csv"
+
+    @property
     def duration(self) -> float:
         """How long it takes [s]."""
         return self.end - self.start
-
-    def to_dict(self) -> dict[str, Any]:
-        """Writes plain data, with the file to play."""
-        return {**asdict(self), "file": None if self.stage is None else f"{self.stage}.csv"}
-
-    @classmethod
-    def from_dict(cls, data: Mapping[str, Any]) -> Slot:
-        """Reads what `to_dict` wrote."""
-        return cls(**{name: value for name, value in data.items() if name != "file"})
 
 
 def make_timetable(programme: Programme, samples: Mapping[str, int], period: float) -> tuple[Slot, ...]:

@@ -19,6 +19,7 @@ from oed.cli.commands.diagnose import diagnose
 from oed.cli.commands.doctor import doctor
 from oed.cli.commands.effects import effects
 from oed.cli.commands.example import example
+from oed.cli.commands.explain import explain
 from oed.cli.commands.export import export
 from oed.cli.commands.fleet import fleet
 from oed.cli.commands.force import force
@@ -69,6 +70,7 @@ FUNCTIONS = (
     robot,
     robots,
     effects,
+    explain,
     doctor,
 )
 

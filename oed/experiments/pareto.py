@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import combinations_with_replacement
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -15,9 +14,10 @@ from numpy.typing import NDArray
 from oed.criteria import Blend, Criterion
 from oed.criteria import criterion as choose_criterion
 from oed.experiments.designing import design
+from oed.experiments.quality import excitation_findings
 from oed.experiments.results.result import Design
 from robots.common.errors import InputError
-from robots.common.files import write_atomic
+from robots.common.records import Finding, Result, axes_for
 from robots.robot import Robot
 
 if TYPE_CHECKING:
@@ -31,7 +31,7 @@ MOST_CRITERIA = 3
 
 
 @dataclass(frozen=True, kw_only=True)
-class ParetoFront:
+class ParetoFront(Result, format="robot-oed pareto front"):
     """Designs between the extremes of several criteria.
 
     Attributes:
@@ -40,6 +40,9 @@ class ParetoFront:
         designs: the P designs, one for each row of weights.
         values: of each criterion for the optimised part of each design, (P, k), as people read them.
     """
+
+    FILE = PARETO
+    ENTRIES = ("criteria=named_criteria", "points")
 
     criteria: tuple[Criterion, ...]
     weights: Array
@@ -56,6 +59,21 @@ class ParetoFront:
         return efficient
 
     @property
+    def named_criteria(self) -> list[dict[str, str]]:
+        """Name and label of each criterion."""
+        return [{"name": criterion.name, "label": criterion.label} for criterion in self.criteria]
+
+    @property
+    def points(self) -> list[dict[str, Any]]:
+        """The designs, each in a folder beside the file, with weights and values."""
+        return [
+            {"folder": folder_of(point), "weights": weights, "values": values, "efficient": bool(efficient)}
+            for point, (weights, values, efficient) in enumerate(
+                zip(self.weights, self.values, self.efficient, strict=True), start=1
+            )
+        ]
+
+    @property
     def success(self) -> bool:
         """Whether all designs keep their limits and excite all parameters."""
         return all(design.success for design in self.designs)
@@ -69,6 +87,34 @@ class ParetoFront:
         data |= {name: self.values[:, k] for k, name in enumerate(names)}
         index = pd.RangeIndex(1, len(self.designs) + 1, name="point")
         return pd.DataFrame({**data, "efficient": self.efficient}, index=index)
+
+    @property
+    def conclusion(self) -> str:
+        """How many designs there are to choose from."""
+        return (
+            f"Choose one of {int(self.efficient.sum())} Pareto-optimal designs, of {len(self.designs)}: no other "
+            "design is better in every criterion."
+        )
+
+    @property
+    def remarks(self) -> tuple[Finding, ...]:
+        """What single designs do not determine, and limits that they exceed."""
+        found = [
+            replace(finding, subject=f"Point {point}:")
+            for point, design in enumerate(self.designs, start=1)
+            for finding in excitation_findings(design.whole)
+        ]
+        found += [
+            Finding(
+                code="limit.exceeded",
+                subject=f"Point {point}:",
+                text=f"the motion exceeds {len(design.violated)} limits.",
+                action="Do not play it.",
+            )
+            for point, design in enumerate(self.designs, start=1)
+            if design.violated
+        ]
+        return tuple(found)
 
     def summary(self) -> str:
         """Lists the designs with their criteria."""
@@ -86,9 +132,7 @@ class ParetoFront:
         Args:
             ax: where to draw; a new figure by default.
         """
-        from matplotlib.figure import Figure
-
-        axes = ax if ax is not None else Figure(figsize=(6, 5)).subplots()
+        axes = axes_for(ax, (6, 5))
         for efficient, marker in ((True, "o"), (False, "x")):
             chosen = self.efficient == efficient
             axes.plot(self.values[chosen, 0], self.values[chosen, 1], marker, label="efficient" if efficient else "not")
@@ -97,40 +141,12 @@ class ParetoFront:
         axes.legend()
         return axes
 
-    def to_dict(self) -> dict[str, Any]:
-        """Writes the front as plain data for `pareto.json`; the designs lie in folders beside it."""
-        return {
-            "format": "robot-oed pareto front",
-            "format_version": 1,
-            "criteria": [{"name": criterion.name, "label": criterion.label} for criterion in self.criteria],
-            "points": [
-                {
-                    "folder": folder_of(point),
-                    "weights": weights.tolist(),
-                    "values": values.tolist(),
-                    "efficient": bool(efficient),
-                }
-                for point, (weights, values, efficient) in enumerate(
-                    zip(self.weights, self.values, self.efficient, strict=True), start=1
-                )
-            ],
-        }
-
-    def save(self, folder: str | Path, *, force: bool = False) -> None:
-        """Writes `pareto.json`, and each design in a folder of its own.
-
-        Args:
-            folder: an existing one.
-            force: replace files that are there.
-
-        Raises:
-            InputError: a file is there, and force is not given.
-        """
+    def _save_beside(self, folder: Path, *, force: bool) -> None:
+        """Writes each design in a folder of its own."""
         for point, saved in enumerate(self.designs, start=1):
-            own = Path(folder) / folder_of(point)
+            own = folder / folder_of(point)
             own.mkdir(exist_ok=True)
             saved.save(own, force=force)
-        write_atomic(Path(folder) / PARETO, json.dumps(self.to_dict(), indent=2, allow_nan=False) + "\n", force=force)
 
 
 def pareto(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
@@ -12,15 +13,20 @@ from oed.criteria import Criterion, Weighting, triangle
 from oed.criteria import criterion as choose_criterion
 from robots.base_parameters import BaseParameters
 from robots.common.parallel import one_blas_thread
+from robots.common.plain import significant
+from robots.common.records import Finding, Record
 from robots.regressor import TorqueModel, default_model
 from robots.robot import Robot
 from robots.signals import Motion
+
+NOISE = 0.02
+"""Torque noise over the torque: what models of robots commonly leave."""
 
 _LABELS = {"fourier": "Fourier series", "sinusoid": "velocity strokes", "whole": "whole experiment"}
 
 
 @dataclass(frozen=True, kw_only=True)
-class Quality:
+class Quality(Record):
     """Information of a part of the experiment on the parameters.
 
     Attributes:
@@ -28,6 +34,15 @@ class Quality:
         samples: how many.
         singular_values: of the unscaled regressor Y (m,), ascending.
     """
+
+    ENTRIES = (
+        "part",
+        "samples",
+        "cond_Y=cond",
+        "log_det_YtY=log_det",
+        "smallest_singular_value_Y=smallest",
+        "singular_values_Y=singular_values",
+    )
 
     part: str
     samples: int
@@ -39,21 +54,29 @@ class Quality:
         kind, *rest = self.part.split(" ", 1)
         return " ".join([_LABELS.get(kind, kind), *rest])
 
+    @property
+    def full(self) -> bool:
+        """Whether Y has full rank, so that the motion excites all parameters."""
+        return self.singular_values[0] > 1e-10 * self.singular_values[-1]
+
+    @property
+    def cond(self) -> float | None:
+        """Condition number of Y; None where it has not full rank."""
+        return self.value("cond") if self.full else None
+
+    @property
+    def log_det(self) -> float | None:
+        """Logarithm of det(Y'Y); None where Y has not full rank."""
+        return self.value("d") if self.full else None
+
+    @property
+    def smallest(self) -> float:
+        """Smallest singular value of Y; 0 where it has not full rank."""
+        return self.singular_values[0] if self.full else 0.0
+
     def value(self, criterion: str | Criterion) -> float:
         """Evaluates a criterion."""
         return choose_criterion(criterion).value(np.square(self.singular_values))
-
-    def to_dict(self) -> dict[str, Any]:
-        """Lists cond(Y), log det(Y'Y) and the smallest singular value; null where Y has not full rank."""
-        full = self.singular_values[0] > 1e-10 * self.singular_values[-1]
-        return {
-            "part": self.part,
-            "samples": self.samples,
-            "cond_Y": self.value("cond") if full else None,
-            "log_det_YtY": self.value("d") if full else None,
-            "smallest_singular_value_Y": self.singular_values[0] if full else 0.0,
-            "singular_values_Y": list(self.singular_values),
-        }
 
 
 @one_blas_thread()
@@ -69,3 +92,46 @@ def design_model(robot: Robot, settings: Mapping[str, Any]) -> TorqueModel:
     """Builds the model whose columns a design with these settings is for."""
     keys = ("friction", "velocity_scale", "rotor", "offset")
     return default_model(robot, **{key: settings[key] for key in keys})
+
+
+def excitation_findings(quality: Quality) -> tuple[Finding, ...]:
+    """Says whether a motion determines all parameters, and whether noise leaves one of them open.
+
+    With torque noise of `NOISE` of the torque, the standard error of the worst-determined direction is about
+    NOISE cond(Y) / sqrt(N) of the parameters' size. Above 1 that direction is not determined.
+
+    Args:
+        quality: of the whole motion.
+    """
+    cond = quality.cond
+    code = excitation_code(cond, quality.samples)
+    if not code:
+        return ()
+    action = "Give the motion more room or time: --velocity-fraction, --periods or --effort thorough."
+    if cond is None:
+        text = "The motion does not excite all parameters: the regressor lacks rank."
+        return (Finding(code=code, text=text, action=action),)
+    error = _worst_error(cond, quality.samples)
+    text = (
+        f"At least one combination of parameters is not determined: cond(Y) is {significant(cond, digits=2)}. With "
+        f"torque noise of {100 * NOISE:g} %, its standard error is about {significant(error, digits=2)} times the "
+        "parameters' size."
+    )
+    return (Finding(code=code, text=text, action=action),)
+
+
+def excitation_code(cond: float | None, samples: int) -> str:
+    """Gives the code of a finding about the excitation; empty if the motion determines all parameters.
+
+    Args:
+        cond: condition number of the regressor; None if it lacks rank.
+        samples: number of its samples.
+    """
+    if cond is None:
+        return "excitation.incomplete"
+    return "excitation.weak" if _worst_error(cond, samples) > 1.0 else ""
+
+
+def _worst_error(cond: float, samples: int) -> float:
+    """Standard error of the worst-determined direction over the parameters' size, see `excitation_findings`."""
+    return NOISE * cond / math.sqrt(samples)

@@ -12,8 +12,8 @@ from datetime import UTC, datetime
 from pathlib import Path
 
 from oed.overviews.kinds import BY_NAME, Figure, Reading, read_kind
-from oed.reports.rendering.severity import ORDER, Level, severity
 from robots.common.errors import InputError
+from robots.common.records.findings import ORDER, Level, severity
 
 LARGEST = 64_000_000
 """Files above this size [bytes] are not read."""
@@ -148,10 +148,12 @@ def _entry(root: Path, path: Path) -> Entry | None:
         return None
     try:
         reading = read_kind(path.name, data)
-    except (KeyError, TypeError, ValueError, IndexError, AttributeError, ZeroDivisionError, OverflowError) as error:
+    except (InputError, LookupError, TypeError, ValueError, AttributeError, ArithmeticError) as error:
         if not isinstance(data.get("format"), str) and path.name in BY_NAME and not data.keys() & {"verdict", "limits"}:
             return None
         what = f"the field {error} is missing" if isinstance(error, KeyError) else "a field has another form"
+        if isinstance(error, InputError) and error.column:
+            what = f"the field {error.column!r}: {error.problem}"
         text = f"Written by another version of oed: {what}. Make it again, or open its file."
         return replace(entry, kind="other version", level="note", verdict=text)
     return None if reading is None else _filled(entry, reading)

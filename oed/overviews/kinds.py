@@ -7,11 +7,17 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
+from estimation.actuators.result import actuators_of
+from estimation.calibrations.result import SHOWN, Calibration
 from estimation.diagnosis.results.standing import standing_of, standing_verdict
+from estimation.payloads.body import body_from_dict
+from estimation.payloads.result import PayloadEstimate
+from oed.experiments.drives.result import DriveDesign
+from oed.experiments.pose_designs.result import PoseDesign
+from oed.experiments.quality import excitation_code
 from oed.experiments.safety_checks.freedom import collides, freedom_text
-from oed.reports.pages.design_report import excitation_code
-from oed.reports.rendering.severity import LEVELS
-from robots.common.plain import two_digits
+from robots.common.records import Result, effect_code
+from robots.terms.effects import EFFECTS
 
 Figure = float | str | None
 Data = Mapping[str, Any]
@@ -139,7 +145,7 @@ def _diagnosis(data: Data) -> Reading:
         "ambiguous": "Several causes fit",
         "unexplained": "Part of the residual has no known cause",
     }[verdict]
-    known = [f"effect.{f['effect']}" for f in findings if f"effect.{f['effect']}" in LEVELS]
+    known = [effect_code(f["effect"]) for f in findings if f["effect"] in EFFECTS]
     before, after = ([math.nan if x is None else x for x in data[part]["nrmse"]] for part in ("baseline", "extended"))
     standing, forbidden = standing_of(verdict, before, after), standing_verdict(verdict, before, after)
     codes = [*(known if standing != "unconfirmed" else []), *([f"diagnosis.{standing}"] if standing != "sound" else [])]
@@ -177,7 +183,7 @@ def _monitoring(data: Data) -> Reading:
     return Reading(
         kind="monitoring",
         verdict=data["verdict"],
-        codes=(*(f"change.{f['kind']}" for f in data["findings"]), "done"),
+        codes=(*(f"change.{f['severity']}" for f in data["findings"]), "done"),
         figures={"changes": len(data["findings"]), "hours": data["hours"]},
         robot=_robot(data),
     )
@@ -209,68 +215,32 @@ def _comparison(data: Data) -> Reading:
 
 
 def _payload(data: Data) -> Reading:
-    open_ = sum(not item["determined"] for item in data["quantities"])
-    if data["mass"] == 0.0:
-        # Older files have a mass.
-        bound = data["quantities"][0]["ci95"][1]
-        verdict, open_ = f"No payload found: at most {two_digits(bound)} kg at 95 %.", 0
-    else:
-        verdict = f"Mass {data['mass']:.3g} kg; {open_ or 'no'} quantities not determined."
-    return Reading(
-        kind="payload",
-        verdict=verdict,
-        codes=("payload.uncertain",) if open_ else ("done",),
-        figures={"mass [kg]": data["mass"], "rows": data["rows"]},
-        robot=_robot(data),
-    )
+    result = PayloadEstimate.from_dict(data, body=body_from_dict(dict(data), PayloadEstimate.FILE))
+    return _said("payload", result, data, {"mass [kg]": data["mass"], "rows": result.rows})
 
 
 def _drives(data: Data) -> Reading:
-    errors = [1e3 * joint["held_out"] for joint in data["errors"]]
-    mean = sum(errors) / len(errors)
-    open_ = sum(value["status"] == "not determined" for value in data["parameters"])
-    return Reading(
-        kind="drives",
-        verdict=f"Simulated motion within {mean:.3g} mrad; {open_ or 'no'} parameters not determined.",
-        codes=("drives.effect",) if data["findings"] else ("drives.undetermined",) if open_ else ("done",),
-        figures={"error [mrad]": mean, "effects": len(data["findings"]), "parameters": len(data["parameters"])},
-        robot=_robot(data),
-    )
+    result = actuators_of(data)
+    figures = {"effects": len(result.findings), "parameters": len(result.parameters)}
+    return _said("drives", result, data, {"error [mrad]": 1e3 * result.held_out_error, **figures})
 
 
 def _calibration(data: Data) -> Reading:
-    levels, factor = data["levels"], 1e3 if data["unit"] != "px" else 1.0
-    unit = {"m": "mm", "rad": "mrad", "px": "px"}[data["unit"]]
-    before, after = factor * levels["before"], factor * levels["held_out"]
-    return Reading(
-        kind="calibration",
-        verdict=f"Error of held-out poses {before:.3g} -> {after:.3g} {unit}.",
-        codes=("calibration.doubtful",) if data["warnings"] else ("done",),
-        figures={f"before [{unit}]": before, f"held out [{unit}]": after, "outliers": len(data["outliers"])},
-        robot=_robot(data),
-    )
+    result = Calibration.from_dict(data, robot=None, corrected=None)
+    unit, factor = SHOWN[result.unit]
+    errors = {f"before [{unit}]": factor * result.levels.before, f"held out [{unit}]": factor * result.levels.held_out}
+    return _said("calibration", result, data, {**errors, "outliers": len(result.outliers)})
 
 
 def _drive_design(data: Data) -> Reading:
-    ratios = sorted(i["standard_error"] / i["of_chirp"] for i in data["expected"] if i["of_chirp"])
-    middle = ratios[len(ratios) // 2] if ratios else math.nan
-    return Reading(
-        kind="motion for drives",
-        verdict=f"Standard errors {middle:.2g} times those of a chirp.",
-        figures={"parameters": len(data["expected"])},
-        robot=_robot(data),
-    )
+    result = DriveDesign.from_dict(data, t=None, command=None)
+    return _said("motion for drives", result, data, {"parameters": len(result.expected)})
 
 
 def _pose_design(data: Data) -> Reading:
-    free = data["collision"] is not None and data["collision"]["certified"]
-    return Reading(
-        kind="poses",
-        verdict=f"{len(data['poses'])} poses for a calibration, {data['duration']:.0f} s of motion.",
-        codes=("done",) if free else ("collision.unchecked",),
-        figures={"poses": len(data["poses"]), "O1": data["observability"]["O1"], "duration [s]": data["duration"]},
-        robot=_robot(data),
-    )
+    result = PoseDesign.from_dict(data, robot=None, motion=None, parameters=(), expected=None)
+    poses: dict[str, Figure] = {"poses": len(result.q), "O1": data["observability"]["O1"]}
+    return _said("poses", result, data, {**poses, "duration [s]": data["duration"]})
 
 
 def _forces(data: Data) -> Reading:
@@ -311,6 +281,17 @@ def _limits(data: Data) -> Reading:
         verdict=f"{hidden} of {len(limits)} effects cannot be found with this motion.",
         codes=("detection.limited",) if hidden else ("done",),
         figures={"effects": len(limits), "cannot be found": hidden},
+        robot=_robot(data),
+    )
+
+
+def _said(kind: str, result: Result, data: Data, figures: Mapping[str, Figure]) -> Reading:
+    """What a result says of itself."""
+    return Reading(
+        kind=kind,
+        verdict=result.conclusion,
+        codes=(*(remark.code for remark in result.remarks), "done"),
+        figures=figures,
         robot=_robot(data),
     )
 

@@ -45,7 +45,6 @@ from oed.reports.rendering.html import render as render
 from oed.reports.rendering.matplotlib_ import save_png as save_png
 from oed.reports.rendering.matplotlib_ import to_matplotlib as to_matplotlib
 from oed.reports.rendering.page import Fact as Fact
-from oed.reports.rendering.page import Finding as Finding
 from oed.reports.rendering.page import Page as Page
 from oed.reports.rendering.page import Section as Section
 from oed.reports.rendering.page import Table as Table
@@ -59,8 +58,9 @@ from oed.reports.rendering.plotly_ import to_plotly as to_plotly
 from oed.reports.rendering.provenance import Footer as Footer
 from oed.reports.rendering.provenance import InputFile as InputFile
 from oed.reports.rendering.provenance import Recording as Recording
-from oed.reports.rendering.severity import severity as severity
-from oed.reports.rendering.significant import percent as percent
-from oed.reports.rendering.significant import significant as significant
-from oed.reports.rendering.significant import significant_error as significant_error
-from oed.reports.rendering.significant import with_error as with_error
+from robots.common.plain import rounded_percent as rounded_percent
+from robots.common.plain import significant as significant
+from robots.common.plain import significant_error as significant_error
+from robots.common.plain import with_error as with_error
+from robots.common.records.findings import Finding as Finding
+from robots.common.records.findings import severity as severity

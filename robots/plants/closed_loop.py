@@ -36,6 +36,8 @@ class Loop:
         damping: of the error; 1 is critical.
     """
 
+    ENTRIES = ("bandwidth_hz=bandwidth", "damping")
+
     bandwidth: float = 5.0
     damping: float = 1.0
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from typing import Any, ClassVar
 
 import numpy as np
@@ -13,6 +13,7 @@ from scipy.linalg import expm
 
 from robots.common.errors import InputError
 from robots.common.parallel import one_blas_thread
+from robots.common.records import Record
 from robots.thermal.checks import checked_ambient, checked_power, checked_steps
 from robots.thermal.parameters import Inputs, ThermalParameter
 
@@ -20,7 +21,7 @@ Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, kw_only=True)
-class ThermalModel(ABC):
+class ThermalModel(Record, ABC):
     """A joint that its own friction heats, and whose friction falls as it warms up.
 
         tau_f = tau_cold(dq) (alpha (T - T0) + beta)           (thesis eq. 100 to 104)
@@ -38,6 +39,8 @@ class ThermalModel(ABC):
     Raises:
         InputError: a parameter that is out of range or not finite.
     """
+
+    ENTRIES = ("model=name", "*")
 
     name: ClassVar[str]
     parameters: ClassVar[tuple[ThermalParameter, ...]]
@@ -72,10 +75,6 @@ class ThermalModel(ABC):
     def values(self) -> dict[str, float]:
         """The parameters by name, and T0."""
         return {**{p.name: float(getattr(self, p.name)) for p in self.parameters}, "T0": self.T0}
-
-    def to_dict(self) -> dict[str, Any]:
-        """Writes the model as plain data, for a file."""
-        return {"model": self.name, **{item.name: getattr(self, item.name) for item in fields(self)}}
 
     # What a member states.
 

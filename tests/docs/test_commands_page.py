@@ -29,7 +29,7 @@ def offered(command: Any) -> dict[str, str]:
     rows = {}
     for parameter in command.params:
         if parameter.param_type_name == "argument":
-            rows[parameter.name.upper()] = "required"
+            rows[parameter.name.upper()] = "required" if parameter.required else "-"
             continue
         spelling = " / ".join((*parameter.opts, *parameter.secondary_opts))
         default = parameter.default

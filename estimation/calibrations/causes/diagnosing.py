@@ -14,6 +14,7 @@ from estimation.calibrations.causes.findings import CauseFinding
 from estimation.calibrations.fit import GeometryFit, scaled_rows
 from estimation.calibrations.weighting import Weights
 from estimation.uncertainty.quantiles import student_95
+from robots.common.records import Record
 from robots.geometry_errors.model import GeometryModel, Prediction
 from robots.geometry_errors.poses import MeasuredPoses
 from robots.geometry_errors.terms import TERMS
@@ -34,7 +35,7 @@ SINGLE = 0.1  # share of outliers, above which they are no single faults and cou
 
 
 @dataclass(frozen=True, kw_only=True)
-class GeometryDiagnosis:
+class GeometryDiagnosis(Record):
     """Causes of what a description gets wrong.
 
     Attributes:
@@ -44,10 +45,6 @@ class GeometryDiagnosis:
 
     findings: tuple[CauseFinding, ...]
     evidence: dict[str, float]
-
-    def to_dict(self) -> dict[str, Any]:
-        """Writes it as plain data."""
-        return {"findings": [finding.to_dict() for finding in self.findings], "evidence": dict(self.evidence)}
 
 
 def diagnose_geometry(

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from typing import Any
 
 from robots.common.plain import two_digits
+from robots.common.records import Record
 
 ACTIONS = {
     "zero": "Add it to the joint's zero (joint_zeros.yaml), or use the calibrated robot.",
@@ -23,7 +24,7 @@ ACTIONS = {
 
 
 @dataclass(frozen=True, kw_only=True)
-class CauseFinding:
+class CauseFinding(Record):
     """A named cause.
 
     Attributes:
@@ -37,6 +38,8 @@ class CauseFinding:
         rivals: causes that explain the same errors nearly as well.
     """
 
+    ENTRIES = ("*", "parameters=stated_parameters", "sentence", "action")
+
     cause: str
     joint: int | None
     marker: int | None
@@ -45,6 +48,16 @@ class CauseFinding:
     p_value: float
     share: float
     rivals: tuple[str, ...] = ()
+
+    @property
+    def stated_parameters(self) -> list[dict[str, Any]]:
+        """The parameters, as files have them."""
+        return [{key: value for key, value in item.items() if key != "shown"} for item in self.parameters]
+
+    @property
+    def action(self) -> str:
+        """Says what to do."""
+        return ACTIONS[self.cause]
 
     @property
     def sentence(self) -> str:
@@ -81,14 +94,3 @@ class CauseFinding:
         shown = {item["unit"]: item["shown"] for item in self.parameters}
         parts = [f"{two_digits(shown[unit][1] * square**0.5)} {shown[unit][0]}" for unit, square in by_unit.items()]
         return " and ".join(parts)
-
-    def to_dict(self) -> dict[str, Any]:
-        """Writes it as plain data."""
-        parameters = [{key: value for key, value in item.items() if key != "shown"} for item in self.parameters]
-        return {
-            **asdict(self),
-            "parameters": parameters,
-            "rivals": list(self.rivals),
-            "sentence": self.sentence,
-            "action": ACTIONS[self.cause],
-        }

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from estimation.diagnosis.experiment_plans.experiment_grams import Grams
 from estimation.diagnosis.experiment_plans.experiment_motions import MAKERS, MotionRange, Stage
+from robots.terms.effects import EXPERIMENTS
 
 Array = NDArray[np.float64]
 
@@ -27,6 +28,11 @@ TIMES, LONGEST = (2, 4, 8, 16), 300.0
 combined may be as long each."""
 
 
+def experiment_words(kind: str, times: int) -> str:
+    """Describes a kind of experiment, and how often its motions are made."""
+    return EXPERIMENTS.get(kind, kind.replace("_", " ")) + (f", repeated {times} times" if times > 1 else "")
+
+
 @dataclass(frozen=True, kw_only=True)
 class Proposal:
     """One kind of experiment and its evaluation.
@@ -42,6 +48,11 @@ class Proposal:
     resolves: float
     duration: float
     times: int = 1
+
+    @property
+    def words(self) -> str:
+        """What the robot does, and how often."""
+        return experiment_words(self.kind, self.times)
 
 
 @dataclass(frozen=True, eq=False)

@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
-from typing import Any
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,7 +22,7 @@ from estimation.diagnosis.hypothesis_tests.problem import Problem
 from estimation.diagnosis.hypothesis_tests.scan import Entry
 from estimation.diagnosis.hypothesis_tests.scoring import accept, visible_root
 from robots.common.forks import forked
-from robots.common.plain import finite
+from robots.common.records import Record, read_null_as
 from robots.terms.effect_bases.capabilities import AtReversals, Persistence
 from robots.terms.effects import EFFECTS
 
@@ -50,7 +49,7 @@ CHUNK = 8
 
 
 @dataclass(frozen=True, kw_only=True)
-class Limit:
+class Limit(Record):
     """Detection limit of one effect at one joint.
 
     Sizes are shares of the joint's torque RMS. For an effect of the whole robot it is the joint where the effect is
@@ -67,27 +66,26 @@ class Limit:
         note: why no size is detectable, or what remains undetermined; empty without a note.
     """
 
+    ENTRIES = (
+        "effect",
+        "joint",
+        "detectable",
+        "at_worst",
+        "attributable",
+        "toughest_rival=toughest",
+        "visible",
+        "note",
+    )
+
     effect: str
     joint: int | None
-    detectable: float
-    at_worst: float
-    attributable: float
+    detectable: float = field(metadata=read_null_as(np.inf))
+    # Older files lack this entry.
+    at_worst: float = field(default=np.inf, metadata=read_null_as(np.inf))
+    attributable: float = field(metadata=read_null_as(np.inf))
     toughest: str | None
     visible: float
     note: str = ""
-
-    def to_dict(self) -> dict[str, Any]:
-        """Returns plain data, with None for infinite values."""
-        return {
-            "effect": self.effect,
-            "joint": self.joint,
-            "detectable": finite(self.detectable),
-            "at_worst": finite(self.at_worst),
-            "attributable": finite(self.attributable),
-            "toughest_rival": self.toughest,
-            "visible": self.visible,
-            "note": self.note,
-        }
 
 
 def find_limits(problem: Problem, entries: Sequence[Entry], *, false_alarm: float = 0.01) -> tuple[Limit, ...]:

@@ -21,6 +21,7 @@ from estimation.diagnosis.experiment_plans.choices import (
     Choice,
     Proposal,
     combined,
+    experiment_words,
     make_choice,
     repeat_stages,
     repeated,
@@ -37,6 +38,7 @@ from estimation.diagnosis.experiment_plans.experiment_motions import (
 from estimation.diagnosis.experiment_plans.rival_shapes import find_rival_shapes
 from estimation.diagnosis.hypothesis_tests.problem import Problem
 from robots.common.forks import forked
+from robots.common.records import Record
 from robots.robot import Robot
 from robots.signals import Motion
 from robots.terms.effects import EXPERIMENTS
@@ -48,7 +50,7 @@ VARIANTS = 4
 
 
 @dataclass(frozen=True, kw_only=True)
-class NextExperiment:
+class NextExperiment(Record):
     """The proposed experiment.
 
     Attributes:
@@ -64,15 +66,32 @@ class NextExperiment:
         kinds: all kinds that it combines, `kind` first.
     """
 
+    ENTRIES = ("kind", "kinds=all_kinds", "joint", "why", "resolves", "times", "logged", "runs", "alternatives")
+
     kind: str
     joint: int | None
     why: str
     resolves: float
-    stages: tuple[Stage, ...]
-    ranking: tuple[Proposal, ...]
+    stages: tuple[Stage, ...] = ()
+    ranking: tuple[Proposal, ...] = ()
     times: int = 1
     logged: str = ""
     kinds: tuple[str, ...] = ()
+
+    @property
+    def words(self) -> str:
+        """What the robot does, and how often."""
+        return experiment_words(self.kind, self.times)
+
+    @property
+    def all_kinds(self) -> tuple[str, ...]:
+        """All kinds that it combines."""
+        return self.kinds or (self.kind,)
+
+    @property
+    def alternatives(self) -> tuple[Proposal, ...]:
+        """The ranking, as files have it."""
+        return self.ranking
 
     @property
     def motions(self) -> tuple[Motion, ...]:
@@ -92,22 +111,6 @@ class NextExperiment:
             }
             for stage in self.stages
         ]
-
-    def to_dict(self) -> dict[str, Any]:
-        """Returns plain data, without the motions."""
-        return {
-            "kind": self.kind,
-            "kinds": list(self.kinds or (self.kind,)),
-            "joint": self.joint,
-            "why": self.why,
-            "resolves": self.resolves,
-            "times": self.times,
-            "logged": self.logged,
-            "runs": self.runs,
-            "alternatives": [
-                {"kind": p.kind, "resolves": p.resolves, "duration": p.duration, "times": p.times} for p in self.ranking
-            ],
-        }
 
 
 def plan_next(problem: Problem, causes: Sequence[Cause]) -> NextExperiment | None:

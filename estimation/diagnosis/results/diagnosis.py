@@ -2,25 +2,24 @@
 
 from __future__ import annotations
 
-import json
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from estimation.diagnosis.experiment_plans.detection_limits import Limit, summarise_limits
 from estimation.diagnosis.experiment_plans.next_experiment import NextExperiment
-from estimation.diagnosis.findings import Finding, list_parameters, read_finding
-from estimation.diagnosis.results.standing import standing_text, standing_verdict
+from estimation.diagnosis.findings import Finding, list_parameters
+from estimation.diagnosis.results.actions import action_for, close_causes, sentence_for
+from estimation.diagnosis.results.standing import standing_of, standing_text, standing_verdict
 from estimation.diagnosis.results.verdict_text import close_rivals, format_p_value, state_verdict
-from estimation.diagnosis.simulations.simulation_result import Simulation, read_simulation
+from estimation.diagnosis.simulations.simulation_result import Simulation
 from estimation.diagnosis.validations.prediction_settings import all_row_errors
 from estimation.models.model import Model, load_model
-from robots.common.errors import InputError
-from robots.common.files import write_atomic
-from robots.common.plain import finite, number
+from robots.common.records import Finding as Remark
+from robots.common.records import Result, axes_for, effect_code, findings_of, read, read_json
 from robots.terms.base import length_unit
 
 if TYPE_CHECKING:
@@ -30,7 +29,7 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 
 DIAGNOSIS, MODEL = "diagnosis.json", "model.json"
-VERDICTS = ("none", "named", "ambiguous", "unexplained")
+Verdict = Literal["none", "named", "ambiguous", "unexplained"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,7 +55,7 @@ class Trace:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Diagnosis:
+class Diagnosis(Result):
     """The result of `diagnose`.
 
     Attributes:
@@ -77,6 +76,22 @@ class Diagnosis:
         simulation: forward simulation of a stretch of held-out data, without and with the findings; None without
             findings.
     """
+
+    FILE = DIAGNOSIS
+    ENTRIES = (
+        "robot.name=model.robot.name",
+        "verdict",
+        "findings",
+        "baseline.nrmse=baseline",
+        "extended.nrmse=extended",
+        "explained",
+        "excess=excess_shares",
+        "limits",
+        "next_experiment",
+        "unseen=how_unseen",
+        "simulation",
+        "notes",
+    )
 
     verdict: str
     findings: tuple[Finding, ...]
@@ -102,12 +117,76 @@ class Diagnosis:
         return self.verdict in ("none", "named")
 
     @property
+    def excess_shares(self) -> list[dict[str, float]]:
+        """The shares of `excess`, by name."""
+        return [dict(zip(("noise", "state", "time"), row, strict=True)) for row in self.excess.tolist()]
+
+    @property
     def every_row(self) -> Array:
         """NRMSE (n,) of the extended model on all held-out rows, as in `predict`; NaN where unknown.
 
         `baseline` and `extended` leave out rows in which a joint's direction of motion is not known.
         """
         return all_row_errors(self.model)
+
+    @property
+    def _errors(self) -> tuple[Array, Array, Array]:
+        return self.baseline, self.extended, self.every_row
+
+    @property
+    def conclusion(self) -> str:
+        """What to do, in a sentence or two."""
+        forbidden = standing_verdict(self.verdict, *self._errors, self.limits)
+        following = "" if self.next_experiment is None else self.next_experiment.words
+        if forbidden:
+            return f"{forbidden} Record {following} and diagnose again." if following else forbidden
+        if self.verdict == "none":
+            return "No missing effect was found: use the model as it is."
+        if self.verdict == "named":
+            known = sentence_for((finding.effect, finding.joint) for finding in self.findings)
+            return f"{known} {self.findings[0].sentence}" if len(self.findings) == 1 else known
+        # A free function does not name a cause, whatever its gain.
+        helps = any(finding.gain.ci95[0] > 0 and finding.named for finding in self.findings)
+        why = "part of the error has no known cause" if helps else "no effect of the catalogue explains the residual"
+        if self.verdict == "ambiguous":
+            why = "several causes fit"
+        if following:
+            return f"Record {following} and diagnose again: {why}."
+        return f"Check logs and robot: {why}, and no known experiment finds it."
+
+    @property
+    def remarks(self) -> tuple[Remark, ...]:
+        """Effects, unexplained residuals, close rivals and notes."""
+        standing = standing_of(self.verdict, *self._errors)
+        confirmed = standing != "unconfirmed"
+        found = [
+            Remark(
+                code="diagnosis.unexplained"
+                if not finding.named
+                else effect_code(finding.effect)
+                if confirmed
+                else "diagnosis.note",
+                subject=f"{finding.title[:1].upper()}{finding.title[1:]}:",
+                text=finding.sentence,
+                action=action_for(finding.effect, [finding.joint]) if finding.named and confirmed else "",
+            )
+            for finding in self.findings
+        ]
+        if standing != "sound":
+            text = standing_text(self.verdict, *self._errors, self.limits)
+            found += findings_of(f"diagnosis.{standing}", [text])
+        if self.verdict == "unexplained" and not any(item.code == "diagnosis.unexplained" for item in found):
+            found += findings_of("diagnosis.unexplained", ["Part of the residual is not noise and has no known cause."])
+        if self.verdict == "ambiguous":
+            texts = [
+                f"{f.title[:1].upper()}{f.title[1:]} explains the logs hardly better than {', '.join(close_causes(f))}."
+                for f in self.findings
+                if close_causes(f)
+            ]
+            found += findings_of("diagnosis.ambiguous", texts or ["Several causes explain the logs about as well."])
+        seen = summarise_limits(self.limits) if self.verdict == "none" else ""
+        done = [f"{seen}."] if seen else []
+        return (*found, *findings_of("diagnosis.note", self.notes), *findings_of("done", done))
 
     def summary(self) -> str:
         """Returns the verdict, findings, held-out errors, simulation, next experiment and notes as text."""
@@ -182,30 +261,9 @@ class Diagnosis:
         names = ["effect", "joint", "parameter", "value", "unit", "low", "high", "determined", "p_value", "delta_bic"]
         return pd.DataFrame(rows, columns=names)
 
-    def to_dict(self) -> dict[str, Any]:
-        """Returns the content of `diagnosis.json` as plain data."""
-        return {
-            "robot": {"name": self.model.robot.name},
-            "verdict": self.verdict,
-            "findings": [finding.to_dict() for finding in self.findings],
-            "baseline": {"nrmse": list(map(finite, self.baseline.tolist()))},
-            "extended": {"nrmse": list(map(finite, self.extended.tolist()))},
-            "explained": self.explained,
-            "excess": [
-                dict(zip(("noise", "state", "time"), map(finite, row), strict=True)) for row in self.excess.tolist()
-            ],
-            "limits": [limit.to_dict() for limit in self.limits],
-            "next_experiment": None if self.next_experiment is None else self.next_experiment.to_dict(),
-            "unseen": self.how_unseen,
-            "simulation": None if self.simulation is None else self.simulation.to_dict(),
-            "notes": list(self.notes),
-        }
-
     def plot(self, ax: Axes | None = None) -> Axes:
         """Plots the held-out error of each joint for both models, on `ax` or on a new figure; returns the axes."""
-        from matplotlib.figure import Figure
-
-        axes = ax if ax is not None else Figure(figsize=(6, 4)).subplots()
+        axes = axes_for(ax, (6, 4))
         joints = np.arange(1, len(self.baseline) + 1)
         axes.bar(joints - 0.2, 100 * self.baseline, 0.4, label="base model")
         axes.bar(joints + 0.2, 100 * self.extended, 0.4, label="extended model")
@@ -214,19 +272,9 @@ class Diagnosis:
         axes.legend()
         return axes
 
-    def save(self, folder: str | Path, *, force: bool = False) -> None:
-        """Writes `diagnosis.json` and `model.json` into an existing folder.
-
-        Args:
-            folder: the folder.
-            force: whether existing files are replaced.
-
-        Raises:
-            InputError: a file exists, and `force` is not set.
-        """
-        text = json.dumps(self.to_dict(), indent=2, allow_nan=False) + "\n"
-        write_atomic(Path(folder) / DIAGNOSIS, text, force=force)
-        self.model.save(Path(folder) / MODEL, force=force)
+    def _save_beside(self, folder: Path, *, force: bool) -> None:
+        """Writes `model.json`."""
+        self.model.save(folder / MODEL, force=force)
 
     @staticmethod
     def load(folder: str | Path) -> Diagnosis:
@@ -238,63 +286,14 @@ class Diagnosis:
         Raises:
             InputError: a file is missing or not a valid diagnosis.
         """
-        file = Path(folder) / DIAGNOSIS
-        try:
-            data = json.loads(file.read_text(encoding="utf-8"))
-            model = load_model(Path(folder) / MODEL)
-            return _from_dict(data, model)
-        except FileNotFoundError:
-            raise InputError("no such file", file=file, remedy="give the folder written by `oed diagnose`") from None
-        except (OSError, UnicodeDecodeError, json.JSONDecodeError) as error:
-            raise InputError(f"cannot be read as JSON: {error}", file=file) from error
-        except (KeyError, TypeError, ValueError) as error:
-            raise InputError(f"is no valid diagnosis: {type(error).__name__} {error}", file=file) from error
-
-
-def _from_dict(data: dict[str, Any], model: Model) -> Diagnosis:
-    if data["verdict"] not in VERDICTS:
-        raise ValueError(f"verdict {data['verdict']!r}")
-    following = data["next_experiment"]
-    return Diagnosis(
-        verdict=data["verdict"],
-        findings=tuple(read_finding(item) for item in data["findings"]),
-        baseline=np.array(data["baseline"]["nrmse"], dtype=float),
-        extended=np.array(data["extended"]["nrmse"], dtype=float),
-        explained=float(data["explained"]),
-        excess=np.array([[number(row[key]) for key in ("noise", "state", "time")] for row in data["excess"]]),
-        limits=tuple(_limit(item) for item in data["limits"]),
-        next_experiment=None if following is None else _next(following),
-        model=model,
-        how_unseen=data["unseen"],
-        notes=tuple(data["notes"]),
-        # Older files lack this entry.
-        simulation=None if data.get("simulation") is None else read_simulation(data["simulation"]),
-    )
-
-
-def _limit(item: dict[str, Any]) -> Limit:
-    return Limit(
-        effect=item["effect"],
-        joint=item["joint"],
-        detectable=number(item["detectable"], np.inf),
-        # Older files lack this entry.
-        at_worst=number(item.get("at_worst"), np.inf),
-        attributable=number(item["attributable"], np.inf),
-        toughest=item["toughest_rival"],
-        visible=float(item["visible"]),
-        note=item["note"],
-    )
-
-
-def _next(item: dict[str, Any]) -> NextExperiment:
-    return NextExperiment(
-        kind=item["kind"],
-        joint=item["joint"],
-        why=item["why"],
-        resolves=float(item["resolves"]),
-        stages=(),
-        ranking=(),
-        # Older files lack this entry.
-        times=int(item.get("times", 1)),
-        logged=str(item.get("logged", "")),
-    )
+        file, remedy = Path(folder) / DIAGNOSIS, "give the folder written by `oed diagnose`"
+        data = read_json(file, remedy=remedy)
+        read(Verdict, data.get("verdict"), file=file, remedy=remedy)
+        rows = read(list[dict[str, float]], data.get("excess"), file=file, remedy=remedy)
+        return Diagnosis.from_dict(
+            data,
+            file=file,
+            remedy=remedy,
+            model=load_model(Path(folder) / MODEL),
+            excess=np.array([list(row.values()) for row in rows]),
+        )

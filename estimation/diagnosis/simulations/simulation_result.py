@@ -4,12 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from robots.common.plain import finite, number
+from robots.common.records import Record
 from robots.plants.closed_loop import Loop
 
 Array = NDArray[np.float64]
@@ -36,7 +35,7 @@ class Curves:
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Simulation:
+class Simulation(Record):
     """How well the simulated robot follows a stretch of held-out data, without and with the findings.
 
     The measured torque drives the simulated robot, and a position loop controls it to the measured motion. The
@@ -51,6 +50,17 @@ class Simulation:
         note: limitations of this simulation; empty without any.
         curves: curves for plots; None after loading from a file.
     """
+
+    ENTRIES = (
+        "start",
+        "end",
+        "loop",
+        "torque.before=torque[0]",
+        "torque.after=torque[1]",
+        "motion.before=motion[0]",
+        "motion.after=motion[1]",
+        "note",
+    )
 
     start: float
     end: float
@@ -83,48 +93,3 @@ class Simulation:
             f"{self.end:.1f} s, measured torque as input, assumed {self.loop.bandwidth:g} Hz position loop)."
             f"{worse}{f' {self.note}' if self.note else ''}"
         )
-
-    def to_dict(self) -> dict[str, Any]:
-        """Returns the simulation as plain data for `diagnosis.json`, without the curves."""
-
-        def pair(values: tuple[Array, Array]) -> dict[str, list[float | None]]:
-            return {
-                key: [finite(value) for value in part.tolist()]
-                for key, part in zip(("before", "after"), values, strict=True)
-            }
-
-        return {
-            "start": self.start,
-            "end": self.end,
-            "loop": {"bandwidth_hz": self.loop.bandwidth, "damping": self.loop.damping},
-            "torque": pair(self.torque),
-            "motion": pair(self.motion),
-            "note": self.note,
-        }
-
-
-def read_simulation(data: dict[str, Any]) -> Simulation:
-    """Reads the plain data of `Simulation.to_dict`.
-
-    Args:
-        data: entry `simulation` of `diagnosis.json`.
-
-    Returns:
-        The simulation, without curves.
-
-    Raises:
-        KeyError: an entry is missing.
-    """
-
-    def pair(item: dict[str, list[float | None]]) -> tuple[Array, Array]:
-        before, after = (np.array([number(value) for value in item[key]]) for key in ("before", "after"))
-        return before, after
-
-    return Simulation(
-        start=float(data["start"]),
-        end=float(data["end"]),
-        loop=Loop(bandwidth=float(data["loop"]["bandwidth_hz"]), damping=float(data["loop"]["damping"])),
-        torque=pair(data["torque"]),
-        motion=pair(data["motion"]),
-        note=str(data["note"]),
-    )

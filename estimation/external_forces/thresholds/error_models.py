@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,6 +12,7 @@ from scipy.optimize import nnls
 from estimation.exports.friction import linear_friction
 from estimation.external_forces.residuals.velocity_noise import NOISY, SLIDING
 from estimation.models.model import Model
+from robots.common.records import Record
 from robots.terms.friction import SLOWEST
 
 Array = NDArray[np.float64]
@@ -33,7 +33,7 @@ LEAST, DISTINCT = 1e-3, 1e-3
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class ErrorModel:
+class ErrorModel(Record):
     """Variance of each joint's residual on a healthy robot, and the correlation between joints.
 
         var_j = level_j + reversal_j w_1^2 + friction_j w_2^2 + w_3^2 + w_4^2
@@ -118,15 +118,6 @@ class ErrorModel:
     def covariance(self, deviation: Array) -> Array:
         """Gives the residual's covariance (N, n, n) [(N m)^2]."""
         return deviation[..., :, None] * self.correlation * deviation[..., None, :]
-
-    def to_dict(self) -> dict[str, Any]:
-        """Writes it as plain data."""
-        return {name: np.asarray(getattr(self, name)).tolist() for name in FIELDS}
-
-    @staticmethod
-    def from_dict(data: Mapping[str, Any]) -> ErrorModel:
-        """Reads what `to_dict` wrote."""
-        return ErrorModel(**{name: np.array(data[name], dtype=float) for name in FIELDS})
 
 
 FIELDS = (

@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from typing import Any
 
 from estimation.uncertainty.quantiles import count_interval
-from robots.common.plain import finite
+from robots.common.records import Record, plain
 
 
 @dataclass(frozen=True, kw_only=True)
-class RateCheck:
+class RateCheck(Record):
     """False alarms in healthy motion that the threshold was not made of.
 
     Attributes:
@@ -57,22 +56,8 @@ class RateCheck:
 
     def summary(self) -> dict[str, Any]:
         """Gives count, time, interval and verdict as plain data."""
-        low, high = self.interval
-        return {
-            **self.to_dict(),
-            "interval95": [low, finite(high)],
-            "confirmed": self.confirmed,
-            "contradicted": self.contradicted,
-        }
-
-    def to_dict(self) -> dict[str, Any]:
-        """Writes it as plain data."""
-        return asdict(self)
-
-    @staticmethod
-    def from_dict(data: Mapping[str, Any]) -> RateCheck:
-        """Reads what `to_dict` wrote."""
-        return RateCheck(alarms=int(data["alarms"]), hours=float(data["hours"]), rate=float(data["rate"]))
+        more = {"interval95": self.interval, "confirmed": self.confirmed, "contradicted": self.contradicted}
+        return self.to_dict() | plain(more)
 
 
 def _duration(hours: float) -> str:

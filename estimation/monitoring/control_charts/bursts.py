@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 
 import numpy as np
+
+from robots.common.records import Record
 
 # Prior of a window's largest chi-square, of white noise in six joints and fifty blocks, and its weight in windows.
 PRIOR_MEAN, PRIOR_DEVIATION, PRIOR_WINDOWS = 17.0, 6.0, 10.0
@@ -13,7 +15,7 @@ EULER = 0.5772156649
 
 
 @dataclass
-class BurstChart:
+class BurstChart(Record):
     """The extreme-value distribution (Gumbel) of a window's largest chi-square, learnt from healthy windows.
 
     Attributes:
@@ -48,7 +50,3 @@ class BurstChart:
             self.square *= 1 - 1 / MOST_WINDOWS
         self.square += step * (chi - self.mean)
         return False
-
-    def to_dict(self) -> dict[str, float]:
-        """Gives the state as plain data."""
-        return asdict(self)

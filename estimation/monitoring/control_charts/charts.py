@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass
-from typing import Any
+from dataclasses import dataclass
 
 import numpy as np
 
 from estimation.monitoring.control_charts.level_filter import CORRELATION_TIME
 from estimation.monitoring.control_charts.run_lengths import cusum_threshold, ewma_threshold
+from robots.common.records import Record
 
 # Allowance of the CUSUM: half of a change by two standard deviations of the innovations.
 ALLOWANCE = 1.0
@@ -19,7 +19,7 @@ CORRELATION_PRIOR, CORRELATION_STEP, LARGEST_CORRELATION = 100.0, 0.05, 0.6
 
 
 @dataclass
-class Chart:
+class Chart(Record):
     """Both charts of a quantity.
 
     Attributes:
@@ -102,7 +102,3 @@ class Chart:
         """Starts both charts again; the serial correlation is kept."""
         self.up = self.down = self.level = self.unlogged = 0.0
         self.count = 0
-
-    def to_dict(self) -> dict[str, Any]:
-        """Gives the state as plain data."""
-        return asdict(self)

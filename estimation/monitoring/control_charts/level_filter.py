@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 from numpy.typing import NDArray
+
+from robots.common.records import Record
 
 Array = NDArray[np.float64]
 
@@ -17,7 +17,7 @@ PRIOR_WINDOWS, MOST_WINDOWS = 30.0, 1000.0
 CLIPPED = 9.0
 
 
-class LevelFilter:
+class LevelFilter(Record):
     """A Kalman filter for y = features b + e + noise, where e is an Ornstein-Uhlenbeck process.
 
     The coefficients b are constant. The standard deviation of e is learnt from the innovations, from a prior on.
@@ -28,6 +28,15 @@ class LevelFilter:
         scatter: prior standard deviation of e.
     """
 
+    ENTRIES = ("state", "covariance", "scatter", "weight", "square", "time")
+
+    state: Array
+    covariance: Array
+    scatter: float
+    weight: float
+    square: float
+    time: float | None
+
     def __init__(self, mean: Array, spread: Array, scatter: float) -> None:
         m = len(mean)
         self.state = np.concatenate([np.asarray(mean, dtype=float), [0.0]])
@@ -37,7 +46,7 @@ class LevelFilter:
         self.covariance[m, m] = self.scatter**2
         self.weight = 0.0
         self.square = 0.0
-        self.time: float | None = None
+        self.time = None
 
     @property
     def coefficients(self) -> Array:
@@ -116,23 +125,3 @@ class LevelFilter:
         self.covariance[:-1, :-1] = covariance
         self.covariance[-2, -2] += variance
         self.covariance[-1, -1] = self.deviation**2
-
-    def to_dict(self) -> dict[str, Any]:
-        """Gives the state as plain data."""
-        return {
-            "state": self.state.tolist(),
-            "covariance": self.covariance.tolist(),
-            "scatter": self.scatter,
-            "weight": self.weight,
-            "square": self.square,
-            "time": self.time,
-        }
-
-    @classmethod
-    def from_dict(cls, data: dict[str, Any]) -> LevelFilter:
-        """Reads `to_dict`."""
-        state = np.array(data["state"], dtype=float)
-        found = cls(state[:-1], np.zeros(len(state) - 1), data["scatter"])
-        found.state, found.covariance = state, np.array(data["covariance"], dtype=float)
-        found.weight, found.square, found.time = data["weight"], data["square"], data["time"]
-        return found

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import Any, Literal
+from dataclasses import dataclass, field
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,6 +13,7 @@ from estimation.monitoring.control_charts.charts import Chart
 from estimation.monitoring.control_charts.level_filter import LevelFilter
 from estimation.monitoring.settings import PAUSE
 from estimation.uncertainty.quantiles import chi2_limit
+from robots.common.records import Record
 
 Array = NDArray[np.float64]
 
@@ -34,7 +35,7 @@ def start_limit(count: int) -> float:
 
 
 @dataclass(frozen=True, eq=False)
-class Sample:
+class Sample(Record, as_list=True):
     """One window of one quantity.
 
     Attributes:
@@ -56,23 +57,31 @@ class Sample:
     unlogged: float = 0.0
 
 
-class Quantity:
+@dataclass(eq=False)
+class Quantity(Record):
     """One monitored quantity with its filter, its charts and its last windows.
 
-    Args:
+    Attributes:
         group: what it is.
         index: joint, or payload direction, counted from 0.
         level: its healthy level.
         chart: its charts.
         margin: steps up to this size are no finding.
+        samples: the last windows.
+        before: coefficients and covariance before each of the samples.
+        deviation: of the last window from the explained level.
     """
 
-    def __init__(self, group: Group, index: int, level: LevelFilter, chart: Chart, margin: float) -> None:
-        self.group, self.index, self.level, self.chart, self.margin = group, index, level, chart, margin
-        self.samples: list[Sample] = []
-        # Coefficients and covariance before each of the samples.
-        self.before: list[tuple[Array, Array]] = []
-        self.deviation = np.nan
+    ENTRIES = ("group", "index", "level", "chart", "margin", "samples", "before")
+
+    group: Group
+    index: int
+    level: LevelFilter
+    chart: Chart
+    margin: float
+    samples: list[Sample] = field(default_factory=list)
+    before: list[tuple[Array, Array]] = field(default_factory=list)
+    deviation: float = np.nan
 
     def observe(self, sample: Sample, *, learn: bool) -> bool:
         """Takes a window into account, and says whether a chart gives an alarm.
@@ -157,29 +166,3 @@ class Quantity:
         log = np.cumsum(log)
         same = np.where(log[:, None] == log[None, :], 1.0, LASTING_SHARE)
         return np.asarray(same * spread[:, None] * spread[None, :])
-
-    def to_dict(self) -> dict[str, Any]:
-        """Gives the state as plain data."""
-        return {
-            "group": self.group,
-            "index": self.index,
-            "level": self.level.to_dict(),
-            "chart": self.chart.to_dict(),
-            "margin": self.margin,
-            "samples": [[s.start, s.end, s.t, s.y, s.variance, s.features.tolist(), s.unlogged] for s in self.samples],
-            "before": [[mean.tolist(), covariance.tolist()] for mean, covariance in self.before],
-        }
-
-    @classmethod
-    def from_dict(cls, data: dict[str, Any]) -> Quantity:
-        """Reads `to_dict`."""
-        found = cls(
-            data["group"], data["index"], LevelFilter.from_dict(data["level"]), Chart(**data["chart"]), data["margin"]
-        )
-        found.samples = [
-            # A state of an older version ends with the features.
-            Sample(start, end, t, y, variance, np.array(features, dtype=float), *unlogged)
-            for start, end, t, y, variance, features, *unlogged in data["samples"]
-        ]
-        found.before = [(np.array(m, dtype=float), np.array(c, dtype=float)) for m, c in data["before"]]
-        return found

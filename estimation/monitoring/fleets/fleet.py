@@ -138,11 +138,11 @@ def robot_row(task: Task) -> tuple[RobotRow, bool]:
         # New logs continue a kept monitor only if they come after all that it has seen, and that has not changed.
         kept, seen = None, []
     if kept is not None and len(seen) == len(files):
-        return RobotRow.from_state(kept["row"]), True
+        return RobotRow.from_dict(kept["row"], file=file, whole=True), True
     row, monitor = _monitored(task, files, kept if state.exists() else None, len(seen))
     if monitor is not None and monitor.last is not None:
         monitor.save(state)
-    content = {**head, "logs": logs, "row": row.to_state()}
+    content = {**head, "logs": logs, "row": row.to_dict(whole=True)}
     write_atomic(file, json.dumps(content, allow_nan=False), force=True)
     return row, False
 
@@ -178,7 +178,11 @@ def _monitored(
         if kept is None:
             monitor = Monitor(_baseline(task.model, task.digest), task.settings)
         else:
-            old, monitor, files = RobotRow.from_state(kept["row"]), Monitor.load(_kept_files(task)[1]), files[seen:]
+            old, monitor, files = (
+                RobotRow.from_dict(kept["row"], whole=True),
+                Monitor.load(_kept_files(task)[1]),
+                files[seen:],
+            )
         logs, refused = read_each(files, monitor.baseline.robot, task.mapping)
         if logs:
             return RobotRow.of(name, monitor_logs(monitor, logs, refused=refused)), monitor

@@ -2,24 +2,23 @@
 
 from __future__ import annotations
 
-import json
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from estimation.monitoring.fleets.robot_row import LIGHTS, RobotRow
 from robots.common.files import write_atomic
+from robots.common.records import Finding, Result
 
 if TYPE_CHECKING:
     import pandas as pd
 
 RESULT, TABLE = "fleet.json", "fleet.csv"
-FORMAT, FORMAT_VERSION = "robot-oed fleet", 1
 LISTED = 20
 
 
 @dataclass(frozen=True, kw_only=True)
-class FleetResult:
+class FleetResult(Result, format="robot-oed fleet"):
     """All robots of a fleet.
 
     Attributes:
@@ -27,6 +26,9 @@ class FleetResult:
         resumed: robots that an earlier run had done.
         single: robots that are a log directly in the folder.
     """
+
+    FILE = RESULT
+    ENTRIES = ("light", "verdict", "counts", "resumed", "robots=rows")
 
     rows: tuple[RobotRow, ...]
     resumed: int = 0
@@ -37,9 +39,28 @@ class FleetResult:
         return sum(row.light == light for row in self.rows)
 
     @property
+    def counts(self) -> dict[str, int]:
+        """Number of robots with each light."""
+        return {light: self.count(light) for light in LIGHTS}
+
+    @property
     def light(self) -> str:
         """The worst light."""
         return self.rows[0].light
+
+    @property
+    def conclusion(self) -> str:
+        """How many robots need what, and with which one to begin."""
+        worst = self.rows[0]
+        return f"{self.verdict()} Begin with {worst.name}. {worst.advice}" if worst.advice else self.verdict()
+
+    @property
+    def remarks(self) -> tuple[Finding, ...]:
+        """One of each robot."""
+        return tuple(
+            Finding(code=f"fleet.{row.light}", subject=f"{row.name}:", text=row.text, action=row.advice)
+            for row in self.rows
+        )
 
     def verdict(self) -> str:
         """Says in one sentence how many robots need what."""
@@ -69,18 +90,6 @@ class FleetResult:
             )
         return "\n".join(lines)
 
-    def to_dict(self) -> dict[str, Any]:
-        """Gives the result as plain data."""
-        return {
-            "format": FORMAT,
-            "format_version": FORMAT_VERSION,
-            "light": self.light,
-            "verdict": self.verdict(),
-            "counts": {light: self.count(light) for light in LIGHTS},
-            "resumed": self.resumed,
-            "robots": [row.to_dict() for row in self.rows],
-        }
-
     def to_frame(self) -> pd.DataFrame:
         """Gives a row per robot, worst first."""
         import pandas as pd
@@ -102,13 +111,6 @@ class FleetResult:
             ]
         )
 
-    def save(self, folder: str | Path, *, force: bool = False) -> None:
-        """Writes `fleet.json` and `fleet.csv` into a folder.
-
-        Raises:
-            InputError: a file is there, and force is not given.
-        """
-        place = Path(folder)
-        text = json.dumps(self.to_dict(), indent=2, allow_nan=False)
-        write_atomic(place / RESULT, text + "\n", force=force)
-        write_atomic(place / TABLE, self.to_frame().to_csv(index=False), force=force)
+    def _save_beside(self, folder: Path, *, force: bool) -> None:
+        """Writes `fleet.csv`."""
+        write_atomic(folder / TABLE, self.to_frame().to_csv(index=False), force=force)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass, field
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -10,6 +10,7 @@ import numpy as np
 from estimation.monitoring.findings import Finding, when
 from estimation.monitoring.log_row import LogRow
 from estimation.monitoring.result import MonitorResult
+from robots.common.records import Record
 
 # Points of a trend that are kept of each robot.
 POINTS = 240
@@ -35,7 +36,7 @@ class Trend:
 
 
 @dataclass(frozen=True, kw_only=True)
-class RobotRow:
+class RobotRow(Record, shares=("origin",)):
     """One robot.
 
     Attributes:
@@ -52,6 +53,19 @@ class RobotRow:
         heat: lowest and highest change of friction by temperature [%].
         trend: for the picture.
     """
+
+    ENTRIES = (
+        "robot=name",
+        "light",
+        "text",
+        "advice",
+        "since",
+        "hours",
+        "heat_percent=heat",
+        "findings",
+        "logs",
+        "notes",
+    )
 
     name: str
     light: str
@@ -100,47 +114,6 @@ class RobotRow:
     def left_out(self) -> int:
         """Number of logs that were left out."""
         return sum(not row.used for row in self.logs)
-
-    def to_dict(self) -> dict[str, Any]:
-        """Gives the row as plain data."""
-        return {
-            "robot": self.name,
-            "light": self.light,
-            "text": self.text,
-            "advice": self.advice,
-            "since": self.since,
-            "hours": self.hours,
-            "heat_percent": list(self.heat),
-            "findings": [f.to_dict(self.origin) for f in self.findings],
-            "logs": [row.to_dict() for row in self.logs],
-            "notes": list(self.notes),
-        }
-
-    def to_state(self) -> dict[str, Any]:
-        """Gives all fields, for the file that a later run reads."""
-        data = asdict(self)
-        data["logs"] = [row.to_dict() for row in self.logs]
-        return data
-
-    @classmethod
-    def from_state(cls, data: dict[str, Any]) -> RobotRow:
-        """Reads `to_state`."""
-        trend = data["trend"]
-        return cls(
-            **{
-                **data,
-                "logs": tuple(map(LogRow.from_dict, data["logs"])),
-                "findings": tuple(Finding(**item) for item in data["findings"]),
-                "notes": tuple(data["notes"]),
-                "heat": (float(data["heat"][0]), float(data["heat"][1])),
-                "trend": Trend(
-                    hours=tuple(trend["hours"]),
-                    heat=tuple(map(tuple, trend["heat"])),
-                    rest=tuple(map(tuple, trend["rest"])),
-                    logs=tuple(trend["logs"]),
-                ),
-            }
-        )
 
 
 def _trend(result: MonitorResult) -> Trend:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -17,6 +16,7 @@ from estimation.models.model import Model, load_model
 from estimation.predictions.checked_motions import CUTOFF
 from estimation.thermal import ThermalTorqueModel, thermal_from_dict
 from robots.common.errors import InputError
+from robots.common.records import read_json
 from robots.robot import Robot
 from robots.terms.effect_bases.capabilities import Persistence
 from robots.terms.situations.flange_body import FLANGE, link_columns, with_body
@@ -163,7 +163,7 @@ def read_baseline(path: str | PathLike[str]) -> Baseline:
     file = Path(path)
     file = file / "model.json" if file.is_dir() else file
     model = load_model(file)
-    data = json.loads(file.read_text(encoding="utf-8"))
+    data = read_json(file, remedy="give the model.json of oed identify, oed diagnose or oed thermal")
     return baseline_of(model, data, file)
 
 
@@ -178,8 +178,7 @@ def baseline_of(model: Model, data: Mapping[str, Any] | None = None, file: Path 
     Raises:
         InputError: a model without friction, or a damaged thermal part.
     """
-    # As a file would hold it: tuples become lists.
-    content = json.loads(json.dumps(model.to_dict())) if data is None else data
+    content = model.to_dict() if data is None else data
     if not any(column.friction for column in model.parameters):
         raise InputError("the model has no friction", file=file, remedy="identify the robot with friction")
     return Baseline(model=model, thermal=thermal_from_dict(model, content), source=content)

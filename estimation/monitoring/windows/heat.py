@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 from numpy.typing import NDArray
 
@@ -11,6 +9,7 @@ from estimation.monitoring.settings import PAUSE, Heat
 from estimation.monitoring.windows.baseline import Baseline
 from estimation.monitoring.windows.unlogged_work import DUTY_SPREAD, JOINT_SPREAD, UnloggedWork
 from robots.common.errors import InputError
+from robots.common.records import Record
 from robots.thermal import ThermalModel
 from robots.thermal.online import Step, discretise
 
@@ -34,13 +33,20 @@ AMBIENT_SPREAD, COMMON_SPREAD = 10.0, 0.5
 LOWEST_FACTOR = 0.05
 
 
-class HeatState:
+class HeatState(Record):
     """Follows the heat of each joint from window to window, and gives features of the log of its friction.
 
     Args:
         kind: what explains the change of friction.
         baseline: the model.
     """
+
+    ENTRIES = ("kind", "states", "kept", "work?", "reference")
+
+    states: list[Array | None]
+    kept: Array
+    work: UnloggedWork
+    reference: Array
 
     def __init__(self, kind: Heat, baseline: Baseline) -> None:
         if kind == "model" and baseline.thermal is None:
@@ -51,7 +57,7 @@ class HeatState:
         self.models: tuple[ThermalModel | None, ...] = (
             baseline.thermal.thermal if kind == "model" and baseline.thermal is not None else (None,) * n
         )
-        self.states: list[Array | None] = [_start(model) for model in self.models]
+        self.states = [_start(model) for model in self.models]
         self.kept = np.zeros((n, 2))
         self.reference = np.full(n, np.nan)
         fast = baseline.time_constant
@@ -166,27 +172,6 @@ class HeatState:
                 self._steps[key] = step
         around = model.ambient if ambient is None else ambient
         return step.Phi @ state + step.around * around + step.driven + step.heat * power
-
-    def to_dict(self) -> dict[str, Any]:
-        """Gives the state as plain data."""
-        return {
-            "kind": self.kind,
-            "states": [None if state is None else state.tolist() for state in self.states],
-            "kept": self.kept.tolist(),
-            "work": self.work.to_dict(),
-            "reference": [None if np.isnan(value) else float(value) for value in self.reference],
-        }
-
-    @classmethod
-    def from_dict(cls, data: dict[str, Any], baseline: Baseline) -> HeatState:
-        """Reads `to_dict`."""
-        found = cls(data["kind"], baseline)
-        found.states = [None if state is None else np.array(state, dtype=float) for state in data["states"]]
-        found.kept = np.array(data["kept"], dtype=float)
-        if "work" in data:  # A state of an older version has no pauses.
-            found.work = UnloggedWork.from_dict(found.n, data["work"])
-        found.reference = np.array([np.nan if value is None else value for value in data["reference"]], dtype=float)
-        return found
 
 
 def _start(model: ThermalModel | None) -> Array | None:

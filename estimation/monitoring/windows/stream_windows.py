@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from robots.common.errors import InputError
+from robots.common.records import Record
 
 Array = NDArray[np.float64]
 
@@ -22,7 +23,7 @@ LONGEST = 6.0
 LOOK_BACK = 0.2
 
 
-class StreamWindows:
+class StreamWindows(Record):
     """Cuts rows into windows from the start of each recording on; the cuts do not depend on the chunks.
 
     A window holds a stated time of motion. Rests make it longer: a robot at rest shows nothing of its friction.
@@ -34,11 +35,17 @@ class StreamWindows:
         slowest: speeds (n,) below which the joints rest [rad/s or m/s]; positions are the columns after the time.
     """
 
+    ENTRIES = ("rows", "start", "period")
+
+    rows: Array
+    start: float | None
+    period: float | None
+
     def __init__(self, window: float, margin: float, width: int, slowest: Array) -> None:
         self.window, self.margin, self.slowest = window, margin, slowest
         self.rows = np.zeros((0, width))
-        self.start: float | None = None
-        self.period: float | None = None
+        self.start = None
+        self.period = None
 
     @property
     def last(self) -> float | None:
@@ -128,13 +135,8 @@ class StreamWindows:
         rest = np.where(moves[1:], 0.0, np.diff(inside))
         return np.asarray(inside - start - np.concatenate([[0.0], np.cumsum(rest)]))
 
-    def to_dict(self) -> dict[str, Any]:
-        """Gives the state as plain data."""
-        rows = [[None if np.isnan(value) else value for value in row] for row in self.rows.tolist()]
-        return {"rows": rows, "start": self.start, "period": self.period}
-
     def restore(self, data: dict[str, Any]) -> None:
         """Reads `to_dict`."""
-        rows = [[np.nan if value is None else value for value in row] for row in data["rows"]]
-        self.rows = np.array(rows, dtype=float).reshape(len(rows), self.rows.shape[1])
-        self.start, self.period = data["start"], data["period"]
+        width = self.rows.shape[1]
+        self.__dict__.update(vars(StreamWindows.from_dict(data)))
+        self.rows = self.rows.reshape(len(self.rows), width)

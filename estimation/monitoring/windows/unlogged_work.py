@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+
+from robots.common.records import Record
 
 Array = NDArray[np.float64]
 
@@ -26,7 +27,7 @@ Heated = Callable[[int, Array, float, float, float | None], Array]
 """Temperature state of a joint after a time [s] at a power [W]."""
 
 
-class UnloggedWork:
+class UnloggedWork(Record):
     """Follows each joint as if the robot had worked in the whole of the last pause, beside the joint that rested in it.
 
     The heat of the pause lies between the two. Its share of the heat of work without a rest, the duty, is one unknown
@@ -36,13 +37,22 @@ class UnloggedWork:
         n: number of joints.
     """
 
+    ENTRIES = ("worked", "rested", "energy", "time", "duties", "last")
+
+    worked: list[Array | None]
+    rested: list[Array | None]
+    energy: Array
+    time: float
+    duties: list[float]
+    last: float
+
     def __init__(self, n: int) -> None:
-        self.worked: list[Array | None] = [None] * n
+        self.worked = [None] * n
         # As if the robot had rested in all pauses so far.
-        self.rested: list[Array | None] = [None] * n
+        self.rested = [None] * n
         # Friction power at the reference temperature, summed over the logs [J], and their time [s].
         self.energy, self.time = np.zeros(n), 0.0
-        self.duties: list[float] = []
+        self.duties = []
         self.last = DUTY_SPREAD
 
     @property
@@ -109,26 +119,3 @@ class UnloggedWork:
             for step in steps:
                 now = heated(j, now, power[j] * factor(j, now), step, ambient)
             self.worked[j] = now
-
-    def to_dict(self) -> dict[str, Any]:
-        """Gives the state as plain data."""
-        return {
-            "worked": [None if state is None else state.tolist() for state in self.worked],
-            "rested": [None if state is None else state.tolist() for state in self.rested],
-            "energy": self.energy.tolist(),
-            "time": self.time,
-            "duties": self.duties,
-            "last": self.last,
-        }
-
-    @classmethod
-    def from_dict(cls, n: int, data: dict[str, Any]) -> UnloggedWork:
-        """Reads `to_dict`."""
-        found = cls(n)
-        found.worked, found.rested = (
-            [None if state is None else np.array(state, dtype=float) for state in data[name]]
-            for name in ("worked", "rested")
-        )
-        found.energy, found.time = np.array(data["energy"], dtype=float), float(data["time"])
-        found.duties, found.last = [float(value) for value in data["duties"]], float(data["last"])
-        return found

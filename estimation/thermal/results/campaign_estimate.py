@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from estimation.models.model import Model
 from estimation.thermal.results.estimate import ThermalEstimate
 from estimation.thermal.torque import ThermalTorqueModel
+from robots.common.records import Finding, Result, axes_for, findings_of
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -20,7 +21,7 @@ Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class CampaignEstimate:
+class CampaignEstimate(Result):
     """A torque model with heat, and the evidence for it.
 
     Attributes:
@@ -31,6 +32,8 @@ class CampaignEstimate:
         rounds: of the two fits' turns.
         notes: what a reader must know.
     """
+
+    ENTRIES = ("success", "residual_rms", "residual_without", "rounds", "notes", "thermal", "model=torque_model")
 
     torque_model: ThermalTorqueModel
     thermal: tuple[ThermalEstimate | None, ...]
@@ -48,6 +51,36 @@ class CampaignEstimate:
     def success(self) -> bool:
         """Whether every joint's thermal fit succeeded."""
         return all(fit is not None and fit.success for fit in self.thermal)
+
+    @property
+    def gain(self) -> Array:
+        """Share (n,) of each joint's error that the thermal model takes away."""
+        return np.asarray(1.0 - self.residual_rms / np.maximum(self.residual_without, 1e-300))
+
+    @property
+    def conclusion(self) -> str:
+        """Whether heat explains the friction of these logs."""
+        share = round(100 * float(np.median(self.gain)))
+        if share > 0:
+            return (
+                f"Use this thermal model: it reduces the torque error of the median joint by {share} %, compared with "
+                "temperature-independent friction."
+            )
+        return "These logs show no effect of temperature: record from cold to warm, or use the model without heat."
+
+    @property
+    def remarks(self) -> tuple[Finding, ...]:
+        """What the logs do not determine, notes, and joints without a thermal model."""
+        fits = [fit for fit in self.thermal if fit is not None]
+        names = sorted({q.name for fit in fits for q in fit.parameters if not q.determined})
+        text = f"These logs determine time constants and friction ratios, but not {', '.join(names)}."
+        still = ", ".join(str(j) for j, fit in enumerate(self.thermal, start=1) if fit is None)
+        rest = f"No thermal model for joint {still}: it does not move in the logs."
+        return (
+            *findings_of("thermal.undetermined", [text] if names else []),
+            *findings_of("model.warning", self.joint_notes),
+            *findings_of("joint.still", [rest] if still else []),
+        )
 
     def summary(self) -> str:
         """Gives each joint's error with and without thermal model, time constants, the span of friction, and notes."""
@@ -86,23 +119,9 @@ class CampaignEstimate:
         frames = [fit.to_frame().assign(joint=j + 1) for j, fit in enumerate(self.thermal) if fit is not None]
         return pd.concat(frames)
 
-    def to_dict(self) -> dict[str, Any]:
-        """Writes the estimate as plain data."""
-        return {
-            "success": self.success,
-            "residual_rms": self.residual_rms.tolist(),
-            "residual_without": self.residual_without.tolist(),
-            "rounds": self.rounds,
-            "notes": list(self.notes),
-            "thermal": [None if fit is None else fit.to_dict() for fit in self.thermal],
-            "model": self.torque_model.to_dict(),
-        }
-
     def plot(self, ax: Axes | None = None) -> Axes:
         """Draws each joint's friction over that at T0 against time."""
-        from matplotlib.figure import Figure
-
-        axes = ax if ax is not None else Figure(figsize=(7, 4)).subplots()
+        axes = axes_for(ax, (7, 4))
         for j, fit in enumerate(self.thermal):
             for run in fit.runs if fit is not None else ():
                 if run.channel == "friction":

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from estimation.thermal.results.estimate import RunFit, ThermalEstimate
+from robots.common.records import Record, axes_for
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -65,7 +66,7 @@ class Candidate:
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class ThermalChoice:
+class ThermalChoice(Record):
     """The models beside each other.
 
     Attributes:
@@ -73,6 +74,8 @@ class ThermalChoice:
         best: name of the model of choice.
         held_out: what was held out, ``runs`` or ``end``.
     """
+
+    ENTRIES = ("best", "held_out", "models=rows", "estimate")
 
     candidates: tuple[Candidate, ...]
     best: str
@@ -84,6 +87,11 @@ class ThermalChoice:
         found = next(c.estimate for c in self.candidates if c.order == self.best)
         assert found is not None
         return found
+
+    @property
+    def rows(self) -> list[dict[str, Any]]:
+        """A row per model, as tables have it."""
+        return [_row(item) for item in self.candidates]
 
     def summary(self) -> str:
         """Gives the table of thesis Tables 6 and 7, with held-out errors and criteria."""
@@ -107,21 +115,11 @@ class ThermalChoice:
         """Gives a row per model."""
         import pandas as pd
 
-        return pd.DataFrame([_row(item) for item in self.candidates]).set_index("model")
-
-    def to_dict(self) -> dict[str, Any]:
-        """Writes the comparison as plain data."""
-        rows = [
-            {k: (v if not isinstance(v, float) or np.isfinite(v) else None) for k, v in _row(item).items()}
-            for item in self.candidates
-        ]
-        return {"best": self.best, "held_out": self.held_out, "models": rows, "estimate": self.estimate.to_dict()}
+        return pd.DataFrame(self.rows).set_index("model")
 
     def plot(self, ax: Axes | None = None) -> Axes:
         """Draws each model's error against time, at the largest power."""
-        from matplotlib.figure import Figure
-
-        axes = ax if ax is not None else Figure(figsize=(7, 4)).subplots()
+        axes = axes_for(ax, (7, 4))
         for item in self.candidates:
             if item.estimate is not None:
                 run = max(item.estimate.runs, key=lambda run: (run.channel == "friction", run.power))

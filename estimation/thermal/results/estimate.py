@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field, replace
 from os import PathLike
@@ -14,8 +13,7 @@ from numpy.typing import NDArray
 
 from estimation.thermal.results.derived import SPAN, Quantity
 from robots.common.errors import InputError
-from robots.common.files import existing_file, write_atomic
-from robots.common.plain import finite
+from robots.common.records import Result, axes_for, read, read_json
 from robots.thermal import ThermalModel, build_thermal_model
 
 if TYPE_CHECKING:
@@ -23,9 +21,6 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 Array = NDArray[np.float64]
-
-THERMAL = "thermal.json"
-FORMAT = "robot-oed thermal model"
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -44,6 +39,8 @@ class RunFit:
         ambient: surroundings at first [degC].
     """
 
+    ENTRIES = ("name", "channel", "rows=t.size", "rms", "power", "start", "ambient")
+
     name: str
     channel: str
     t: Array
@@ -61,7 +58,7 @@ class RunFit:
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class ThermalEstimate:
+class ThermalEstimate(Result, format="robot-oed thermal model"):
     """A fitted thermal model and the evidence for it.
 
     Attributes:
@@ -81,6 +78,27 @@ class ThermalEstimate:
         status: what the solver said.
         notes: what a reader must know before using the numbers.
     """
+
+    FILE = "thermal.json"
+    ENTRIES = (
+        "success",
+        "status",
+        "model",
+        "parameters",
+        "combinations",
+        "bounds",
+        "covariance",
+        "noise",
+        "noise_proportional=proportional",
+        "colour",
+        "log_likelihood",
+        "aic",
+        "bic",
+        "rows",
+        "free",
+        "runs",
+        "notes",
+    )
 
     model: ThermalModel
     parameters: tuple[Quantity, ...]
@@ -163,55 +181,13 @@ class ThermalEstimate:
         kinds = ["parameter"] * len(self.parameters) + ["combination"] * len(self.combinations)
         return pd.DataFrame(rows).assign(kind=kinds).set_index("name")
 
-    def to_dict(self) -> dict[str, Any]:
-        """Writes the estimate as plain data, without the measurements."""
-
-        def plain(item: Quantity) -> dict[str, Any]:
-            error = finite(item.standard_error)
-            return {**asdict(item), "standard_error": error}
-
-        return {
-            "format": FORMAT,
-            "format_version": 1,
-            "success": self.success,
-            "status": self.status,
-            "model": self.model.to_dict(),
-            "parameters": [plain(item) for item in self.parameters],
-            "combinations": [plain(item) for item in self.combinations],
-            "bounds": dict(self.bounds),
-            "covariance": self.covariance.tolist(),
-            "noise": dict(self.noise),
-            "noise_proportional": self.proportional,
-            "colour": self.colour,
-            "log_likelihood": self.log_likelihood,
-            "aic": self.aic,
-            "bic": self.bic,
-            "rows": self.rows,
-            "free": self.free,
-            "runs": [
-                {
-                    "name": run.name,
-                    "channel": run.channel,
-                    "rows": len(run.t),
-                    "rms": run.rms,
-                    "power": run.power,
-                    "start": list(run.start),
-                    "ambient": run.ambient,
-                }
-                for run in self.runs
-            ],
-            "notes": list(self.notes),
-        }
-
     def plot(self, ax: Axes | None = None) -> Axes:
         """Draws the friction, or without it the temperatures, against time, run by run.
 
         Args:
             ax: where to draw; a new figure by default.
         """
-        from matplotlib.figure import Figure
-
-        axes = ax if ax is not None else Figure(figsize=(7, 4)).subplots()
+        axes = axes_for(ax, (7, 4))
         shown = [run for run in self.runs if run.channel == "friction"] or list(self.runs)
         for run in shown:
             minutes = (run.t - run.t[0]) / 60.0
@@ -221,19 +197,6 @@ class ThermalEstimate:
         axes.set_ylabel("friction [N m]" if shown[0].channel == "friction" else "temperature [°C]")
         axes.legend()
         return axes
-
-    def save(self, folder: str | PathLike[str], *, force: bool = False) -> None:
-        """Writes `thermal.json` into a folder that is there.
-
-        Args:
-            folder: an existing one.
-            force: replace a file that is there.
-
-        Raises:
-            InputError: the file is there, and force is not given.
-        """
-        text = json.dumps(self.to_dict(), indent=2, allow_nan=False) + "\n"
-        write_atomic(Path(folder) / THERMAL, text, force=force)
 
 
 def searched_parameters(fit: ThermalEstimate) -> list[str]:
@@ -260,13 +223,6 @@ def load_thermal_model(path: str | PathLike[str]) -> ThermalModel:
         InputError: a missing or damaged file.
     """
     file = Path(path)
-    file = existing_file(file / THERMAL if file.is_dir() else file)
-    try:
-        data = json.loads(file.read_text(encoding="utf-8"))
-        if data["format"] != FORMAT or data["format_version"] != 1:
-            raise InputError("is not a thermal model file of this version", file=file, allowed=f'"format": "{FORMAT}"')
-        return build_thermal_model(data["model"])
-    except (UnicodeDecodeError, json.JSONDecodeError, AttributeError, KeyError, TypeError) as error:
-        raise InputError(
-            f"is not a thermal model file, or is damaged ({type(error).__name__}: {error})", file=file
-        ) from error
+    file, remedy = file / ThermalEstimate.FILE if file.is_dir() else file, "fit the model again with oed thermal"
+    data = read_json(file, ThermalEstimate.FORMAT, ThermalEstimate.FORMAT_VERSION, remedy=remedy)
+    return build_thermal_model(read(dict[str, Any], data.get("model"), file=file, remedy=remedy))

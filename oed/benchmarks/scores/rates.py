@@ -8,11 +8,14 @@ from dataclasses import dataclass
 import numpy as np
 
 from estimation.uncertainty.quantiles import NORMAL_95, median_interval, share_interval
+from robots.common.records import Record
 
 
 @dataclass(frozen=True, kw_only=True)
-class Rate:
+class Rate(Record):
     """A share of cases, with the Clopper-Pearson interval at 95 %."""
+
+    ENTRIES = ("hits", "cases=tries", "rate=value", "ci95=interval")
 
     hits: int
     tries: int
@@ -34,21 +37,23 @@ class Rate:
         low, high = (100 * bound for bound in self.interval)
         return f"{self.hits} of {self.tries} ({low:.0f} to {high:.0f} %)"
 
-    def to_dict(self) -> dict[str, object]:
-        """Gives the rate as plain data."""
-        interval = None if self.interval is None else list(self.interval)
-        return {"hits": self.hits, "cases": self.tries, "rate": self.value, "ci95": interval}
-
 
 @dataclass(frozen=True, kw_only=True)
-class Median:
+class Median(Record):
     """A median, with the interval at 95 % that holds for every continuous distribution.
 
     Attributes:
         values: sorted.
     """
 
+    ENTRIES = ("cases=size", "median=value", "ci95=interval")
+
     values: tuple[float, ...]
+
+    @property
+    def size(self) -> int:
+        """Number of values."""
+        return len(self.values)
 
     @property
     def value(self) -> float | None:
@@ -68,21 +73,23 @@ class Median:
             return f"{self.value:.3g} ({len(self.values)} cases)"
         return f"{self.value:.3g} ({self.interval[0]:.3g} to {self.interval[1]:.3g}, {len(self.values)} cases)"
 
-    def to_dict(self) -> dict[str, object]:
-        """Gives the median as plain data."""
-        interval = None if self.interval is None else list(self.interval)
-        return {"cases": len(self.values), "median": self.value, "ci95": interval}
-
 
 @dataclass(frozen=True, kw_only=True)
-class Mean:
+class Mean(Record):
     """A mean, with the interval at 95 % of a normal distribution.
 
     Attributes:
         values: whose mean it is.
     """
 
+    ENTRIES = ("effects=size", "mean=value", "ci95=interval")
+
     values: tuple[float, ...]
+
+    @property
+    def size(self) -> int:
+        """Number of values."""
+        return len(self.values)
 
     @property
     def value(self) -> float:
@@ -101,11 +108,6 @@ class Mean:
         """Writes mean, interval and count."""
         between = "" if self.interval is None else f"{self.interval[0]:.2g} to {self.interval[1]:.2g}, "
         return f"{self.value:.2g} ({between}{len(self.values)} effects)"
-
-    def to_dict(self) -> dict[str, object]:
-        """Gives the mean as plain data."""
-        interval = None if self.interval is None else list(self.interval)
-        return {"effects": len(self.values), "mean": self.value, "ci95": interval}
 
 
 def rate(values: Iterable[bool]) -> Rate:

@@ -14,6 +14,7 @@ from oed.benchmarks.scores.judging import Judgement
 from oed.benchmarks.scores.rates import Mean, Median, Rate, median, rate
 from oed.benchmarks.sealing import unseal
 from robots.common.errors import InputError
+from robots.common.records import Record
 
 Figures = Mapping[str, Rate | Median | Mean]
 
@@ -36,7 +37,7 @@ class ToolScore:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Scores:
+class Scores(Record):
     """Scores of tools, side by side.
 
     Attributes:
@@ -81,22 +82,6 @@ class Scores:
             if tool.unpredicted > len(tool.missing):
                 lines.append(f"{tool.tool}: {tool.unpredicted} cases have no predicted torque")
         return lines
-
-    def to_dict(self) -> dict[str, object]:
-        """Gives the scores as plain data."""
-        return {
-            "benchmark": self.benchmark,
-            "cases": self.cases,
-            "tools": [
-                {
-                    "tool": tool.tool,
-                    "figures": {title: figure.to_dict() for title, figure in tool.figures.items()},
-                    "missing": list(tool.missing),
-                    "unpredicted": tool.unpredicted,
-                }
-                for tool in self.tools
-            ],
-        }
 
 
 def score_benchmark(

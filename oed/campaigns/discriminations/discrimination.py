@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
@@ -14,22 +13,26 @@ from numpy.typing import NDArray
 
 from estimation.diagnosis.hypothesis_tests.power import resolving_energy
 from oed.campaigns.discriminations.motions import Run
-from oed.experiments.results.design_file import DESIGN, TRAJECTORY
-from oed.experiments.safety_checks.freedom import freedom_of, freedom_text
-from oed.experiments.safety_checks.margins import margin_data, missing_limits
+from oed.experiments.results.design_file import TRAJECTORY
+from oed.experiments.results.planned import OF_ROBOT, Planned
+from oed.experiments.safety_checks.freedom import freedom_findings, freedom_of, freedom_text, is_free
+from oed.experiments.safety_checks.margins import missing_limits
 from oed.exports import write_trajectory
 from robots.collision import Surroundings
-from robots.common.files import write_atomic
 from robots.common.plain import percent
+from robots.common.records import Finding, Record, findings_of
 from robots.robot import Robot
 from robots.signals import Motion
 from robots.version import VERSION
 
 Array = NDArray[np.float64]
 
+_SURE = 0.95
+"""Chance from which an experiment counts as sure."""
+
 
 @dataclass(frozen=True, kw_only=True)
-class DiscriminationScore:
+class DiscriminationScore(Record):
     """One kind of experiment, judged.
 
     Attributes:
@@ -42,6 +45,8 @@ class DiscriminationScore:
         visible: the largest that the base model alone leaves.
         note: why it cannot be made, or empty.
     """
+
+    ENTRIES = ("kind", "resolves", "smallest_size=smallest", "duration", "runs", "note")
 
     kind: str
     resolves: float
@@ -66,20 +71,11 @@ class DiscriminationScore:
         """The size at which it separates the causes with 95 % chance, of one judged at a `size`; None for none."""
         return size * float(np.sqrt(resolving_energy() / self.energy)) if self.energy > 0 else None
 
-    def to_dict(self, size: float) -> dict[str, Any]:
-        """Writes it as plain data; `size` is the one it was judged at."""
-        return {
-            "kind": self.kind,
-            "resolves": self.resolves,
-            "smallest_size": self.smallest(size),
-            "duration": self.duration,
-            "runs": self.runs,
-            "note": self.note,
-        }
-
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Discrimination:
+class Discrimination(
+    Planned, format="robot-oed discriminating experiment", tool=True, shares=("size", "limits=robot.limits")
+):
     """The experiment proposed.
 
     Attributes:
@@ -95,6 +91,28 @@ class Discrimination:
         settings: what makes the same experiment again.
         surroundings: what the motions are checked against; None where they are not checked for collisions.
     """
+
+    ENTRIES = (
+        *OF_ROBOT,
+        "criterion",
+        "rivals=named_rivals",
+        "kind",
+        "what",
+        "why",
+        "resolves",
+        "reference_alone=alone",
+        "size",
+        "noise",
+        "segments",
+        "runs=stated_runs",
+        "alternatives=ranking",
+        "quality",
+        "collision=freedom",
+        "duration",
+        "period=robot.period",
+        "warnings",
+        "settings",
+    )
 
     robot: Robot
     rivals: tuple[tuple[str, int | None], ...]
@@ -119,6 +137,39 @@ class Discrimination:
         return min(
             (one for one in found if one), key=lambda one: (not one["meetings"], one["clearance"] or 0.0), default=None
         )
+
+    criterion = "discriminate"
+    quality = ()
+
+    @property
+    def named_rivals(self) -> list[dict[str, Any]]:
+        """Effect and joint of the two causes."""
+        return [{"effect": name, "joint": joint} for name, joint in self.rivals]
+
+    @property
+    def segments(self) -> list[dict[str, object]]:
+        """Segments of the first run."""
+        return self.runs[0].table()
+
+    @property
+    def stated_runs(self) -> list[dict[str, Any]]:
+        """The runs, with the file of each."""
+        return [
+            {
+                "file": file,
+                "payload_kg": run.payload,
+                "gravity": run.gravity,
+                "duration": run.motion.duration,
+                "segments": run.table(),
+                "smallest_margins": run.margins,
+            }
+            for file, run in zip(self.files, self.runs, strict=True)
+        ]
+
+    @property
+    def duration(self) -> float:
+        """Of all runs [s]."""
+        return sum(run.motion.duration for run in self.runs)
 
     @property
     def resolves(self) -> float:
@@ -186,50 +237,24 @@ class Discrimination:
         notes.append("Collisions are not checked.")
         return tuple(notes)
 
-    def to_dict(self) -> dict[str, Any]:
-        """Writes everything but the samples as plain data for `design.json`."""
-        return {
-            "format": "robot-oed discriminating experiment",
-            "format_version": 1,
-            "tool_version": VERSION,
-            "robot": {"name": self.robot.name, "origin": self.robot.origin, "sha256": self.robot.digest},
-            "criterion": "discriminate",
-            "rivals": [{"effect": name, "joint": joint} for name, joint in self.rivals],
-            "kind": self.kind,
-            "what": self.what,
-            "why": self.why,
-            "resolves": self.resolves,
-            "reference_alone": self.alone,
-            "size": self.size,
-            "noise": self.noise.tolist(),
-            "segments": self.runs[0].table(),
-            "runs": [
-                {
-                    "file": file,
-                    "payload_kg": run.payload,
-                    "gravity": None if run.gravity is None else run.gravity.tolist(),
-                    "duration": run.motion.duration,
-                    "segments": run.table(),
-                    "smallest_margins": [margin_data(margin, self.robot.limits) for margin in run.margins],
-                }
-                for file, run in zip(self.files, self.runs, strict=True)
-            ],
-            "alternatives": [judged.to_dict(self.size) for judged in self.ranking],
-            "quality": [],
-            "collision": self.freedom,
-            "duration": sum(run.motion.duration for run in self.runs),
-            "period": self.robot.period,
-            "warnings": list(self.warnings),
-            "settings": dict(self.settings),
-        }
+    @property
+    def conclusion(self) -> str:
+        """What the experiment distinguishes, and whether to play it."""
+        warning = "" if is_free(self.freedom) else "Do not play these motions. "
+        return f"{warning}{self.why}. {freedom_text(self.freedom)}"
 
-    def save(self, folder: str | Path) -> None:
-        """Writes the trajectories and `design.json`.
+    @property
+    def remarks(self) -> tuple[Finding, ...]:
+        """What is not known of collisions, conditions, and how sure the decision is."""
+        text = f"The experiment gives the right decision with {100 * self.resolves:.0f} % probability only."
+        return (
+            *freedom_findings(self.freedom),
+            *findings_of("experiment.note", self.warnings),
+            *findings_of("experiment.unsure", [text] if self.resolves < _SURE else []),
+        )
 
-        Args:
-            folder: an existing one; files that are there are replaced.
-        """
-        target = Path(folder)
+    def _save_beside(self, folder: Path, *, force: bool) -> None:
+        """Writes the trajectories."""
         written: set[str] = set()
         for file, run in zip(self.files, self.runs, strict=True):
             if file not in written:
@@ -239,9 +264,8 @@ class Discrimination:
                     "collisions": freedom_text(self.freedom),
                     "tool": f"robot-oed {VERSION}",
                 }
-                write_trajectory(target / file, run.motion, stated, kinds=self.robot.chain.kinds, force=True)
+                write_trajectory(folder / file, run.motion, stated, kinds=self.robot.chain.kinds, force=True)
                 written.add(file)
-        write_atomic(target / DESIGN, json.dumps(self.to_dict(), indent=2, allow_nan=False) + "\n")
 
     def summary(self) -> str:
         """Describes the experiment and its alternatives in a few lines."""

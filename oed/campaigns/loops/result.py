@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass
-from typing import Any
+from dataclasses import dataclass
 
-from oed.campaigns.loops.state import Experiment, Verdict
+from estimation.diagnosis.results.actions import action_for
+from oed.campaigns.loops.state import Experiment, Verdict, name_of
 from robots.common.plain import several
+from robots.common.records import Finding, Result, effect_code, findings_of
 from robots.robot import Robot
+from robots.terms.effects import EFFECTS
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class LoopResult:
+class LoopResult(Result):
     """A loop that has ended.
 
     Attributes:
@@ -23,6 +25,18 @@ class LoopResult:
         success: whether nothing was ambiguous or unexplained at the end.
         duration: from the beginning of this start [s].
     """
+
+    ENTRIES = (
+        "robot=robot.name",
+        "place",
+        "folder",
+        "verdict=diagnosis.verdict",
+        "causes=diagnosis.causes",
+        "ended",
+        "success",
+        "duration",
+        "experiments",
+    )
 
     robot: Robot
     place: str
@@ -39,19 +53,27 @@ class LoopResult:
         assert last is not None
         return last
 
-    def to_dict(self) -> dict[str, Any]:
-        """Gives everything as plain data."""
-        return {
-            "robot": self.robot.name,
-            "place": self.place,
-            "folder": self.folder,
-            "verdict": self.diagnosis.verdict,
-            "causes": self.diagnosis.causes,
-            "ended": self.ended,
-            "success": self.success,
-            "duration": self.duration,
-            "experiments": [asdict(experiment) for experiment in self.experiments],
-        }
+    @property
+    def conclusion(self) -> str:
+        """Why the loop ended."""
+        return f"{self.ended[:1].upper()}{self.ended[1:]}."
+
+    @property
+    def remarks(self) -> tuple[Finding, ...]:
+        """The findings of the last diagnosis, and whether the loop ended early."""
+        found = [
+            Finding(
+                code=effect_code(item["effect"]) if item["effect"] in EFFECTS else "diagnosis.unexplained",
+                subject=f"{name_of(item)}:",
+                text=str(item.get("sentence", "")),
+                action=action_for(item["effect"], [item["joint"]]) if item["effect"] in EFFECTS else "",
+            )
+            for item in self.diagnosis.findings
+        ]
+        return (
+            *found,
+            *findings_of("loop.unfinished", [] if self.success else [f"The loop ended early: {self.ended}."]),
+        )
 
     def summary(self) -> str:
         """Gives the course in a few lines."""

@@ -8,13 +8,12 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from oed.campaigns.state_files import read_state, write_state
 from oed.controllers.recording.clock import ClockAnchor
 from robots.common.errors import InputError
+from robots.common.records import Record, read_json, write_json
 from robots.robot import Robot
 
 LOOP = "loop.json"
-FORMAT = "robot-oed loop"
 
 
 @dataclass(kw_only=True)
@@ -99,7 +98,7 @@ class Experiment:
 
 
 @dataclass(kw_only=True)
-class LoopState:
+class LoopState(Record, format="robot-oed loop"):
     """The loop so far.
 
     Attributes:
@@ -135,7 +134,7 @@ class LoopState:
 
     def save(self, folder: Path) -> None:
         """Replaces the file."""
-        write_state(folder / LOOP, FORMAT, self)
+        write_json(folder / LOOP, self.to_dict(), force=True)
 
     @classmethod
     def load(cls, folder: Path) -> LoopState | None:
@@ -144,19 +143,11 @@ class LoopState:
         Raises:
             InputError: a file of another kind, or a damaged one.
         """
-        return read_state(
-            folder / LOOP,
-            FORMAT,
-            "a loop",
-            lambda data: cls(
-                robot=data["robot"],
-                settings=data["settings"],
-                home=data["home"],
-                experiments=[_experiment(item) for item in data["experiments"]],
-                ended=data["ended"],
-                success=data["success"],
-            ),
-        )
+        file, remedy = folder / LOOP, "choose another folder"
+        if not file.exists():
+            return None
+        data = read_json(file, cls.FORMAT, cls.FORMAT_VERSION, remedy=remedy)
+        return cls.from_dict(data, file=file, remedy=remedy)
 
     def require_same(self, robot: Robot, settings: Mapping[str, Any], folder: Path) -> None:
         """Refuses to go on with another robot or other choices.
@@ -188,22 +179,6 @@ def name_of(finding: Mapping[str, Any]) -> str:
     """Names a finding in words."""
     joint = finding["joint"]
     return str(finding["effect"]).replace("_", " ") + ("" if joint is None else f" of joint {joint}")
-
-
-def _experiment(data: Mapping[str, Any]) -> Experiment:
-    runs = []
-    for item in data["runs"]:
-        known = item["recorded"]
-        recorded = None if known is None else Recorded(**{**known, "end": ClockAnchor(**known["end"])})
-        runs.append(LoopRun(trajectory=item["trajectory"], pause=item["pause"], recorded=recorded))
-    diagnosis = data["diagnosis"]
-    return Experiment(
-        kind=data["kind"],
-        why=data["why"],
-        resolves=data["resolves"],
-        runs=runs,
-        diagnosis=None if diagnosis is None else Verdict(**diagnosis),
-    )
 
 
 def remove_loop(folder: Path) -> None:

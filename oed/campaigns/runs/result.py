@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass
-from typing import Any
+from dataclasses import dataclass
 
 from oed.campaigns.runs.state import RecordedStage
+from robots.common.records import Record
 
 
 @dataclass(frozen=True, kw_only=True)
-class CampaignRun:
+class CampaignRun(Record):
     """A campaign that was played to its end.
 
     Attributes:
@@ -20,6 +20,8 @@ class CampaignRun:
         starts: how often the run was started; each start after the first followed an interruption.
         duration: from the beginning of this start [s].
     """
+
+    ENTRIES = ("*", "rows")
 
     robot: str
     place: str
@@ -32,10 +34,6 @@ class CampaignRun:
     def rows(self) -> int:
         """Rows of all logs."""
         return sum(stage.rows for stage in self.stages)
-
-    def to_dict(self) -> dict[str, Any]:
-        """Gives all fields as plain data."""
-        return {**asdict(self), "stages": [asdict(stage) for stage in self.stages], "rows": self.rows}
 
     def summary(self) -> str:
         """Says in a few lines what was recorded."""

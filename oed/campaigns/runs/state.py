@@ -8,15 +8,14 @@ from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from oed.campaigns.state_files import read_state, write_state
 from oed.controllers.recording.clock import ClockAnchor
 from robots.common.errors import InputError
 from robots.common.files import remove_partial_files
 from robots.common.locks import close_locked, lock
+from robots.common.records import Record, read_json, write_json
 
 RUN, LOCK = "run.json", ".run.lock"
 LOGS = "logs"
-FORMAT = "robot-oed campaign run"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -47,7 +46,7 @@ class RecordedStage:
 
 
 @dataclass(kw_only=True)
-class RunState:
+class RunState(Record, format="robot-oed campaign run"):
     """What was done of a campaign.
 
     Attributes:
@@ -67,7 +66,7 @@ class RunState:
 
     def save(self, folder: Path) -> None:
         """Replaces the file."""
-        write_state(folder / RUN, FORMAT, self)
+        write_json(folder / RUN, self.to_dict(), force=True)
 
     @classmethod
     def load(cls, folder: Path) -> RunState | None:
@@ -76,16 +75,11 @@ class RunState:
         Raises:
             InputError: a file of another kind, or a damaged one.
         """
-        return read_state(
-            folder / RUN,
-            FORMAT,
-            "a run",
-            lambda data: cls(
-                campaign=data["campaign"],
-                recorded=[RecordedStage(**{**row, "end": ClockAnchor(**row["end"])}) for row in data["recorded"]],
-                starts=data["starts"],
-            ),
-        )
+        file, remedy = folder / RUN, "choose another folder"
+        if not file.exists():
+            return None
+        data = read_json(file, cls.FORMAT, cls.FORMAT_VERSION, remedy=remedy)
+        return cls.from_dict(data, file=file, remedy=remedy)
 
 
 @contextmanager

@@ -105,6 +105,7 @@ def identify(
         from estimation.predictions.method_table import compare_methods
         from oed.reports import save_estimate_report
         from robots.common.files import ResultFolder, open_atomic
+        from robots.common.records import plain
 
         with ExitStack() as files:
             folder = files.enter_context(ResultFolder(out, force, names=["model.json", "report.html"]))
@@ -168,7 +169,7 @@ def identify(
             **result.to_dict(),
             "gate": [gate.to_dict() for gate in result.gates],
             "below_3_standard_errors": weak,
-            "methods": table.to_dict() if table else None,
+            "methods": plain(table.rows) if table else None,
             "mjcf": None if written is None else {"stated": list(written.stated), "remarks": list(written.remarks)},
         },
     )

@@ -122,9 +122,8 @@ def _findings(path: Path, robot: Robot) -> tuple[dict[int, str], Any]:
     """Reads the joints that a diagnosis marks, and its findings."""
     from estimation.diagnosis.results.diagnosis import Diagnosis
     from oed.reports.pages.motions.diagnosis_motion import joint_marks
-    from oed.reports.rendering.page import Finding
     from robots.common.errors import InputError
-    from robots.terms.effects import EFFECTS
+    from robots.common.records import Finding, effect_code
 
     found = Diagnosis.load(path.parent if path.name == "diagnosis.json" else path).findings
     beyond = next((f for f in found if f.joint is not None and f.joint > robot.n), None)
@@ -136,7 +135,7 @@ def _findings(path: Path, robot: Robot) -> tuple[dict[int, str], Any]:
         )
     findings = tuple(
         Finding(
-            code=f"effect.{f.effect}" if f.effect in EFFECTS else "diagnosis.unexplained",
+            code=effect_code(f.effect) if f.named else "diagnosis.unexplained",
             subject=f"Joint {f.joint}:" if f.joint else "",
             text=f.sentence,
         )

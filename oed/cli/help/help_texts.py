@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 COMMANDS: dict[str, tuple[str, ...]] = {
-    "First steps": ("example", "robots", "robot", "effects", "doctor"),
+    "First steps": ("example", "robots", "robot", "effects", "explain", "doctor"),
     "Experiments": ("design", "pareto", "retime", "campaign", "export", "show"),
     "Robot and virtual robot": ("stream", "record", "loop", "controller", "simulate"),
     "Models": ("check", "identify", "actuators", "thermal", "predict", "payload", "calibrate"),
@@ -154,6 +154,7 @@ EXAMPLES = {
     "robots": ("oed robots",),
     "robot": ("oed robot show ur10", "oed robot show arm.urdf --tip tool0 --json"),
     "effects": ("oed effects", "oed effects --json"),
+    "explain": ("oed explain OED-L014", "oed explain"),
     "doctor": ("oed doctor",),
 }
 """Command lines to copy, by command."""

@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from typing import Any
 
 from oed.controllers.recording.clock import ClockAnchor
 from oed.controllers.recording.recording import loss
+from robots.common.records import Record
 
 
 @dataclass(frozen=True, kw_only=True)
-class StreamResult:
+class StreamResult(Record):
     """How a trajectory was played.
 
     Attributes:
@@ -48,10 +49,6 @@ class StreamResult:
     dry_run: bool
     note: str = ""
     anchor: ClockAnchor | None = None
-
-    def to_dict(self) -> dict[str, Any]:
-        """Gives all fields as plain data."""
-        return asdict(self)
 
     def summary(self) -> str:
         """Says in a few lines what happened."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from os import PathLike, fspath
 from typing import Any
 
@@ -16,6 +16,7 @@ from oed.controllers.recording.reported_joints import require_no_further_joints,
 from robots.common.errors import InputError, OedError
 from robots.common.plain import several
 from robots.common.progress import SILENT, Progress
+from robots.common.records import Record
 from robots.robot import Robot
 from robots.version import VERSION
 
@@ -23,7 +24,7 @@ TURN = 0.05
 
 
 @dataclass(frozen=True, kw_only=True)
-class Recording:
+class Recording(Record):
     """What was recorded.
 
     Attributes:
@@ -45,10 +46,6 @@ class Recording:
     interrupted: bool
     feedback: dict[str, Any]
     note: str = ""
-
-    def to_dict(self) -> dict[str, Any]:
-        """Gives all fields as plain data."""
-        return asdict(self)
 
     def summary(self) -> str:
         """Says in one line what was recorded."""

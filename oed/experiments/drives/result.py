@@ -2,19 +2,17 @@
 
 from __future__ import annotations
 
-import json
 from dataclasses import asdict, dataclass
-from html import escape
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from oed.exports.trajectory_checks import UNKNOWN_COLLISIONS
 from robots.common.errors import InputError
-from robots.common.files import existing_file, write_atomic
-from robots.common.plain import finite, number
+from robots.common.files import existing_file
+from robots.common.records import Finding, Result, axes_for, findings_of, read_json
 from robots.common.tables.table_files import write_table
 
 if TYPE_CHECKING:
@@ -23,8 +21,7 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
-COMMANDS, FILE = "commands.csv", "design.json"
-FORMAT, FORMAT_VERSION = "robot-oed drive design", 1
+COMMANDS = "commands.csv"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -52,7 +49,7 @@ class ExpectedError:
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class DriveDesign:
+class DriveDesign(Result, format="robot-oed drive design"):
     """A motion for drives.
 
     Attributes:
@@ -65,6 +62,9 @@ class DriveDesign:
         noise: of measured positions [rad or m], for which they hold.
         collisions: what was checked for collisions, and how near the motion comes.
     """
+
+    FILE = "design.json"
+    ENTRIES = ("robot", "joints", "segments", "expected", "noise", "collisions")
 
     robot: str
     joints: tuple[str, ...]
@@ -89,6 +89,18 @@ class DriveDesign:
     def ratio(self) -> float:
         """Median over the parameters of the standard error over that of a chirp."""
         return float(np.nanmedian([item.ratio for item in self.expected]))
+
+    @property
+    def conclusion(self) -> str:
+        """Whether to play the motion, and what it is worth beside a chirp."""
+        if self.collides:
+            return f"Do not play this motion. {self.collisions}"
+        return f"Standard errors will be {self.ratio:.2g} times those of a chirp of the same time and limits."
+
+    @property
+    def remarks(self) -> tuple[Finding, ...]:
+        """What was checked for collisions."""
+        return findings_of("experiment.note", [self.collisions])
 
     def summary(self) -> str:
         """Lists segments and expected standard errors, beside those of a chirp."""
@@ -118,9 +130,7 @@ class DriveDesign:
         Args:
             ax: where to draw; a new figure by default.
         """
-        from matplotlib.figure import Figure
-
-        axes = ax if ax is not None else Figure(figsize=(8, 4)).subplots()
+        axes = axes_for(ax, (8, 4))
         for j, name in enumerate(self.joints):
             axes.plot(self.t, self.command[:, j], label=name)
         axes.set_xlabel("time [s]")
@@ -128,37 +138,11 @@ class DriveDesign:
         axes.legend(fontsize="small")
         return axes
 
-    def _repr_html_(self) -> str:
-        return f"<pre>{escape(self.summary())}</pre>"
-
-    def to_dict(self) -> dict[str, Any]:
-        """Writes the result as plain data for `design.json`."""
-        return {
-            "format": FORMAT,
-            "format_version": FORMAT_VERSION,
-            "robot": self.robot,
-            "joints": list(self.joints),
-            "segments": list(self.segments),
-            "expected": [asdict(item) | {"of_chirp": finite(item.of_chirp)} for item in self.expected],
-            "noise": self.noise,
-            "collisions": self.collisions,
-        }
-
-    def save(self, folder: str | Path, *, force: bool = False) -> None:
-        """Writes `commands.csv` (``t,qref1..qrefn``) and `design.json` into a folder that is there.
-
-        Args:
-            folder: an existing one.
-            force: replace files that are there.
-
-        Raises:
-            InputError: a file is there, and force is not given.
-        """
-        place = Path(folder)
+    def _save_beside(self, folder: Path, *, force: bool) -> None:
+        """Writes `commands.csv` (``t,qref1..qrefn``)."""
         columns = {"t": self.t} | {f"qref{j + 1}": self.command[:, j] for j in range(len(self.joints))}
         metadata = {"robot": self.robot, "joints": list(self.joints), "collisions": self.collisions}
-        write_table(place / COMMANDS, columns, metadata, force=force)
-        write_atomic(place / FILE, json.dumps(self.to_dict(), indent=2, allow_nan=False) + "\n", force=force)
+        write_table(folder / COMMANDS, columns, metadata, force=force)
 
     @classmethod
     def load(cls, folder: str | Path) -> DriveDesign:
@@ -172,20 +156,12 @@ class DriveDesign:
         """
         import pandas as pd
 
-        place = Path(folder)
-        file = existing_file(place / FILE)
-        try:
-            data = json.loads(file.read_text(encoding="utf-8"))
-            table = pd.read_csv(existing_file(place / COMMANDS), comment="#")
-            return cls(
-                robot=data["robot"],
-                joints=tuple(data["joints"]),
-                t=table["t"].to_numpy(dtype=float),
-                command=table[[f"qref{j + 1}" for j in range(len(data["joints"]))]].to_numpy(dtype=float),
-                segments=tuple(data["segments"]),
-                expected=tuple(ExpectedError(**i | {"of_chirp": number(i["of_chirp"])}) for i in data["expected"]),
-                noise=data["noise"],
-                collisions=data["collisions"],
-            )
-        except (KeyError, TypeError, ValueError) as error:
-            raise InputError(f"is damaged ({type(error).__name__}: {error})", file=file) from error
+        place, remedy = Path(folder), "give the folder written by `oed design --for actuators`"
+        data = read_json(place / cls.FILE, cls.FORMAT, cls.FORMAT_VERSION, remedy=remedy)
+        table = pd.read_csv(existing_file(place / COMMANDS), comment="#")
+        names = ["t", *(f"qref{j + 1}" for j in range(len(data.get("joints", ()))))]
+        lacking = [name for name in names if name not in table]
+        if lacking:
+            raise InputError("is missing", file=place / COMMANDS, column=lacking[0], remedy=remedy)
+        t, *command = (table[name].to_numpy(dtype=float) for name in names)
+        return cls.from_dict(data, file=place / cls.FILE, remedy=remedy, t=t, command=np.column_stack(command))

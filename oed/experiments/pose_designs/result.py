@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -12,11 +11,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from oed.experiments.pose_designs.observability import observability_indices
+from oed.experiments.results.planned import OF_ROBOT, Planned
 from oed.experiments.safety_checks.freedom import freedom_text, is_free
 from oed.exports import write_trajectory
-from robots.common.errors import InputError
-from robots.common.files import existing_file, write_atomic
-from robots.common.plain import finite
+from robots.common.records import Finding, axes_for, findings_of, read, read_json
 from robots.common.tables.table_files import write_table
 from robots.geometry_errors.terms import ErrorParameter
 from robots.robot import Robot
@@ -29,13 +27,12 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
-FORMAT = "robot-oed pose design"
 DESIGN, POSES, TRAJECTORY = "design.json", "poses.csv", "trajectory.csv"
 SHOWN = {"m": ("mm", 1e3), "rad": ("mrad", 1e3), "px": ("px", 1.0)}
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class PoseDesign:
+class PoseDesign(Planned, format="robot-oed pose design", tool=True):
     """Poses for a calibration.
 
     Attributes:
@@ -56,6 +53,25 @@ class PoseDesign:
         settings: everything that makes the same design again.
     """
 
+    ENTRIES = (
+        *OF_ROBOT,
+        "criterion",
+        "poses=q",
+        "home",
+        "observability",
+        "random_observability",
+        "eigenvalues",
+        "random_eigenvalues",
+        "parameters=stated_parameters",
+        "prediction",
+        "unit",
+        "left_out",
+        "duration=motion.duration",
+        "segments",
+        "collision=freedom",
+        "settings",
+    )
+
     robot: Robot
     criterion: str
     q: Array
@@ -75,22 +91,58 @@ class PoseDesign:
     def __repr__(self) -> str:
         return f"PoseDesign({self.robot.name!r}, {len(self.q)} poses, O1 {self.observability['O1']:.3g})"
 
-    def _repr_html_(self) -> str:
-        return f"<pre>{self.summary()}</pre>"
-
     @property
     def observability(self) -> dict[str, float]:
         """The indices O1 to O5."""
         return observability_indices(self.eigenvalues, len(self.q))
 
     @property
+    def random_observability(self) -> dict[str, float]:
+        """The indices of as many random poses."""
+        return observability_indices(self.random_eigenvalues, len(self.q))
+
+    @property
+    def stated_parameters(self) -> list[dict[str, Any]]:
+        """The parameters with the standard errors to expect."""
+        return [
+            {
+                "name": item.name,
+                "kind": item.kind,
+                "joint": item.joint,
+                "unit": item.unit,
+                "scale": item.scale,
+                "expected_standard_error": error,
+            }
+            for item, error in zip(self.parameters, self.expected, strict=True)
+        ]
+
+    @property
     def success(self) -> bool:
         """Whether all poses are reached and the moves are proved free of collisions."""
         return self.left_out == 0 and (self.freedom is None or is_free(self.freedom))
 
+    @property
+    def conclusion(self) -> str:
+        """How well the calibrated robot is expected to predict."""
+        unit, factor = SHOWN[self.unit]
+        return (
+            f"Measured at these {len(self.q)} poses, the calibrated robot is expected to be right to "
+            f"{factor * self.prediction:.3g} {unit}, if the kinds of errors are these and the noise is as stated."
+        )
+
+    @property
+    def remarks(self) -> tuple[Finding, ...]:
+        """What is not known of collisions, and poses that were left out."""
+        code = "collision.unchecked" if self.freedom is None else "collision.found"
+        text = f"{self.left_out} poses were left out: no free move reaches them."
+        return (
+            *findings_of(code, [] if is_free(self.freedom) else [freedom_text(self.freedom)]),
+            *findings_of("experiment.note", [text] if self.left_out else []),
+        )
+
     def summary(self) -> str:
         """Says how good the poses are, what errors to expect, and whether the moves are free."""
-        own, other = self.observability, observability_indices(self.random_eigenvalues, len(self.q))
+        own, other = self.observability, self.random_observability
         unit, factor = SHOWN[self.unit]
         lines = [
             f"{self.robot.name}: {len(self.q)} poses for a calibration of {len(self.parameters)} parameters, "
@@ -126,9 +178,7 @@ class PoseDesign:
         Args:
             ax: where to draw; a new figure by default.
         """
-        from matplotlib.figure import Figure
-
-        axes = ax if ax is not None else Figure(figsize=(6, 4)).subplots()
+        axes = axes_for(ax, (6, 4))
         for values, label in ((self.eigenvalues, "designed"), (self.random_eigenvalues, "random")):
             axes.semilogy(np.sqrt(np.maximum(values, 0.0))[::-1], "o-", markersize=3, label=label)
         axes.set_xlabel("direction")
@@ -136,67 +186,24 @@ class PoseDesign:
         axes.legend()
         return axes
 
-    def to_dict(self) -> dict[str, Any]:
-        """Writes the result as plain data for `design.json`."""
-        return {
-            "format": FORMAT,
-            "format_version": 1,
-            "tool_version": VERSION,
-            "robot": {"name": self.robot.name, "origin": self.robot.origin, "sha256": self.robot.digest},
-            "criterion": self.criterion,
-            "poses": self.q.tolist(),
-            "home": self.home.tolist(),
-            "observability": self.observability,
-            "random_observability": observability_indices(self.random_eigenvalues, len(self.q)),
-            "eigenvalues": self.eigenvalues.tolist(),
-            "random_eigenvalues": self.random_eigenvalues.tolist(),
-            "parameters": [
-                {
-                    "name": item.name,
-                    "kind": item.kind,
-                    "joint": item.joint,
-                    "unit": item.unit,
-                    "scale": item.scale,
-                    "expected_standard_error": finite(float(error)),
-                }
-                for item, error in zip(self.parameters, self.expected, strict=True)
-            ],
-            "prediction": self.prediction,
-            "unit": self.unit,
-            "left_out": self.left_out,
-            "duration": self.motion.duration,
-            "segments": [dict(segment) for segment in self.segments],
-            "collision": self.freedom,
-            "settings": dict(self.settings),
-        }
-
-    def save(self, folder: str | Path, *, force: bool = False) -> None:
-        """Writes `design.json`, `poses.csv` and `trajectory.csv` into a folder that is there.
-
-        Args:
-            folder: an existing one.
-            force: replace files that are there.
-
-        Raises:
-            InputError: a file is there, and force is not given.
-        """
-        place = Path(folder)
-        text = json.dumps(self.to_dict(), indent=2, allow_nan=False) + "\n"
-        write_atomic(place / DESIGN, text, force=force)
+    def _save_beside(self, folder: Path, *, force: bool) -> None:
+        """Writes `poses.csv` and `trajectory.csv`."""
         rests = [segment for segment in self.segments if segment["kind"] == "pose"]
         columns: dict[str, Any] = {"pose": np.arange(1, len(self.q) + 1)}
         columns |= {f"q{i + 1}": values for i, values in enumerate(self.q.T)}
         columns |= {"start": np.array([r["start"] for r in rests]), "end": np.array([r["end"] for r in rests])}
         columns |= {name: np.full(len(self.q), np.nan) for name in self.settings["columns"]}
         units = {f"q{i + 1}": self.robot.limits.unit(i) for i in range(self.robot.n)} | {"start": "s", "end": "s"}
-        write_table(place / POSES, columns, {"robot": self.robot.stated or self.robot.origin}, units=units, force=force)
+        write_table(
+            folder / POSES, columns, {"robot": self.robot.stated or self.robot.origin}, units=units, force=force
+        )
         stated = {
             "robot": self.robot.stated or self.robot.origin or self.robot.name,
             "criterion": self.criterion,
             "collisions": freedom_text(self.freedom),
             "tool_version": VERSION,
         }
-        write_trajectory(place / TRAJECTORY, self.motion, stated, kinds=self.robot.chain.kinds, force=force)
+        write_trajectory(folder / TRAJECTORY, self.motion, stated, kinds=self.robot.chain.kinds, force=force)
 
 
 def load_pose_design(folder: str | Path, robot: Robot | None = None) -> PoseDesign:
@@ -213,40 +220,41 @@ def load_pose_design(folder: str | Path, robot: Robot | None = None) -> PoseDesi
     from robots.geometry_errors.terms.base import shown_unit
     from robots.loading import load_robot
 
-    file = existing_file(Path(folder) / DESIGN)
-    try:
-        data = json.loads(file.read_text(encoding="utf-8"))
-        if data.get("format") != FORMAT:
-            raise InputError("is no design of poses", file=file)
-        known = robot or load_robot(data["robot"]["origin"], unlimited=True)
-        return PoseDesign(
-            robot=known,
-            criterion=data["criterion"],
-            q=np.array(data["poses"], dtype=float),
-            home=np.array(data["home"], dtype=float),
-            motion=read_trajectory(Path(folder) / TRAJECTORY)[0],
-            segments=tuple(data["segments"]),
-            parameters=tuple(
-                ErrorParameter(
-                    name=item["name"],
-                    kind=item["kind"],
-                    joint=item["joint"],
-                    unit=item["unit"],
-                    scale=item["scale"],
-                    shown=shown_unit(item["unit"]),
-                )
-                for item in data["parameters"]
-            ),
-            eigenvalues=np.array(data["eigenvalues"]),
-            random_eigenvalues=np.array(data["random_eigenvalues"]),
-            expected=np.array(
-                [np.nan if (e := item["expected_standard_error"]) is None else e for item in data["parameters"]]
-            ),
-            prediction=data["prediction"],
-            unit=data["unit"],
-            left_out=data["left_out"],
-            freedom=data["collision"],
-            settings=data["settings"],
-        )
-    except (OSError, UnicodeDecodeError, json.JSONDecodeError, KeyError, TypeError, AttributeError) as error:
-        raise InputError(f"is damaged ({type(error).__name__}: {error})", file=file) from error
+    file, remedy = Path(folder) / DESIGN, "give the folder written by `oed design --for calibration`"
+    data = read_json(file, PoseDesign.FORMAT, PoseDesign.FORMAT_VERSION, remedy=remedy)
+    parameters = read(list[_Parameter], data.get("parameters"), file=file, remedy=remedy)
+    origin = read(_Origin, data.get("robot"), file=file, remedy=remedy).origin
+    return PoseDesign.from_dict(
+        data,
+        file=file,
+        remedy=remedy,
+        robot=robot or load_robot(origin, unlimited=True),
+        motion=read_trajectory(Path(folder) / TRAJECTORY)[0],
+        parameters=tuple(
+            ErrorParameter(
+                name=item.name,
+                kind=item.kind,
+                joint=item.joint,
+                unit=item.unit,
+                scale=item.scale,
+                shown=shown_unit(item.unit),
+            )
+            for item in parameters
+        ),
+        expected=np.array([p.expected_standard_error for p in parameters]),
+    )
+
+
+@dataclass(frozen=True)
+class _Origin:
+    origin: str
+
+
+@dataclass(frozen=True)
+class _Parameter:
+    name: str
+    kind: str
+    joint: int | None
+    unit: str
+    scale: float
+    expected_standard_error: float

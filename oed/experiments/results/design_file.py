@@ -13,12 +13,13 @@ from oed.criteria import criterion as choose_criterion
 from oed.experiments.problems.essential import restricted
 from oed.experiments.quality import Quality, design_model
 from oed.experiments.results.outcome import Outcome
-from oed.experiments.safety_checks.margins import margin_from
 from oed.experiments.safety_checks.spatial_check import SpatialMargin
 from oed.exports import read_trajectory
 from robots.base_parameters import find_base_parameters
 from robots.common.errors import InputError
 from robots.common.files import existing_file
+from robots.common.records import read
+from robots.limits import Margin
 from robots.loading import load_robot
 from robots.robot import Robot
 from robots.terms.situations.flange_body import carrying, payload_part
@@ -51,11 +52,6 @@ def read_design(
             base = restricted(base, [i for i, name in enumerate(base.names) if name in data["model"]["columns"]])
         if list(base.names) != data["model"]["columns"]:
             raise InputError(f"the design is for {data['robot']['name']}, not for {known.name}", file=file)
-        qualities = tuple(
-            Quality(part=q["part"], samples=q["samples"], singular_values=tuple(q["singular_values_Y"]))
-            for q in data["quality"]
-        )
-        margins = tuple(margin_from(margin) for margin in data["smallest_margins"])
         motion = read_trajectory(Path(folder) / TRAJECTORY)[0]
         return {
             "robot": known,
@@ -63,14 +59,14 @@ def read_design(
             "criterion": choose_criterion(criterion or data["criterion"]),
             "motion": motion,
             "segments": tuple(data["segments"]),
-            "qualities": qualities,
-            "margins": margins,
-            "islands": tuple(Outcome.from_dict(island) for island in data["solver"]["islands"]),
+            "qualities": read(tuple[Quality, ...], data["quality"], file=file),
+            "margins": read(tuple[Margin, ...], data["smallest_margins"], file=file),
+            "islands": read(tuple[Outcome, ...], data["solver"]["islands"], file=file),
             "settings": settings,
             "coefficients": np.array((data.get("fourier") or data["excitation"])["coefficients"]),
             "home": np.array(data["home"]) if "home" in data else motion.q[0],
             "home_moved": data.get("home_moved", False),
-            "space": tuple(SpatialMargin(**margin) for margin in data.get("limits_in_space", ())),
+            "space": read(tuple[SpatialMargin, ...], data.get("limits_in_space", []), file=file),
             "freedom": data["collision"],
             "strokes_left_out": tuple(data["strokes_left_out"]),
         }

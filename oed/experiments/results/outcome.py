@@ -2,17 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import asdict, dataclass
-from typing import Any
+from dataclasses import dataclass
 
-import numpy as np
-
-from robots.common.plain import all_finite, number
+from robots.common.records import Record
 
 
 @dataclass(frozen=True, kw_only=True)
-class Outcome:
+class Outcome(Record):
     """How one independent search ended.
 
     Attributes:
@@ -32,16 +28,3 @@ class Outcome:
     evaluations: int
     status: str
     starts: tuple[tuple[float, float], ...] = ()
-
-    def to_dict(self) -> dict[str, Any]:
-        """Writes plain data; null where a point did not excite all parameters."""
-        data = {name: None if value != value else value for name, value in asdict(self).items()}
-        return data | {"starts": [all_finite(pair) for pair in self.starts]}
-
-    @classmethod
-    def from_dict(cls, data: Mapping[str, Any]) -> Outcome:
-        """Reads what `to_dict` wrote."""
-        values: dict[str, Any] = {name: np.nan if value is None else value for name, value in data.items()}
-        pairs = (map(number, pair) for pair in data.get("starts", ()))
-        values["starts"] = tuple((before, after) for before, after in pairs)
-        return cls(**values)

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -12,17 +11,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from oed.criteria import Criterion
-from oed.experiments.quality import Quality
-from oed.experiments.results.design_file import DESIGN, TRAJECTORY, read_design
+from oed.experiments.quality import Quality, excitation_findings
+from oed.experiments.results.design_file import TRAJECTORY, read_design
 from oed.experiments.results.outcome import Outcome
+from oed.experiments.results.planned import OF_ROBOT, Planned
 from oed.experiments.results.views import motion_frame, plot_velocities
-from oed.experiments.safety_checks.freedom import freedom_text, is_free
-from oed.experiments.safety_checks.margins import assumed_values, margin_data, measured_margins
+from oed.experiments.safety_checks.freedom import freedom_findings, freedom_text, is_free
+from oed.experiments.safety_checks.margins import assumption_findings, measured_margins
 from oed.experiments.safety_checks.spatial_check import SpatialMargin
 from oed.experiments.searches.search import INTERRUPTED
 from oed.exports import write_trajectory
 from robots.base_parameters import BaseParameters
-from robots.common.files import write_atomic
+from robots.common.records import Finding, findings_of
 from robots.limits import Margin
 from robots.plants import PlantEffect
 from robots.robot import Robot
@@ -37,7 +37,7 @@ Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, kw_only=True)
-class Design:
+class Design(Planned, format="robot-oed design", tool=True, shares=("limits=robot.limits",)):
     """An excitation experiment.
 
     Attributes:
@@ -58,6 +58,34 @@ class Design:
         strokes_left_out: joints without a stroke, for on it the arm would collide or break another limit in space.
     """
 
+    ENTRIES = (
+        *OF_ROBOT,
+        "assumed",
+        "model.columns=base.names",
+        "model.units=base.units",
+        "model.stands_for=base.formulas",
+        "model.terms=terms",
+        "model.scaling=scaling",
+        "model.coulomb=sign",
+        "criterion=criterion.name",
+        "criterion_label=criterion.label",
+        "quality=qualities",
+        "**excitation",
+        "segments",
+        "duration=motion.duration",
+        "period=robot.period",
+        "home",
+        "home_moved",
+        "limits_in_space=space",
+        "collision=freedom",
+        "strokes_left_out",
+        "smallest_margins=margins",
+        "solver.name=settings[solver][name]",
+        "solver.islands=islands",
+        "seed=settings[seed]",
+        "settings",
+    )
+
     robot: Robot
     base: BaseParameters
     criterion: Criterion
@@ -75,9 +103,34 @@ class Design:
     strokes_left_out: tuple[int, ...] = ()
 
     def __repr__(self) -> str:
-        cond = self.optimised.to_dict()["cond_Y"] if self.qualities else None
+        cond = self.optimised.cond if self.qualities else None
         worth = "not all parameters excited" if cond is None else f"cond(Y) {cond:.4g}"
         return f"Design({self.robot.name!r}, {self.motion.duration:.1f} s, {self.base.size} parameters, {worth})"
+
+    @property
+    def terms(self) -> list[str]:
+        """Names of the model's terms."""
+        return [term.name for term in self.base.model.terms]
+
+    @property
+    def scaling(self) -> str:
+        """How the columns of the regressor are scaled."""
+        return str(self.settings.get("scaling", "none"))
+
+    @property
+    def sign(self) -> str:
+        """The function of the velocity that stands for its sign in Coulomb friction."""
+        return f"tanh(dq / {self.settings['velocity_scale']:g})"
+
+    @property
+    def excitation(self) -> dict[str, Any]:
+        """The optimised part: under ``fourier`` a series, under ``excitation`` another family's motion."""
+        common = {"periods": self.settings["periods"], "coefficients": self.coefficients}
+        family = dict(self.settings.get("family") or {"name": "fourier"})
+        if family["name"] == "fourier":
+            frequency, harmonics = self.settings["base_frequency"], self.settings["harmonics"]
+            return {"fourier": {"base_frequency_hz": frequency, "harmonics": harmonics, **common}}
+        return {"excitation": {"family": family, **common}}
 
     @property
     def optimised(self) -> Quality:
@@ -109,7 +162,7 @@ class Design:
         """Whether all limits hold and all parameters are excited."""
         free = self.freedom is None or is_free(self.freedom)
         free = free and not any(margin.violated for margin in self.space)
-        return free and not self.violated and self.optimised.to_dict()["cond_Y"] is not None
+        return free and not self.violated and self.optimised.cond is not None
 
     @property
     def interrupted(self) -> bool:
@@ -133,6 +186,45 @@ class Design:
         """Computes all margins from the samples of the motion, independently of the solver."""
         return measured_margins(self.robot, self.motion, self.base, [e for e in self.effects if e.static])
 
+    @property
+    def conclusion(self) -> str:
+        """Whether to play the motion, and what it determines."""
+        codes = {finding.code for finding in self.remarks}
+        if "limit.exceeded" in codes:
+            return f"Do not play this motion: it exceeds the limit of {self.violated[0].text}."
+        if codes & {"collision.found", "collision.unchecked"}:
+            return f"Do not play this motion. {freedom_text(self.freedom)}"
+        if codes & {"excitation.incomplete", "excitation.weak"}:
+            return "Design the experiment again: this motion does not determine all parameters."
+        return (
+            f"Play trajectory.csv on the robot: in {self.motion.duration:.0f} s it determines all {self.base.size} "
+            f"base parameters within all limits. {freedom_text(self.freedom)}"
+        )
+
+    @property
+    def remarks(self) -> tuple[Finding, ...]:
+        """Limits that are exceeded, what is not determined, and what was assumed or not checked."""
+        robot = self.robot
+        found = [
+            Finding(
+                code="limit.exceeded",
+                subject=f"Joint {margin.joint}:",
+                text=f"the motion exceeds the limit of {margin.text}.",
+                action="Do not play it.",
+            )
+            for margin in self.violated
+        ]
+        found += excitation_findings(self.whole)
+        found += assumption_findings(robot)
+        if not any(margin.quantity == "torque" for margin in self.margins):
+            text = "Torque limits were not checked: the robot's description lacks nominal dynamics or torque limits."
+            found += findings_of("torque.unchecked", [text])
+        found += freedom_findings(self.freedom)
+        if self.strokes_left_out:
+            joints = ", ".join(str(joint) for joint in self.strokes_left_out)
+            found += findings_of("stroke.left_out", [f"No velocity stroke for joints {joints}: the arm would collide."])
+        return tuple(found)
+
     def summary(self) -> str:
         """Describes the experiment, its quality and its margins in a few lines."""
         lines = [
@@ -140,14 +232,13 @@ class Design:
             f"{len(self.motion)} samples at {1e3 * self.robot.period:g} ms",
         ]
         for quality in self.qualities:
-            values = quality.to_dict()
-            if values["cond_Y"] is None:
+            if quality.cond is None:
                 usual = " (normal)" if quality.part == "sinusoid" else ""
                 lines.append(f"  {quality.label:16} alone: not all parameters are determined{usual}")
             else:
                 lines.append(
-                    f"  {quality.label:16} cond(Y) {values['cond_Y']:.3g}, log det(Y'Y) {values['log_det_YtY']:.1f}, "
-                    f"smallest singular value {values['smallest_singular_value_Y']:.3g}"
+                    f"  {quality.label:16} cond(Y) {quality.cond:.3g}, log det(Y'Y) {quality.log_det:.1f}, "
+                    f"smallest singular value {quality.smallest:.3g}"
                 )
         finals = ", ".join(f"{island.initial:.4g} -> {island.final:.4g} ({island.status})" for island in self.islands)
         searches = "1 search" if len(self.islands) == 1 else f"{len(self.islands)} searches"
@@ -203,66 +294,10 @@ class Design:
         """
         return plot_velocities(self.motion, self.robot.limits, ax)
 
-    def to_dict(self) -> dict[str, Any]:
-        """Writes everything but the samples as plain data for `design.json`."""
-        model = self.base.model
-        return {
-            "format": "robot-oed design",
-            "format_version": 1,
-            "tool_version": VERSION,
-            "robot": {"name": self.robot.name, "origin": self.robot.origin, "sha256": self.robot.digest},
-            "assumed": assumed_values(self.robot),
-            "model": {
-                "columns": list(self.base.names),
-                "units": [column.unit for column in self.base.columns],
-                "stands_for": list(self.base.formulas()),
-                "terms": [term.name for term in model.terms],
-                "scaling": self.settings.get("scaling", "none"),
-                "coulomb": f"tanh(dq / {self.settings['velocity_scale']:g})",
-            },
-            "criterion": self.criterion.name,
-            "criterion_label": self.criterion.label,
-            "quality": [quality.to_dict() for quality in self.qualities],
-            **self._excitation(),
-            "segments": [dict(segment) for segment in self.segments],
-            "duration": self.motion.duration,
-            "period": self.robot.period,
-            "home": self.home.tolist(),
-            "home_moved": self.home_moved,
-            "limits_in_space": [asdict(margin) for margin in self.space],
-            "collision": None if self.freedom is None else dict(self.freedom),
-            "strokes_left_out": list(self.strokes_left_out),
-            "smallest_margins": [margin_data(margin, self.robot.limits) for margin in self.margins],
-            "solver": {
-                "name": self.settings["solver"]["name"],
-                "islands": [island.to_dict() for island in self.islands],
-            },
-            "seed": self.settings["seed"],
-            "settings": dict(self.settings),
-        }
-
-    def _excitation(self) -> dict[str, Any]:
-        """Writes the optimised part: under ``fourier`` a series, under ``excitation`` another family's motion."""
-        common = {"periods": self.settings["periods"], "coefficients": self.coefficients.tolist()}
-        family = dict(self.settings.get("family") or {"name": "fourier"})
-        if family["name"] == "fourier":
-            frequency, harmonics = self.settings["base_frequency"], self.settings["harmonics"]
-            return {"fourier": {"base_frequency_hz": frequency, "harmonics": harmonics, **common}}
-        return {"excitation": {"family": family, **common}}
-
-    def save(self, folder: str | Path, *, force: bool = False) -> None:
-        """Writes `trajectory.csv` and `design.json` into a folder that is there.
-
-        Args:
-            folder: an existing one.
-            force: replace files that are there.
-
-        Raises:
-            InputError: a file is there, and force is not given.
-        """
+    def _save_beside(self, folder: Path, *, force: bool) -> None:
+        """Writes `trajectory.csv`."""
         kinds = self.robot.chain.kinds
-        write_trajectory(Path(folder) / TRAJECTORY, self.motion, self.metadata(), kinds=kinds, force=force)
-        write_atomic(Path(folder) / DESIGN, json.dumps(self.to_dict(), indent=2, allow_nan=False) + "\n", force=force)
+        write_trajectory(folder / TRAJECTORY, self.motion, self.metadata(), kinds=kinds, force=force)
 
     @classmethod
     def load(cls, folder: str | Path, robot: Robot | None = None, criterion: str | Criterion | None = None) -> Design:

@@ -12,17 +12,19 @@ import numpy as np
 from numpy.typing import NDArray
 
 from oed.criteria import CRITERIA
-from oed.experiments.quality import Quality, design_model
+from oed.experiments.quality import Quality, design_model, excitation_findings
 from oed.experiments.results.design_file import DESIGN, TRAJECTORY
+from oed.experiments.results.planned import OF_ROBOT, Planned
 from oed.experiments.results.views import motion_frame, plot_velocities
-from oed.experiments.safety_checks.freedom import collides, freedom_text
-from oed.experiments.safety_checks.margins import assumed_values, margin_data, margin_from, measured_margins
+from oed.experiments.safety_checks.freedom import collides, freedom_findings, freedom_text, is_free
+from oed.experiments.safety_checks.margins import assumption_findings, measured_margins
 from oed.exports import read_trajectory, write_trajectory
 from oed.retiming import Retimed
 from robots.base_parameters import BaseParameters, find_base_parameters
 from robots.common.errors import InputError
-from robots.common.files import existing_file, write_atomic
-from robots.common.plain import all_finite, number
+from robots.common.files import existing_file
+from robots.common.plain import number
+from robots.common.records import Finding, Record, findings_of, read
 from robots.limits import Margin
 from robots.loading import load_robot
 from robots.robot import Robot
@@ -37,7 +39,7 @@ Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class TorqueUse:
+class TorqueUse(Record):
     """Motor torques of a timing, by the nominal model with friction.
 
     Attributes:
@@ -48,18 +50,9 @@ class TorqueUse:
     peak: Array
     rms: Array
 
-    def to_dict(self) -> dict[str, Any]:
-        """Writes both as plain lists."""
-        return {"peak": self.peak.tolist(), "rms": self.rms.tolist()}
-
-    @classmethod
-    def from_dict(cls, data: Mapping[str, Any] | None) -> TorqueUse | None:
-        """Reads what `to_dict` wrote; null is None."""
-        return None if data is None else cls(peak=np.array(data["peak"]), rms=np.array(data["rms"]))
-
 
 @dataclass(frozen=True, kw_only=True)
-class RetimedExperiment:
+class RetimedExperiment(Planned, format="robot-oed design", tool=True, shares=("limits=robot.limits",)):
     """A path with a new timing, and the information of both timings on the parameters.
 
     Attributes:
@@ -76,6 +69,36 @@ class RetimedExperiment:
         freedom: of collisions, as `collision_data` writes it; None where they were not checked.
     """
 
+    ENTRIES = (
+        *OF_ROBOT,
+        "assumed",
+        "model.columns=base.names",
+        "model.units=base.units",
+        "model.stands_for=base.formulas",
+        "model.scaling=scaling",
+        "criterion",
+        "criterion_label",
+        "quality=before,after",
+        "retiming.method=retimed.method",
+        "retiming.duration_before=retimed.duration_before",
+        "retiming.duration_after=retimed.duration_after",
+        "retiming.path_deviation=retimed.deviation",
+        "retiming.stops=retimed.stops",
+        "retiming.waypoints=retimed.waypoints",
+        "retiming.verdict=retimed.verdict",
+        "retiming.given_keeps_limits=retimed.given_keeps_limits",
+        "retiming.usage=retimed.usage",
+        "retiming.usage_before=retimed.usage_before",
+        "retiming.torque_before=torque_before",
+        "retiming.torque_after=torque_after",
+        "settings",
+        "collision=freedom",
+        "segments",
+        "duration=motion.duration",
+        "period=robot.period",
+        "smallest_margins=margins",
+    )
+
     robot: Robot
     base: BaseParameters
     criterion: str
@@ -88,6 +111,18 @@ class RetimedExperiment:
     settings: Mapping[str, Any]
     freedom: Mapping[str, Any] | None = None
 
+    scaling = "none"
+
+    @property
+    def criterion_label(self) -> str:
+        """The criterion's name for people."""
+        return CRITERIA[self.criterion]().label
+
+    @property
+    def segments(self) -> list[dict[str, Any]]:
+        """The only segment, as in a design file."""
+        return [{"kind": "move", "start": 0.0, "end": self.motion.duration, "joint": None}]
+
     @property
     def motion(self) -> Motion:
         """The new motion."""
@@ -98,11 +133,34 @@ class RetimedExperiment:
         """Whether all limits hold, and no collision was found."""
         return not any(margin.violated for margin in self.margins) and not collides(self.freedom)
 
+    @property
+    def conclusion(self) -> str:
+        """Whether to play the motion, and how fast it is."""
+        retimed = self.retimed
+        name, joint, share = retimed.peak
+        unsafe = not self.success or not is_free(self.freedom)
+        return (
+            f"{'Do not play this motion. ' if unsafe else ''}{retimed.method} runs the path in "
+            f"{retimed.duration_after:.1f} s instead of {retimed.duration_before:.1f} s, using {100 * share:.1f} % of "
+            f"the {name} limit of joint {joint}. {freedom_text(self.freedom)}"
+        )
+
+    @property
+    def remarks(self) -> tuple[Finding, ...]:
+        """What is not determined, limits that are exceeded, and what was assumed or not checked."""
+        text, action = "The new timing exceeds a limit.", "Do not play it."
+        return (
+            *excitation_findings(self.after),
+            *(() if self.success else (Finding(code="limit.exceeded", text=text, action=action),)),
+            *findings_of("timing.slower", [self.retimed.verdict()] if self.retimed.slower else []),
+            *freedom_findings(self.freedom),
+            *assumption_findings(self.robot),
+        )
+
     def summary(self) -> str:
         """Compares the experiment before and after retiming."""
-        label = CRITERIA[self.criterion]().label
         before, after = (_value(quality, self.criterion) for quality in (self.before, self.after))
-        lines = [self.retimed.summary(), f"  {label}: {before} before, {after} after"]
+        lines = [self.retimed.summary(), f"  {self.criterion_label}: {before} before, {after} after"]
         if self.torque_before is not None and self.torque_after is not None:
             for name in ("peak", "rms"):
                 values = (_list(getattr(use, name)) for use in (self.torque_before, self.torque_after))
@@ -133,63 +191,15 @@ class RetimedExperiment:
         """
         return plot_velocities(self.motion, self.robot.limits, ax)
 
-    def to_dict(self) -> dict[str, Any]:
-        """Writes everything but the samples as plain data for `design.json`."""
-        return {
-            "format": "robot-oed design",
-            "format_version": 1,
-            "tool_version": VERSION,
-            "robot": {"name": self.robot.name, "origin": self.robot.origin, "sha256": self.robot.digest},
-            "assumed": assumed_values(self.robot),
-            "model": {
-                "columns": list(self.base.names),
-                "units": [column.unit for column in self.base.columns],
-                "stands_for": list(self.base.formulas()),
-                "scaling": "none",
-            },
-            "criterion": self.criterion,
-            "criterion_label": CRITERIA[self.criterion]().label,
-            "quality": [self.before.to_dict(), self.after.to_dict()],
-            "retiming": {
-                "method": self.retimed.method,
-                "duration_before": self.retimed.duration_before,
-                "duration_after": self.retimed.duration_after,
-                "path_deviation": self.retimed.deviation,
-                "stops": self.retimed.stops,
-                "waypoints": self.retimed.waypoints,
-                "verdict": self.retimed.verdict(),
-                "given_keeps_limits": self.retimed.given_keeps_limits,
-                "usage": _usage_data(self.retimed.usage),
-                "usage_before": _usage_data(self.retimed.usage_before),
-                "torque_before": None if self.torque_before is None else self.torque_before.to_dict(),
-                "torque_after": None if self.torque_after is None else self.torque_after.to_dict(),
-            },
-            "settings": dict(self.settings),
-            "collision": None if self.freedom is None else dict(self.freedom),
-            "segments": [{"kind": "move", "start": 0.0, "end": self.motion.duration, "joint": None}],
-            "duration": self.motion.duration,
-            "period": self.robot.period,
-            "smallest_margins": [margin_data(margin, self.robot.limits) for margin in self.margins],
-        }
-
-    def save(self, folder: str | Path, *, force: bool = False) -> None:
-        """Writes `trajectory.csv` and `design.json` into a folder that is there.
-
-        Args:
-            folder: an existing one.
-            force: replace files that are there.
-
-        Raises:
-            InputError: a file is there, and force is not given.
-        """
+    def _save_beside(self, folder: Path, *, force: bool) -> None:
+        """Writes `trajectory.csv`."""
         metadata = {
             "robot": self.robot.origin or self.robot.name,
             "period": self.robot.period,
             "collisions": freedom_text(self.freedom),
             "tool": f"robot-oed {VERSION}",
         }
-        write_trajectory(Path(folder) / TRAJECTORY, self.motion, metadata, kinds=self.robot.chain.kinds, force=force)
-        write_atomic(Path(folder) / DESIGN, json.dumps(self.to_dict(), indent=2, allow_nan=False) + "\n", force=force)
+        write_trajectory(folder / TRAJECTORY, self.motion, metadata, kinds=self.robot.chain.kinds, force=force)
 
     @classmethod
     def load(cls, folder: str | Path, robot: Robot | None = None) -> RetimedExperiment:
@@ -209,10 +219,7 @@ class RetimedExperiment:
             base = find_base_parameters(design_model(known, data["settings"]))
             if list(base.names) != data["model"]["columns"]:
                 raise InputError(f"the experiment is for {data['robot']['name']}, not for {known.name}", file=file)
-            before, after = (
-                Quality(part=q["part"], samples=q["samples"], singular_values=tuple(q["singular_values_Y"]))
-                for q in data["quality"]
-            )
+            before, after = read(tuple[Quality, Quality], data["quality"], file=file)
             retiming = data["retiming"]
             usage = _usage(retiming["usage"])
             if usage is None:
@@ -234,9 +241,9 @@ class RetimedExperiment:
                     stops=retiming["stops"],
                     waypoints=retiming.get("waypoints", False),
                 ),
-                torque_before=TorqueUse.from_dict(retiming["torque_before"]),
-                torque_after=TorqueUse.from_dict(retiming["torque_after"]),
-                margins=tuple(margin_from(margin) for margin in data["smallest_margins"]),
+                torque_before=read(TorqueUse | None, retiming["torque_before"], file=file),
+                torque_after=read(TorqueUse | None, retiming["torque_after"], file=file),
+                margins=read(tuple[Margin, ...], data["smallest_margins"], file=file),
                 settings=data["settings"],
                 freedom=data["collision"],
             )
@@ -255,19 +262,11 @@ def torque_use(base: BaseParameters, motion: Motion) -> TorqueUse | None:
 
 
 def _value(quality: Quality, criterion: str) -> str:
-    known: Mapping[str, Any] = quality.to_dict()
-    return f"{quality.value(criterion):.4g}" if known["cond_Y"] is not None else "not all parameters excited"
+    return f"{quality.value(criterion):.4g}" if quality.full else "not all parameters excited"
 
 
 def _list(values: Array) -> str:
     return " ".join(f"{value:.4g}" for value in values)
-
-
-def _usage_data(usage: Mapping[str, Array] | None) -> dict[str, Any] | None:
-    """Plain lists; infinite use, of a limit of zero, is null."""
-    if usage is None:
-        return None
-    return {name: all_finite(values) for name, values in usage.items()}
 
 
 def _usage(data: Mapping[str, Any] | None) -> dict[str, Array] | None:

@@ -11,6 +11,7 @@ from oed.exports.trajectory_checks import FREE
 from robots.collision import CollisionModel, CollisionReport, Plane, check_motion
 from robots.collision.boxes import FLOOR
 from robots.common.errors import AssumedValueWarning, InfeasibleError
+from robots.common.records import Finding, findings_of
 from robots.signals import Motion
 
 UNCHECKED = "NOT CHECKED for collisions"
@@ -127,3 +128,17 @@ def freedom_text(freedom: Mapping[str, Any] | None) -> str:
 def _around(obstacles: Mapping[str, float | None]) -> str:
     names = [name if height is None else f"{name} at z = {height:.3g} m" for name, height in obstacles.items()]
     return "".join(f", {name}" for name in names) + ("" if FLOOR in obstacles else "; there is no floor")
+
+
+def freedom_findings(freedom: Mapping[str, Any] | None) -> tuple[Finding, ...]:
+    """Says what is not known of a motion's collisions, or what it collides with.
+
+    Args:
+        freedom: as `collision_data` writes it; None for a motion that was not checked.
+    """
+    text = freedom_text(freedom)
+    if freedom is None:
+        return (Finding(code="collision.unchecked", text=text, action="Leave out --no-collision."),)
+    if collides(freedom):
+        return (Finding(code="collision.found", text=text, action="Do not play it."),)
+    return () if is_free(freedom) else findings_of("collision.sampled", [text])

@@ -2,21 +2,25 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from typing import Any
+from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 
 from robots.base_parameters import BaseParameters
-from robots.common.plain import finite
-from robots.limits import Limits, Margin, symmetric_margins
+from robots.common.records import Finding, findings_of
+from robots.limits import ACCELERATION_PER_VELOCITY, JERK_PER_ACCELERATION, Limits, Margin, symmetric_margins
 from robots.plants import PlantEffect
 from robots.robot import Robot
 from robots.signals import Motion
 from robots.terms.effects import situation
 
 Array = NDArray[np.float64]
+
+_SUBSTITUTES = {
+    "acceleration": f"{ACCELERATION_PER_VELOCITY:g}/s times the velocity limit",
+    "jerk": f"{JERK_PER_ACCELERATION:g}/s times the acceleration limit",
+}
 
 
 def missing_limits(limits: Limits) -> dict[str, tuple[int, ...]]:
@@ -86,20 +90,16 @@ def _rms_margins(motion: Motion, tau: Array, limits: Limits) -> list[Margin]:
     ]
 
 
-def margin_data(margin: Margin, limits: Limits | None = None) -> dict[str, Any]:
-    """Writes a margin as plain data, with its unit if the limits are given; a limit that is not there is null."""
-    return {
-        "quantity": margin.quantity,
-        "joint": margin.joint,
-        **({} if limits is None else {"unit": limits.unit(margin.joint - 1, margin.quantity)}),
-        "value": margin.value,
-        "limit": finite(margin.limit),
-        "time": margin.time,
-        "slack_fraction": margin.slack_fraction,
-    }
+def assumption_findings(robot: Robot) -> tuple[Finding, ...]:
+    """Lists what a plan assumes of its robot.
 
-
-def margin_from(data: Mapping[str, Any]) -> Margin:
-    """Reads what `margin_data` wrote."""
-    known = {key: value for key, value in data.items() if key != "unit"}
-    return Margin(**{**known, "limit": np.inf if data["limit"] is None else data["limit"]})
+    Args:
+        robot: whose motions are planned.
+    """
+    values = [f"Assumed values without a source: {', '.join(robot.assumed)}."] if robot.assumed else []
+    limits = [
+        f"The robot's description states no {name} limit for joint {', '.join(map(str, joints))}; assumed: "
+        f"{_SUBSTITUTES[name]}."
+        for name, joints in missing_limits(robot.limits).items()
+    ]
+    return (*findings_of("value.assumed", values), *findings_of("limit.assumed", limits))

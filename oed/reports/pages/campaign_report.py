@@ -7,11 +7,8 @@ from itertools import groupby
 import numpy as np
 
 from oed.campaigns import Campaign, Slot, Stage
-from oed.experiments.safety_checks.freedom import collides, freedom_text
-from oed.reports.pages.motions.assumption_findings import assumption_findings
 from oed.reports.pictures.campaign_pictures import temperature_picture, velocity_picture
-from oed.reports.rendering.page import Cell, Fact, Finding, Page, Section, Table, findings_of
-from oed.reports.rendering.provenance import footer
+from oed.reports.rendering.page import Cell, Fact, Page, Section, Table, page_of, table_of
 from oed.reports.rendering.saving import save_page
 from robots.common.files import ResultFolder
 
@@ -24,13 +21,11 @@ def save_campaign_report(campaign: Campaign, folder: ResultFolder, *, png: bool 
 def campaign_page(campaign: Campaign) -> Page:
     """Builds the page: what runs when, how each stage moves, and how hot the robot is expected to get."""
     robot = campaign.robot
-    findings = _findings(campaign)
     temperature = _temperature_sections(campaign)
-    return Page(
+    return page_of(
+        campaign,
         title="Campaign",
         robot=robot.title or robot.name,
-        verdict=_verdict(campaign, findings),
-        findings=findings,
         facts=_facts(campaign),
         sections=(
             Section(
@@ -50,7 +45,6 @@ def campaign_page(campaign: Campaign) -> Page:
             *_friction_sections(campaign),
             Section(title="Timetable", tables=(_timetable(campaign.slots),), folded=True),
         ),
-        footer=footer(),
     )
 
 
@@ -71,50 +65,6 @@ def _facts(campaign: Campaign) -> tuple[Fact, ...]:
             )
         )
     return tuple(facts)
-
-
-def _verdict(campaign: Campaign, findings: tuple[Finding, ...]) -> str:
-    codes = {finding.code for finding in findings}
-    if "limit.exceeded" in codes:
-        return "Do not play this campaign: at least one stage exceeds a limit."
-    if "collision.found" in codes:
-        return "Do not play this campaign before its collisions are checked."
-    return (
-        f"Play {len(campaign.stages)} files in {campaign.cycles} cycles by the timetable below, "
-        f"{campaign.duration / 60:.1f} min in all."
-    )
-
-
-def _findings(campaign: Campaign) -> tuple[Finding, ...]:
-    found = [
-        Finding(
-            code="limit.exceeded",
-            subject=f"{stage.name}, joint {margin.joint}:",
-            text=f"the limit of {margin.quantity} is exceeded at {margin.time:.3f} s.",
-            action="Do not play it.",
-        )
-        for stage in campaign.stages
-        for margin in stage.margins
-        if margin.violated
-    ]
-    colliding = []
-    for stage in campaign.stages:
-        if collides(stage.freedom):
-            text = freedom_text(stage.freedom)
-            action = (
-                "Design it again with oed design, which avoids collisions."
-                if stage.kind == "excitation"
-                else "Check it first."
-            )
-            found.append(Finding(code="collision.found", subject=f"{stage.name}:", text=text, action=action))
-            colliding.append(stage.name)
-    if campaign.success:
-        text = "Every stage respects all limits, and starts and ends at rest in the home pose."
-        found += findings_of("done", [text])
-    # The notes say the same of collisions.
-    own = tuple(f"COLLISION in the {name} stage" for name in colliding)
-    notes = [note for note in campaign.notes if not (own and note.startswith(own))]
-    return (*found, *findings_of("experiment.note", notes), *assumption_findings(campaign.robot))
 
 
 def _phases(campaign: Campaign) -> Table:
@@ -166,19 +116,15 @@ def _cycle_table(campaign: Campaign) -> Table:
 
 
 def _timetable(slots: tuple[Slot, ...]) -> Table:
-    rows: tuple[tuple[Cell, ...], ...] = tuple(
-        (
-            f"{slot.start:.3f}",
-            f"{slot.end:.3f}",
-            slot.cycle,
-            slot.phase.replace("_", " "),
-            f"{slot.stage}.csv" if slot.stage else "rest",
-        )
-        for slot in slots
-    )
-    return Table(
-        headings=("start [s]", "end [s]", "cycle", "phase", "file"),
-        rows=rows,
+    return table_of(
+        slots,
+        {
+            "start [s]": lambda slot: f"{slot.start:.3f}",
+            "end [s]": lambda slot: f"{slot.end:.3f}",
+            "cycle": lambda slot: slot.cycle,
+            "phase": lambda slot: slot.phase.replace("_", " "),
+            "file": lambda slot: slot.file or "rest",
+        },
         caption="All times count from the start of the campaign.",
     )
 

@@ -2,32 +2,22 @@
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 from numpy.typing import NDArray
 
 from oed.experiments import Design
 from oed.experiments.quality import Quality
-from oed.experiments.safety_checks.freedom import freedom_text
 from oed.experiments.safety_checks.margins import nominal_torque
 from oed.reports.animations.building import animate
-from oed.reports.pages.motions.assumption_findings import assumption_findings
-from oed.reports.pages.motions.freedom_findings import freedom_findings
-from oed.reports.pages.motions.motion_report import animation_section, approach_text, tightest_fact
-from oed.reports.pictures.trajectory_pictures import margins_picture, spectrum_picture, trajectory_picture
-from oed.reports.rendering.page import Cell, Fact, Finding, Page, Section, Table, findings_of
-from oed.reports.rendering.provenance import footer
+from oed.reports.pages.motions.motion_report import animation_section, tightest_fact
+from oed.reports.pictures.trajectory_pictures import margins_picture, motion_picture, spectrum_picture
+from oed.reports.rendering.page import Cell, Fact, Page, Section, Table, page_of
 from oed.reports.rendering.saving import save_page
-from oed.reports.rendering.significant import significant
 from robots.collision import Surroundings
 from robots.common.files import ResultFolder
 from robots.limits import Margin
 
 Array = NDArray[np.float64]
-
-NOISE = 0.02
-"""Torque noise over the torque: what models of robots commonly leave."""
 
 
 def save_design_report(design: Design, folder: ResultFolder, *, png: bool = False) -> None:
@@ -38,12 +28,10 @@ def save_design_report(design: Design, folder: ResultFolder, *, png: bool = Fals
 def design_page(design: Design) -> Page:
     """Builds the page: what the experiment is worth, how it moves, how far it stays from the limits."""
     robot, motion = design.robot, design.motion
-    findings = _findings(design)
-    return Page(
+    return page_of(
+        design,
         title="Excitation experiment",
         robot=robot.title or robot.name,
-        verdict=_verdict(design, findings),
-        findings=findings,
         facts=_facts(design),
         sections=(
             _home_section(design),
@@ -56,18 +44,7 @@ def design_page(design: Design) -> Page:
                         "between."
                     ),
                 ),
-                pictures=(
-                    trajectory_picture(
-                        motion.t,
-                        motion.q,
-                        motion.dq,
-                        motion.ddq,
-                        limits=robot.limits,
-                        joint_names=robot.joint_names,
-                        kinds=robot.chain.kinds,
-                        segments=design.segments,
-                    ),
-                ),
+                pictures=(motion_picture(robot, motion, segments=design.segments),),
                 tables=(_segments(design),),
             ),
             _animation(design),
@@ -76,7 +53,7 @@ def design_page(design: Design) -> Page:
             Section(title="Search", paragraphs=(_search_text(design),), tables=(_islands(design),)),
             parameters_section(design.base.names, design.base.formulas()),
         ),
-        footer=footer(design.settings["seed"]),
+        seed=design.settings["seed"],
     )
 
 
@@ -123,17 +100,9 @@ def quality_section(qualities: tuple[Quality, ...]) -> Section:
     """Shows the information of each part on the parameters."""
     rows = []
     for quality in qualities:
-        data = quality.to_dict()
-        rows.append(
-            (
-                quality.label,
-                quality.samples,
-                data["cond_Y"],
-                None if data["cond_Y"] is None else data["cond_Y"] ** 2,
-                data["log_det_YtY"],
-                data["smallest_singular_value_Y"],
-            )
-        )
+        cond = quality.cond
+        squared = None if cond is None else cond**2
+        rows.append((quality.label, quality.samples, cond, squared, quality.log_det, quality.smallest))
     table = Table(
         headings=("part", "samples", "cond(Y)", "cond(Y'Y)", "log det(Y'Y)", "smallest singular value of Y"),
         rows=tuple(rows),
@@ -188,99 +157,18 @@ def parameters_section(names: tuple[str, ...], formulas: tuple[str, ...]) -> Sec
 
 
 def _facts(design: Design) -> tuple[Fact, ...]:
-    fourier, whole = design.optimised.to_dict(), design.whole.to_dict()
     value = design.optimised.value(design.criterion)
     tightest = min((m for m in design.margins if np.isfinite(m.limit)), key=lambda m: m.slack_fraction, default=None)
     facts = [
         Fact(label=f"Criterion {design.criterion.label}", value=value, note="of the optimised motion"),
-        Fact(label="cond(Y), optimised motion", value=fourier["cond_Y"]),
-        Fact(label="cond(Y), whole experiment", value=whole["cond_Y"]),
+        Fact(label="cond(Y), optimised motion", value=design.optimised.cond),
+        Fact(label="cond(Y), whole experiment", value=design.whole.cond),
         Fact(label="Parameters", value=design.base.size),
         Fact(label="Duration", value=f"{design.motion.duration:.1f} s"),
     ]
     if tightest is not None:
         facts.append(tightest_fact(tightest))
     return tuple(facts)
-
-
-def _verdict(design: Design, findings: tuple[Finding, ...]) -> str:
-    codes = {finding.code for finding in findings}
-    if "limit.exceeded" in codes:
-        return f"Do not play this motion: it exceeds the limit of {approach_text(design.violated[0])}."
-    if codes & {"collision.found", "collision.unchecked"}:
-        return f"Do not play this motion. {freedom_text(design.freedom)}"
-    if codes & {"excitation.incomplete", "excitation.weak"}:
-        return "Design the experiment again: this motion does not determine all parameters."
-    return (
-        f"Play trajectory.csv on the robot: in {design.motion.duration:.0f} s it determines all {design.base.size} "
-        f"base parameters within all limits. {freedom_text(design.freedom)}"
-    )
-
-
-def _findings(design: Design) -> tuple[Finding, ...]:
-    robot = design.robot
-    found = [
-        Finding(
-            code="limit.exceeded",
-            subject=f"Joint {margin.joint}:",
-            text=f"the motion exceeds the limit of {approach_text(margin)}.",
-            action="Do not play it.",
-        )
-        for margin in design.violated
-    ]
-    found += excitation_findings(design.whole)
-    found += assumption_findings(robot)
-    if not any(margin.quantity == "torque" for margin in design.margins):
-        text = "Torque limits were not checked: the robot's description lacks nominal dynamics or torque limits."
-        found += findings_of("torque.unchecked", [text])
-    found += freedom_findings(design.freedom)
-    if design.strokes_left_out:
-        joints = ", ".join(str(joint) for joint in design.strokes_left_out)
-        found += findings_of("stroke.left_out", [f"No velocity stroke for joints {joints}: the arm would collide."])
-    return tuple(found)
-
-
-def excitation_findings(quality: Quality) -> tuple[Finding, ...]:
-    """Says whether a motion determines all parameters, and whether noise leaves one of them open.
-
-    With torque noise of `NOISE` of the torque, the standard error of the worst-determined direction is about
-    NOISE cond(Y) / sqrt(N) of the parameters' size. Above 1 that direction is not determined.
-
-    Args:
-        quality: of the whole motion.
-    """
-    cond = quality.to_dict()["cond_Y"]
-    code = excitation_code(cond, quality.samples)
-    if not code:
-        return ()
-    action = "Give the motion more room or time: --velocity-fraction, --periods or --effort thorough."
-    if cond is None:
-        text = "The motion does not excite all parameters: the regressor lacks rank."
-        return (Finding(code=code, text=text, action=action),)
-    error = _worst_error(cond, quality.samples)
-    text = (
-        f"At least one combination of parameters is not determined: cond(Y) is {significant(cond, digits=2)}. With "
-        f"torque noise of {100 * NOISE:g} %, its standard error is about {significant(error, digits=2)} times the "
-        "parameters' size."
-    )
-    return (Finding(code=code, text=text, action=action),)
-
-
-def excitation_code(cond: float | None, samples: int) -> str:
-    """Gives the code of a finding about the excitation; empty if the motion determines all parameters.
-
-    Args:
-        cond: condition number of the regressor; None if it lacks rank.
-        samples: number of its samples.
-    """
-    if cond is None:
-        return "excitation.incomplete"
-    return "excitation.weak" if _worst_error(cond, samples) > 1.0 else ""
-
-
-def _worst_error(cond: float, samples: int) -> float:
-    """Standard error of the worst-determined direction over the parameters' size, see `excitation_findings`."""
-    return NOISE * cond / math.sqrt(samples)
 
 
 def _segments(design: Design) -> Table:

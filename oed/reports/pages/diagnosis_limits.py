@@ -7,11 +7,12 @@ from collections.abc import Sequence
 import numpy as np
 
 from estimation.diagnosis.experiment_plans.detection_limits import Limit
-from oed.reports.pages.design_report import NOISE
-from oed.reports.rendering.page import Cell, Fact, Page, Section, Table, findings_of
+from oed.experiments.quality import NOISE
+from oed.reports.rendering.page import Cell, Fact, Page, Section, Table
 from oed.reports.rendering.provenance import footer
 from oed.reports.rendering.saving import save_page
 from robots.common.files import ResultFolder
+from robots.common.records import findings_of
 from robots.terms.effects import EFFECTS
 
 CLEAR = NOISE

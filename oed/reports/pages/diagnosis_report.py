@@ -2,31 +2,31 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from estimation.diagnosis.calibration import CLOSE_RIVAL_BIC
+from estimation.diagnosis.results.actions import close_causes
 from estimation.diagnosis.results.diagnosis import Diagnosis
 from estimation.uncertainty.quantiles import NORMAL_95
 from oed.reports.animations.animation import Animation
-from oed.reports.pages.diagnosis_actions import findings_in, verdict_of
+from oed.reports.pages.diagnosis_evidence import evidence_of
 from oed.reports.pages.diagnosis_limits import limits_section
 from oed.reports.pages.diagnosis_simulation import simulation_section
-from oed.reports.pages.diagnosis_view import DiagnosisView, view_of
 from oed.reports.pages.motions.diagnosis_motion import diagnosis_animation
 from oed.reports.pages.motions.motion_report import animation_section
 from oed.reports.pictures.diagnosis_pictures import cause_picture, gain_picture
 from oed.reports.pictures.torque_pictures import torque_picture
-from oed.reports.rendering.joint_units import joint_titles, joint_units
-from oed.reports.rendering.page import Cell, Fact, Page, Section, Table
+from oed.reports.rendering.joint_units import joint_titles
+from oed.reports.rendering.page import Cell, Fact, Page, Section, Table, page_of
 from oed.reports.rendering.picture import Picture
-from oed.reports.rendering.provenance import footer
+from oed.reports.rendering.provenance import recordings_of
 from oed.reports.rendering.saving import save_page
-from oed.reports.rendering.significant import significant
 from robots.common.files import ResultFolder
-from robots.common.plain import percent, two_digits
+from robots.common.plain import percent, significant, two_digits
 from robots.signals import Log
 
 Array = NDArray[np.float64]
@@ -47,43 +47,41 @@ def save_diagnosis_report(
         png: whether to write the pictures.
     """
     animation = None if log is None else diagnosis_animation(diagnosis, log)
-    save_page(diagnosis_page(view_of(diagnosis), animation), folder, png=png)
+    save_page(diagnosis_page(diagnosis, animation), folder, png=png)
 
 
-def diagnosis_page(view: DiagnosisView, animation: Animation | None = None) -> Page:
+def diagnosis_page(diagnosis: Diagnosis, animation: Animation | None = None) -> Page:
     """Builds the page: findings with their evidence, gain of the extended model, detection limits, next step.
 
     Args:
-        view: the diagnosis.
+        diagnosis: just made; one that was loaded from a file has no curves.
         animation: the robot in 3-D with the joints marked that have a finding.
     """
-    sections = [_torque(view)]
+    robot = diagnosis.model.robot
+    sections = [_torque(diagnosis)]
     if animation is not None:
         sections.append(animation_section(animation))
-    sections += [_finding(view, index) for index in range(len(view.findings))]
-    if view.simulation is not None:
-        sections.append(simulation_section(view.simulation, view.joint_names, view.kinds))
-    if view.unexplained:
-        sections.append(Section(title="Unexplained residual", paragraphs=view.unexplained))
-    sections.append(_next(view))
-    sections.append(limits_section(view.limits, folded=bool(view.findings)))
-    return Page(
+    sections += [_finding(diagnosis, index) for index in range(len(diagnosis.findings))]
+    if diagnosis.simulation is not None:
+        sections.append(simulation_section(diagnosis.simulation, robot.joint_names, robot.chain.kinds))
+    sections.append(_next(diagnosis))
+    sections.append(limits_section(diagnosis.limits, folded=bool(diagnosis.findings)))
+    return page_of(
+        diagnosis,
         title="Diagnosis",
-        robot=view.robot,
-        verdict=verdict_of(view),
-        logs=view.logs,
-        findings=findings_in(view),
-        facts=_facts(view),
-        sections=tuple(sections),
-        footer=footer(view.seed),
+        robot=robot.title or robot.name,
+        logs=recordings_of(diagnosis.model.provenance.get("logs", ())),
+        facts=_facts(diagnosis),
+        sections=sections,
+        seed=diagnosis.model.provenance.get("seed"),
     )
 
 
-def _facts(view: DiagnosisView) -> tuple[Fact, ...]:
-    facts = [Fact(label="Effects found", value=len(view.findings))]
-    if np.isfinite(view.nrmse_before).any():
-        change = np.nan_to_num(view.nrmse_before - view.nrmse_after)
-        own = {finding.joint for finding in view.findings}
+def _facts(diagnosis: Diagnosis) -> tuple[Fact, ...]:
+    facts = [Fact(label="Effects found", value=len(diagnosis.findings))]
+    if np.isfinite(diagnosis.baseline).any():
+        change = np.nan_to_num(diagnosis.baseline - diagnosis.extended)
+        own = {finding.joint for finding in diagnosis.findings}
         if own and None not in own:
             # Only joints with a finding: on other joints the change comes from the base model.
             change[[j for j in range(len(change)) if j + 1 not in own]] = -np.inf
@@ -91,18 +89,18 @@ def _facts(view: DiagnosisView) -> tuple[Fact, ...]:
         facts += [
             Fact(
                 label=f"Error of joint {worst + 1}, held-out data",
-                value=f"{two_digits(100 * view.nrmse_before[worst])} → {percent(view.nrmse_after[worst])}",
+                value=f"{two_digits(100 * diagnosis.baseline[worst])} → {percent(diagnosis.extended[worst])}",
                 note="of its torque RMS, base model → extended model",
-                status="good" if view.nrmse_after[worst] < view.nrmse_before[worst] else "neutral",
+                status="good" if diagnosis.extended[worst] < diagnosis.baseline[worst] else "neutral",
             ),
             Fact(
                 label="Error of all joints, held-out data",
-                value=f"{two_digits(100 * _pooled(view.nrmse_before))} → {percent(_pooled(view.nrmse_after))}",
+                value=f"{two_digits(100 * _pooled(diagnosis.baseline))} → {percent(_pooled(diagnosis.extended))}",
                 note="root mean square over joints",
             ),
         ]
-    if view.findings:
-        chance = max(finding.p_value for finding in view.findings)
+    if diagnosis.findings:
+        chance = max(finding.p_value for finding in diagnosis.findings)
         facts.append(
             Fact(label="False-alarm probability", value=_chance(chance, 100.0) + " %", note="of the weakest finding")
         )
@@ -119,27 +117,29 @@ def _pooled(values: Array) -> float:
     return float(np.sqrt(np.mean(known**2))) if len(known) else float("nan")
 
 
-def _torque(view: DiagnosisView) -> Section:
-    known = np.isfinite(view.nrmse_before).any()
+def _torque(diagnosis: Diagnosis) -> Section:
+    robot, trace = diagnosis.model.robot, diagnosis.trace
+    assert trace is not None
+    known = np.isfinite(diagnosis.baseline).any()
     pictures: list[Picture] = []
     if known:
-        pictures.append(gain_picture(view.nrmse_before, view.nrmse_after, joint_names=view.joint_names))
+        pictures.append(gain_picture(diagnosis.baseline, diagnosis.extended, joint_names=robot.joint_names))
     pictures.append(
         torque_picture(
-            view.t,
-            view.measured,
-            view.extended,
-            joint_names=view.joint_names,
-            kinds=view.kinds,
+            trace.t,
+            trace.measured,
+            trace.measured - trace.after,
+            joint_names=robot.joint_names,
+            kinds=robot.chain.kinds,
             why_gaps="in rows that do not count for a joint: it rests or reverses there, and its friction is not known",
         )
     )
-    titles = joint_titles(view.joint_names, len(view.joint_names))
+    titles = joint_titles(robot.joint_names, robot.n)
     rows: list[tuple[Cell, ...]] = []
     for j, title in enumerate(titles):
         old, new, every = (
             None if not np.isfinite(e[j]) else 100 * float(e[j])
-            for e in (view.nrmse_before, view.nrmse_after, view.nrmse_every)
+            for e in (diagnosis.baseline, diagnosis.extended, diagnosis.every_row)
         )
         gain = None if old is None or new is None or not old else 100 * (1 - new / old)
         rows.append((title, old, new, gain, every))
@@ -154,18 +154,19 @@ def _torque(view: DiagnosisView) -> Section:
     )
     return Section(
         title="Measured and simulated torque",
-        paragraphs=(f"Measured torque, and torque of the extended model, on {view.unseen}.",),
+        paragraphs=(f"Measured torque, and torque of the extended model, on {diagnosis.how_unseen}.",),
         pictures=tuple(pictures),
         tables=(table,) if known else (),
     )
 
 
-def _finding(view: DiagnosisView, index: int) -> Section:
-    finding = view.findings[index]
+def _finding(diagnosis: Diagnosis, index: int) -> Section:
+    finding = diagnosis.findings[index]
     place = "the whole robot" if finding.joint is None else f"joint {finding.joint}"
-    unit = finding.unit or joint_units(view.kinds, len(view.kinds))[finding.shown_on - 1].torque
+    shown, gain = evidence_of(diagnosis, index), finding.gain
     values: list[tuple[Cell, ...]] = []
-    for name, value, unit_of, lower, upper in finding.parameters:
+    for parameter in finding.parameters:
+        value, (lower, upper) = parameter.value, parameter.ci95
         error = (upper - lower) / (2 * NORMAL_95)
         if not np.isfinite(error):
             interval = "not determined by these logs"
@@ -173,7 +174,7 @@ def _finding(view: DiagnosisView, index: int) -> Section:
             interval = "chosen from a list of usual values"
         else:
             interval = f"{significant(lower, error)} to {significant(upper, error)}"
-        values.append((name.replace("_", " "), significant(value, error), unit_of, interval))
+        values.append((parameter.name.replace("_", " "), significant(value, error), parameter.unit, interval))
     tables = [
         Table(
             headings=("parameter", "value", "unit", "95 % interval"),
@@ -185,38 +186,37 @@ def _finding(view: DiagnosisView, index: int) -> Section:
         ("probability of this pattern under noise alone (p-value)", _chance(finding.p_value)),
         ("BIC gain over the model without it", significant(finding.delta_bic, digits=3)),
     ]
-    if np.isfinite(finding.before):
+    if np.isfinite(gain.nrmse_before):
         evidence.append(
             (
                 f"error{finding.elsewhere} on held-out data",
-                f"{100 * finding.before:.3g} → {100 * finding.after:.3g} % of the {finding.of} RMS",
+                f"{100 * gain.nrmse_before:.3g} → {100 * gain.nrmse_after:.3g} % of the {shown.of} RMS",
             )
         )
-    if np.isfinite(finding.interval).all():
-        low, high = finding.interval
+    if np.isfinite(gain.ci95).all():
+        low, high = gain.ci95
         evidence.append(("error reduction, 95 % interval", f"{100 * low:.2g} to {100 * high:.2g} percentage points"))
     tables.append(Table(headings=("evidence", "value"), rows=tuple(evidence)))
     if finding.rivals:
         tables.append(
             Table(
                 headings=("alternative effect", "BIC difference"),
-                rows=tuple((title, round(margin, 1)) for title, margin in finding.rivals),
+                rows=tuple((name.replace("_", " "), round(margin, 1)) for name, margin in finding.rivals),
                 caption=f"Below {CLOSE_RIVAL_BIC:g} an alternative remains possible"
-                f"{'' if finding.rivals[0][1] < CLOSE_RIVAL_BIC else ': none does'}.",
+                f"{'' if close_causes(finding) else ': none does'}.",
             )
         )
     picture = cause_picture(
-        finding.label,
-        finding.coordinate,
-        finding.residual_before,
-        finding.residual_after,
-        title=f"Residual {finding.of} of joint {finding.shown_on}",
-        unit=unit,
+        shown.label,
+        shown.coordinate,
+        shown.before,
+        shown.after,
+        title=f"Residual {shown.of} of joint {shown.joint}",
+        unit=shown.unit,
         name=f"cause-{index + 1}",
     )
     return Section(
         title=f"Finding {index + 1}: {finding.title}, {place}",
-        paragraphs=(finding.sentence,),
         pictures=(picture,),
         tables=tuple(tables),
     )
@@ -238,14 +238,16 @@ _NO_EXPERIMENT = {
 }
 
 
-def _next(view: DiagnosisView) -> Section:
-    if not view.next_kind:
-        rare = [title for finding in view.findings for title, worse in finding.rivals if worse < CLOSE_RIVAL_BIC]
-        text = _UNLESS.format(", ".join(rare)) if view.verdict == "named" and rare else _NO_EXPERIMENT[view.verdict]
-        return Section(title="Next step", paragraphs=(f"{text}{_rough(view)}",))
-    paragraphs = [f"Record {view.next_kind}: {view.next_why}." if view.next_why else f"Record {view.next_kind}."]
+def _next(diagnosis: Diagnosis) -> Section:
+    following = diagnosis.next_experiment
+    if following is None:
+        rare = [name for finding in diagnosis.findings for name in close_causes(finding)]
+        named = diagnosis.verdict == "named"
+        text = _UNLESS.format(", ".join(rare)) if named and rare else _NO_EXPERIMENT[diagnosis.verdict]
+        return Section(title="Next step", paragraphs=(f"{text}{_rough(diagnosis)}",))
+    paragraphs = [f"Record {following.words}: {following.why}." if following.why else f"Record {following.words}."]
     rows: Sequence[tuple[Cell, ...]] = tuple(
-        (kind, round(100 * chance), round(duration)) for kind, chance, duration in view.next_ranking
+        (one.words, round(100 * one.resolves), round(one.duration)) for one in following.ranking
     )
     tables = (
         (
@@ -258,29 +260,29 @@ def _next(view: DiagnosisView) -> Section:
         if rows
         else ()
     )
-    if view.next_logged:
+    if following.logged:
         paragraphs.append(
-            f"The motion is that of {view.next_logged}. If that log starts or ends in motion, run its original "
+            f"The motion is that of {following.logged}. If that log starts or ends in motion, run its original "
             f"program instead."
         )
-    return Section(title="Next step", paragraphs=tuple(paragraphs), tables=(*tables, *_runs(view)))
+    return Section(title="Next step", paragraphs=tuple(paragraphs), tables=(*tables, *_runs(following.runs)))
 
 
-def _rough(view: DiagnosisView) -> str:
+def _rough(diagnosis: Diagnosis) -> str:
     """Names parameters that longer logs would determine better."""
     rough = [
-        f"{', '.join(name.replace('_', ' ') for name in finding.rough)} of {finding.title}"
-        for finding in view.findings
-        if finding.rough
+        f"{', '.join(p.name.replace('_', ' ') for p in finding.parameters if not p.determined)} of {finding.title}"
+        for finding in diagnosis.findings
+        if not all(p.determined for p in finding.parameters)
     ]
-    if view.verdict != "named" or not rough:
+    if diagnosis.verdict != "named" or not rough:
         return ""
     return f" Not well determined: {'; '.join(rough)}. More logs of this kind would improve them."
 
 
-def _runs(view: DiagnosisView) -> tuple[Table, ...]:
+def _runs(runs: Sequence[Mapping[str, Any]]) -> tuple[Table, ...]:
     """The motions to play, in order."""
-    if not view.next_runs:
+    if not runs:
         return ()
     rows: list[tuple[Cell, ...]] = [
         (
@@ -289,7 +291,7 @@ def _runs(view: DiagnosisView) -> tuple[Table, ...]:
             run["payload_kg"] or None,
             "unchanged" if run["gravity"] is None else ", ".join(f"{g:.4g}" for g in run["gravity"]),
         )
-        for run in view.next_runs
+        for run in runs
     ]
     return (
         Table(

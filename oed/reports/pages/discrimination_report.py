@@ -3,18 +3,12 @@
 from __future__ import annotations
 
 from oed.campaigns.discriminations.discrimination import Discrimination
-from oed.experiments.safety_checks.freedom import freedom_text, is_free
 from oed.reports.pages.design_report import margins_section
-from oed.reports.pages.motions.freedom_findings import freedom_findings
-from oed.reports.pictures.trajectory_pictures import trajectory_picture
-from oed.reports.rendering.page import Fact, Page, Section, Table, findings_of
-from oed.reports.rendering.provenance import footer
+from oed.reports.pictures.trajectory_pictures import motion_picture
+from oed.reports.rendering.page import Fact, Page, Section, Table, page_of
 from oed.reports.rendering.saving import save_page
 from robots.common.files import ResultFolder
 from robots.terms.effects import EFFECTS, EXPERIMENTS
-
-DECISIVE = 0.95
-"""Chance from which an experiment counts as sure."""
 
 
 def save_discrimination_report(result: Discrimination, folder: ResultFolder, *, png: bool = False) -> None:
@@ -46,16 +40,10 @@ def discrimination_page(result: Discrimination) -> Page:
         )
         for judged in result.ranking
     )
-    warning = "" if is_free(result.freedom) else "Do not play these motions. "
-    return Page(
+    return page_of(
+        result,
         title="Experiment to distinguish two causes",
         robot=robot.title or robot.name,
-        verdict=f"{warning}{result.why}. {freedom_text(result.freedom)}",
-        findings=(
-            *freedom_findings(result.freedom),
-            *findings_of("experiment.note", result.warnings),
-            *findings_of("experiment.unsure", _unsure(result)),
-        ),
         facts=(
             Fact(label="Probability of the right decision", value=f"{100 * result.resolves:.0f} %"),
             Fact(label="With the reference motion alone", value=f"{100 * result.alone:.0f} %"),
@@ -101,25 +89,11 @@ def discrimination_page(result: Discrimination) -> Page:
             Section(
                 title="Motion",
                 pictures=(
-                    trajectory_picture(
-                        run.motion.t,
-                        run.motion.q,
-                        run.motion.dq,
-                        run.motion.ddq,
-                        limits=robot.limits,
-                        joint_names=robot.joint_names,
-                        kinds=robot.chain.kinds,
-                        segments=[{**entry, "kind": entry["part"]} for entry in run.table()],
+                    motion_picture(
+                        robot, run.motion, segments=[{**entry, "kind": entry["part"]} for entry in run.table()]
                     ),
                 ),
             ),
             margins_section(run.margins, robot.joint_names),
         ),
-        footer=footer(),
     )
-
-
-def _unsure(result: Discrimination) -> tuple[str, ...]:
-    if result.resolves >= DECISIVE:
-        return ()
-    return (f"The experiment gives the right decision with {100 * result.resolves:.0f} % probability only.",)

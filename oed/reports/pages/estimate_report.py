@@ -7,15 +7,14 @@ from numpy.typing import NDArray
 
 from estimation.identifications.estimate import Estimate
 from estimation.predictions.method_table import MethodTable
-from oed.reports.pages.estimates.estimate_findings import findings_in, verdict_of
 from oed.reports.pictures.parameter_pictures import error_bars_picture, friction_picture, parameter_picture
 from oed.reports.pictures.torque_pictures import residual_picture, torque_picture
-from oed.reports.rendering.page import Cell, Fact, Page, Section, Table
+from oed.reports.rendering.page import Cell, Fact, Page, Section, Table, page_of
 from oed.reports.rendering.picture import Picture
-from oed.reports.rendering.provenance import footer, recordings_of
+from oed.reports.rendering.provenance import recordings_of
 from oed.reports.rendering.saving import save_page
-from oed.reports.rendering.significant import significant, significant_error
 from robots.common.files import ResultFolder
+from robots.common.plain import significant, significant_error
 
 Array = NDArray[np.float64]
 
@@ -92,14 +91,11 @@ def estimate_page(estimate: Estimate, methods: MethodTable | None = None) -> Pag
     ]
     if methods is not None:
         sections.insert(1, Section(title="Estimators", tables=(_methods(methods),)))
-    if any(gate.findings for gate in estimate.gates):
-        sections.insert(len(sections) - 1, Section(title="The logs", tables=(_gates(estimate),)))
-    return Page(
+    return page_of(
+        estimate,
         title="Identified dynamics",
         robot=robot.title or robot.name,
-        verdict=verdict_of(estimate),
         logs=recordings_of(model.provenance["logs"]),
-        findings=findings_in(estimate),
         facts=(
             Fact(label="Parameters determined", value=f"{known} of {len(model.names)}"),
             Fact(label="Worst joint, held-out data", value=f"{100 * max(joint.nrmse for joint in joints):.1f} %"),
@@ -110,8 +106,8 @@ def estimate_page(estimate: Estimate, methods: MethodTable | None = None) -> Pag
                 note="the standard errors are this many times those of white noise",
             ),
         ),
-        sections=tuple(sections),
-        footer=footer(model.provenance.get("seed")),
+        sections=sections,
+        seed=model.provenance.get("seed"),
     )
 
 
@@ -227,12 +223,6 @@ def _methods(methods: MethodTable) -> Table:
             "best estimator."
         ),
     )
-
-
-def _gates(estimate: Estimate) -> Table:
-    rows = tuple((gate.log, finding.severity, str(finding)) for gate in estimate.gates for finding in gate.findings)
-    caption = "Result of the data checks before the fit, and the action taken."
-    return Table(headings=("log", "severity", "finding"), rows=rows, caption=caption)
 
 
 def _parameter_pictures(estimate: Estimate) -> tuple[Picture, ...]:

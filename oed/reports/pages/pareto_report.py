@@ -2,17 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from itertools import combinations
 
 import numpy as np
 from numpy.typing import NDArray
 
 from oed.experiments import ParetoFront
-from oed.reports.pages.design_report import excitation_findings
-from oed.reports.rendering.page import Fact, Finding, Page, Section, Table
+from oed.reports.rendering.page import Fact, Page, Section, Table, page_of
 from oed.reports.rendering.picture import Panel, Picture, Series
-from oed.reports.rendering.provenance import footer
 from oed.reports.rendering.saving import save_page
 from robots.common.files import ResultFolder
 
@@ -28,7 +25,6 @@ def save_pareto_report(front: ParetoFront, folder: ResultFolder, *, png: bool = 
 def pareto_page(front: ParetoFront) -> Page:
     """Builds the page: the front as a picture and a table."""
     robot = front.designs[0].robot
-    efficient = int(front.efficient.sum())
     names = [criterion.name for criterion in front.criteria]
     rows = tuple(
         (point, *weights.tolist(), *values.tolist(), "yes" if good else "dominated")
@@ -37,14 +33,10 @@ def pareto_page(front: ParetoFront) -> Page:
         )
     )
     headings = ("point", *(f"weight of {name}" for name in names), *names, "Pareto-optimal")
-    return Page(
+    return page_of(
+        front,
         title="Designs for several criteria",
         robot=robot.title or robot.name,
-        verdict=(
-            f"Choose one of {efficient} Pareto-optimal designs, of {len(front.designs)}: no other design is better in "
-            "every criterion."
-        ),
-        findings=_findings(front),
         facts=tuple(Fact(label=f"Best {c.label}", value=_best(front, k)) for k, c in enumerate(front.criteria)),
         sections=(
             Section(
@@ -60,27 +52,7 @@ def pareto_page(front: ParetoFront) -> Page:
                 tables=(Table(headings=headings, rows=rows, caption="Criteria of the optimised motion."),),
             ),
         ),
-        footer=footer(),
     )
-
-
-def _findings(front: ParetoFront) -> tuple[Finding, ...]:
-    found = [
-        replace(finding, subject=f"Point {point}:")
-        for point, design in enumerate(front.designs, start=1)
-        for finding in excitation_findings(design.whole)
-    ]
-    found += [
-        Finding(
-            code="limit.exceeded",
-            subject=f"Point {point}:",
-            text=f"the motion exceeds {len(design.violated)} limits.",
-            action="Do not play it.",
-        )
-        for point, design in enumerate(front.designs, start=1)
-        if design.violated
-    ]
-    return tuple(found)
 
 
 def _best(front: ParetoFront, k: int) -> float:

@@ -4,14 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 
-from estimation.payloads import PayloadEstimate, Quantity
+from estimation.payloads import PayloadEstimate
 from estimation.payloads.result import METHODS
-from estimation.uncertainty.quantiles import NORMAL_95
 from oed.reports.pictures.parameter_pictures import error_bars_picture
-from oed.reports.rendering.page import Cell, Fact, Page, Section, Table, findings_of
-from oed.reports.rendering.provenance import footer, recordings_of
+from oed.reports.rendering.page import Cell, Fact, Page, Section, Table, page_of
+from oed.reports.rendering.provenance import recordings_of
 from oed.reports.rendering.saving import save_page
-from oed.reports.rendering.significant import significant
 from robots.common.files import ResultFolder
 
 NAMES = {"mass": "mass", **{f"centre_{axis}": f"centre of mass, {axis}" for axis in "xyz"}}
@@ -32,23 +30,16 @@ def payload_page(payload: PayloadEstimate) -> Page:
         )
         for label, key in (("without payload", "without"), ("with payload", "residual"))
     }
-    widest = max(centre, key=lambda item: item.half_width)
-    return Page(
+    return page_of(
+        payload,
         title="Payload",
         robot=payload.robot,
-        verdict=f"No payload was found: {payload.limit}."
-        if not payload.found
-        else (
-            f"Set the payload to {_value(mass)} kg ({_interval(mass)}); its centre of mass is known to "
-            f"{1000 * widest.half_width:.2g} mm or better."
-        ),
         logs=recordings_of(payload.provenance.get("logs", ())),
-        findings=findings_of("payload.uncertain", payload.warnings),
         facts=(
-            Fact(label="Mass", value=f"{_value(mass)} kg"),
+            Fact(label="Mass", value=f"{mass.text} kg"),
             Fact(
                 label="Centre of mass",
-                value=f"{', '.join(_value(item) for item in centre)} m" if payload.found else "–",
+                value=f"{', '.join(item.text for item in centre)} m" if payload.found else "–",
             ),
             Fact(label="Rows", value=payload.rows, note=f"by {METHODS[payload.method]}"),
         ),
@@ -66,7 +57,6 @@ def payload_page(payload: PayloadEstimate) -> Page:
                 title="Torque", pictures=(error_bars_picture(errors, joint_names=[j.name for j in payload.joints]),)
             ),
         ),
-        footer=footer(),
     )
 
 
@@ -74,8 +64,8 @@ def _table(payload: PayloadEstimate) -> Table:
     rows: list[tuple[Cell, ...]] = [
         (
             NAMES.get(item.name, f"{item.name} about the centre"),
-            _value(item),
-            _interval(item) if known else "–",
+            item.text,
+            item.interval_text if known else "–",
             item.unit,
             "yes" if known else "no",
         )
@@ -87,12 +77,3 @@ def _table(payload: PayloadEstimate) -> Table:
         rows=tuple(rows),
         caption=f"Centre of mass and axes {frame}.",
     )
-
-
-def _value(item: Quantity) -> str:
-    return significant(item.value, item.half_width / NORMAL_95)
-
-
-def _interval(item: Quantity) -> str:
-    error = item.half_width / NORMAL_95
-    return f"{significant(item.lower, error)} to {significant(item.upper, error)}"

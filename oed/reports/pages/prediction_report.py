@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from estimation.predictions.prediction import Prediction
 from oed.reports.pictures.torque_pictures import torque_picture
-from oed.reports.rendering.page import Cell, Fact, Finding, Page, Section, Table, findings_of
-from oed.reports.rendering.provenance import Recording, footer
-from robots.common.plain import finite, percent
+from oed.reports.rendering.page import Cell, Fact, Page, Section, Table, page_of
+from oed.reports.rendering.provenance import Recording
+from robots.common.plain import finite
 
 
 def prediction_page(
@@ -25,20 +24,11 @@ def prediction_page(
     """
     measured = prediction.measured
     nothing = np.full_like(prediction.predicted, np.nan)
-    if measured is None:
-        verdict = "The torques are predicted; the log has none to compare with."
-    else:
-        verdict = (
-            f"The model predicts this motion to {100 * np.median(prediction.nrmse):.1f} % of the torque RMS (median)."
-        )
-    extrapolates = prediction.extrapolates
-    share = None if extrapolates is None else 100 * extrapolates.mean(axis=0)
-    return Page(
+    return page_of(
+        prediction,
         title="Prediction",
         robot=robot_name,
-        verdict=verdict,
         logs=logs,
-        findings=_findings(prediction, share),
         facts=(
             Fact(label="Samples", value=len(prediction.motion)),
             Fact(label="Duration", value=f"{prediction.motion.duration:.4g} s"),
@@ -64,18 +54,6 @@ def prediction_page(
                 tables=(_joints(prediction),),
             ),
         ),
-        footer=footer(),
-    )
-
-
-def _findings(prediction: Prediction, share: NDArray[np.float64] | None) -> tuple[Finding, ...]:
-    texts = []
-    if share is not None and share.any():
-        texts = [f"{percent(share.mean() / 100)} of the torques extrapolate: the fit has seen no such motion."]
-    gate = () if prediction.gate is None else prediction.gate.findings
-    return (
-        *findings_of("prediction.extrapolates", (*texts, *prediction.beyond)),
-        *(Finding(code=f"log.{finding.severity}", text=f"{finding}.") for finding in gate),
     )
 
 

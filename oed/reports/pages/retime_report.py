@@ -6,16 +6,12 @@ import numpy as np
 
 from oed.criteria import CRITERIA
 from oed.experiments import RetimedExperiment
-from oed.experiments.safety_checks.freedom import freedom_text, is_free
 from oed.experiments.safety_checks.margins import nominal_torque
 from oed.reports.animations.building import animate
-from oed.reports.pages.design_report import excitation_findings, margins_section, parameters_section, quality_section
-from oed.reports.pages.motions.assumption_findings import assumption_findings
-from oed.reports.pages.motions.freedom_findings import freedom_findings
+from oed.reports.pages.design_report import margins_section, parameters_section, quality_section
 from oed.reports.pages.motions.motion_report import animation_section
-from oed.reports.pictures.trajectory_pictures import trajectory_picture
-from oed.reports.rendering.page import Cell, Fact, Finding, Page, Section, Table, findings_of
-from oed.reports.rendering.provenance import footer
+from oed.reports.pictures.trajectory_pictures import motion_picture
+from oed.reports.rendering.page import Cell, Fact, Page, Section, Table, page_of
 from oed.reports.rendering.saving import save_page
 from robots.common.files import ResultFolder
 from robots.common.plain import finite
@@ -30,40 +26,14 @@ def save_retime_report(result: RetimedExperiment, given: Motion, folder: ResultF
 def retime_page(result: RetimedExperiment, given: Motion) -> Page:
     """Builds the page: gain and cost of the new timing."""
     robot, retimed = result.robot, result.retimed
-    before, after = result.before.to_dict()["cond_Y"], result.after.to_dict()["cond_Y"]
-    name, joint, share = retimed.peak
+    before, after = result.before.cond, result.after.cond
     pictures = tuple(
-        trajectory_picture(
-            motion.t,
-            motion.q,
-            motion.dq,
-            motion.ddq,
-            limits=robot.limits,
-            joint_names=robot.joint_names,
-            kinds=robot.chain.kinds,
-            name=stem,
-        )
-        for stem, motion in (("after", result.motion), ("before", given))
+        motion_picture(robot, motion, name=stem) for stem, motion in (("after", result.motion), ("before", given))
     )
-    findings: list[Finding] = [*excitation_findings(result.after)]
-    if not result.success:
-        findings.append(
-            Finding(code="limit.exceeded", text="The new timing exceeds a limit.", action="Do not play it.")
-        )
-    if retimed.slower:
-        findings += findings_of("timing.slower", [retimed.verdict()])
-    findings += freedom_findings(result.freedom)
-    findings += assumption_findings(robot)
-    timing = (
-        f"{retimed.method} runs the path in {retimed.duration_after:.1f} s instead of {retimed.duration_before:.1f} s, "
-        f"using {100 * share:.1f} % of the {name} limit of joint {joint}."
-    )
-    unsafe = not result.success or not is_free(result.freedom)
-    return Page(
+    return page_of(
+        result,
         title="Retimed path",
         robot=robot.title or robot.name,
-        verdict=f"{'Do not play this motion. ' if unsafe else ''}{timing} {freedom_text(result.freedom)}",
-        findings=tuple(findings),
         facts=(
             Fact(label=f"{CRITERIA['cond']().label} before", value=before if before is not None else "not all excited"),
             Fact(label="cond(Y) after", value=after if after is not None else "not all excited"),
@@ -97,7 +67,6 @@ def retime_page(result: RetimedExperiment, given: Motion) -> Page:
             Section(title="Given motion", pictures=pictures[1:], folded=True),
             parameters_section(result.base.names, result.base.formulas()),
         ),
-        footer=footer(),
     )
 
 

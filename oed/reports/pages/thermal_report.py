@@ -15,12 +15,12 @@ from oed.reports.pictures.thermal_pictures import (
     friction_time_picture,
     time_constant_picture,
 )
-from oed.reports.rendering.page import Cell, Fact, Finding, Page, Section, Table, findings_of
+from oed.reports.rendering.page import Cell, Fact, Page, Section, Table, page_of
 from oed.reports.rendering.picture import Picture
-from oed.reports.rendering.provenance import footer, recordings_from
+from oed.reports.rendering.provenance import recordings_from
 from oed.reports.rendering.saving import save_page
-from oed.reports.rendering.significant import significant, significant_error
 from robots.common.files import ResultFolder
+from robots.common.plain import significant, significant_error
 from robots.signals import Log
 
 Array = NDArray[np.float64]
@@ -52,16 +52,8 @@ def thermal_page(
     """
     robot, fits = estimate.model.robot, estimate.thermal
     names, kinds = robot.joint_names, robot.chain.kinds
-    gain = 1.0 - estimate.residual_rms / np.maximum(estimate.residual_without, 1e-300)
+    gain = estimate.gain
     moving = [fit for fit in fits if fit is not None]
-    open_ = sorted({q.name for fit in moving for q in fit.parameters if not q.determined})
-    share = round(100 * float(np.median(gain)))
-    verdict = (
-        f"Use this thermal model: it reduces the torque error of the median joint by {share} %, compared with "
-        "temperature-independent friction."
-        if share > 0
-        else "These logs show no effect of temperature: record from cold to warm, or use the model without heat."
-    )
     coefficients = _coefficients(estimate)
     fit = fits[joint - 1]
     duty = None if fit is None else duty_picture(fit, duty_runs(logs), title=f"joint {joint}")
@@ -95,35 +87,19 @@ def thermal_page(
     if choice is not None:
         sections.insert(1, Section(title="Model comparison", tables=(_models(choice, joint),)))
     worst = int(np.argmin(np.where([item is not None for item in fits], gain, np.inf)))
-    return Page(
+    return page_of(
+        estimate,
         title="Friction and temperature",
         robot=robot.title or robot.name,
-        verdict=verdict,
         logs=recordings_from(logs),
-        findings=_findings(estimate, open_),
         facts=(
             Fact(label="Model", value=moving[0].model.name if moving else "–"),
             Fact(label="Largest gain", value=f"{100 * gain.max():.0f} %", note=f"joint {int(gain.argmax()) + 1}"),
             Fact(label="Smallest gain", value=f"{100 * gain[worst]:.0f} %", note=f"joint {worst + 1}"),
             Fact(label="Iterations (dynamics, thermal model)", value=estimate.rounds),
         ),
-        sections=tuple(sections),
-        footer=footer(),
+        sections=sections,
     )
-
-
-def _findings(estimate: CampaignEstimate, names: Sequence[str]) -> tuple[Finding, ...]:
-    text = f"These logs determine time constants and friction ratios, but not {', '.join(names)}."
-    return (
-        *findings_of("thermal.undetermined", [text] if names else []),
-        *findings_of("model.warning", estimate.joint_notes),
-        *findings_of("joint.still", _still(estimate.thermal)),
-    )
-
-
-def _still(fits: Sequence[ThermalEstimate | None]) -> tuple[str, ...]:
-    still = [str(j) for j, fit in enumerate(fits, start=1) if fit is None]
-    return (f"No thermal model for joint {', '.join(still)}: it does not move in the logs.",) if still else ()
 
 
 def _joints(estimate: CampaignEstimate) -> Table:

@@ -8,7 +8,7 @@ from oed.campaigns import Campaign, Slot
 from oed.reports.rendering.joint_units import joint_titles, joint_units
 from oed.reports.rendering.palette import joint_role
 from oed.reports.rendering.picture import Line, Panel, Picture, Series, Span
-from oed.reports.rendering.significant import significant
+from robots.common.plain import significant
 
 STAGE_ROLES = {"excitation": "main", "friction": "second", "warm_up": "residual", "power_on": "neutral"}
 """Colours of the kinds of stage."""

@@ -11,8 +11,8 @@ from estimation.uncertainty.quantiles import NORMAL_95
 from oed.reports.rendering.joint_units import joint_titles, joint_units
 from oed.reports.rendering.palette import joint_role, sequence_role
 from oed.reports.rendering.picture import Line, Panel, Picture, Series
-from oed.reports.rendering.significant import significant, with_error
 from robots.common.errors import InputError
+from robots.common.plain import significant, with_error
 from robots.signals import FloatArray
 
 FLAT = 5.0

@@ -13,8 +13,8 @@ from oed.reports.rendering.gaps import break_at_pauses
 from oed.reports.rendering.joint_units import joint_titles, joint_units
 from oed.reports.rendering.palette import joint_role
 from oed.reports.rendering.picture import Band, Line, Panel, Picture, Series
-from oed.reports.rendering.significant import percent, significant
 from robots.common.errors import InputError
+from robots.common.plain import rounded_percent, significant
 from robots.signals import FloatArray
 
 BINS = 41
@@ -65,13 +65,13 @@ def torque_picture(
         residual = truth[:, joint] - model[:, joint]
         level, size = _rms(residual), _rms(truth[:, joint][np.isfinite(residual)])
         unit = units[joint].torque
-        share = f" ({percent(level / size)} of the torque)" if size > 0.0 else ""
+        share = f" ({rounded_percent(level / size)} of the torque)" if size > 0.0 else ""
         panels += [
             Panel(
                 title=titles[joint],
                 x_label="time [s]",
                 y_label=f"{units[joint].effort} [{unit}]",
-                note=f"{percent(left, 2)} not predicted" if (left := float(gaps[:, joint].mean())) else "",
+                note=f"{rounded_percent(left, 2)} not predicted" if (left := float(gaps[:, joint].mean())) else "",
                 series=(
                     *measured_line(times, truth[:, joint]),
                     Series(

@@ -11,10 +11,11 @@ from numpy.typing import ArrayLike
 from oed.reports.rendering.joint_units import JointUnits, joint_titles, joint_units
 from oed.reports.rendering.palette import joint_role, sequence_role
 from oed.reports.rendering.picture import Line, Panel, Picture, Series, Span
-from oed.reports.rendering.significant import significant
 from robots.common.errors import InputError
+from robots.common.plain import significant
 from robots.limits import Limits, Margin
-from robots.signals import FloatArray
+from robots.robot import Robot
+from robots.signals import FloatArray, Motion
 
 SEGMENT_ROLES = {
     "approach": "neutral",
@@ -97,6 +98,30 @@ def trajectory_picture(
         panel_height=130,
         caption="Dashed lines are limits. Limits far outside the range are written in the corner."
         + (" Shaded areas are the segments of the experiment." if spans else ""),
+    )
+
+
+def motion_picture(
+    robot: Robot, motion: Motion, *, segments: Sequence[Mapping[str, Any]] = (), name: str = "trajectory"
+) -> Picture:
+    """Shows a motion of a robot within the limits of its joints.
+
+    Args:
+        robot: the robot.
+        motion: what it does.
+        segments: see `trajectory_picture`.
+        name: the stem of the file name.
+    """
+    return trajectory_picture(
+        motion.t,
+        motion.q,
+        motion.dq,
+        motion.ddq,
+        limits=robot.limits,
+        joint_names=robot.joint_names,
+        kinds=robot.chain.kinds,
+        segments=segments,
+        name=name,
     )
 
 

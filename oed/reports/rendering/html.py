@@ -14,8 +14,8 @@ from oed.reports.rendering.page import Cell, Page, is_number
 from oed.reports.rendering.palette import INK
 from oed.reports.rendering.picture import Picture, legend_entries
 from oed.reports.rendering.plotly_ import MARGINS, height_of, to_plotly
-from oed.reports.rendering.severity import WORDS
-from oed.reports.rendering.significant import significant
+from robots.common.plain import significant
+from robots.common.records.findings import WORDS
 
 TEMPLATES = Path(__file__).parent / "templates"
 

@@ -2,18 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
-from dataclasses import dataclass, field
-from typing import Literal
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Literal, TypeVar
 
 from oed.reports.animations.animation import Animation
 from oed.reports.rendering.picture import Picture
-from oed.reports.rendering.provenance import Footer, Recording
-from oed.reports.rendering.severity import LEVELS, Level, severity
+from oed.reports.rendering.provenance import Footer, Recording, footer
 from robots.common.errors import InputError
+from robots.common.records import Result
+from robots.common.records.findings import ORDER, Finding, Level, severity
 
 Status = Literal["good", "note", "act", "neutral"]
 Cell = str | int | float | bool | None
+Item = TypeVar("Item")
 
 STATUSES = ("good", "note", "act", "neutral")
 ALIGNMENTS = ("left", "right", "center")
@@ -37,34 +39,6 @@ class Fact:
 
     def __post_init__(self) -> None:
         _check("status", self.status, STATUSES)
-
-
-@dataclass(frozen=True, kw_only=True)
-class Finding:
-    """One row of the first screen.
-
-    Args:
-        code: a key of `severity.LEVELS`, which decides how urgent it is.
-        text: what was found, in a sentence.
-        subject: joint, log or part that it is about; empty for the whole.
-        action: what to do; empty where there is nothing to do.
-
-    Raises:
-        InputError: an unknown code.
-    """
-
-    code: str
-    text: str
-    subject: str = ""
-    action: str = ""
-
-    def __post_init__(self) -> None:
-        severity([self.code])
-
-    @property
-    def level(self) -> Level:
-        """How urgent it is."""
-        return LEVELS[self.code]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -153,12 +127,21 @@ class Page:
     footer: Footer = field(default_factory=Footer)
 
     def __post_init__(self) -> None:
-        order = {"act": 0, "note": 1, "good": 2}
-        object.__setattr__(self, "findings", tuple(sorted(self.findings, key=lambda item: order[item.level])))
+        urgent = sorted(self.findings, key=lambda item: -ORDER.index(item.level))
+        object.__setattr__(self, "findings", tuple(urgent))
         names = [picture.name for picture in self.pictures]
         for name in names:
             if names.count(name) > 1:
                 raise InputError(f"two pictures named {name!r} in one page", allowed="names that differ")
+
+    @property
+    def listed(self) -> tuple[Finding, ...]:
+        """The findings as rows: what the verdict states already is not said again."""
+        return tuple(
+            replace(finding, action="" if finding.action in self.verdict else finding.action)
+            for finding in self.findings
+            if finding.text.rstrip(".") not in self.verdict
+        )
 
     @property
     def level(self) -> Level:
@@ -181,14 +164,56 @@ class Page:
         return tuple(dict.fromkeys(log.date for log in self.logs if log.date))
 
 
-def findings_of(code: str, texts: Iterable[str]) -> tuple[Finding, ...]:
-    """Makes one finding of each text.
+def page_of(
+    result: Result,
+    *,
+    title: str,
+    robot: str = "",
+    logs: Iterable[Recording] = (),
+    facts: Iterable[Fact] = (),
+    sections: Iterable[Section | None] = (),
+    seed: int | None = None,
+) -> Page:
+    """Arranges the page of a result: what follows from it, what to know, key figures, evidence, and where it is from.
 
     Args:
-        code: a key of `severity.LEVELS`, of all of them.
-        texts: what was found, each in a sentence or two.
+        result: gives conclusion and remarks.
+        title: what the page is about.
+        robot: its name.
+        logs: recordings that the result rests on.
+        facts: the experts' key figures.
+        sections: pictures and tables, in order; None is left out.
+        seed: of the random numbers, where the result states it.
     """
-    return tuple(Finding(code=code, text=text) for text in texts)
+    return Page(
+        title=title,
+        robot=robot,
+        verdict=result.conclusion,
+        logs=tuple(logs),
+        findings=result.remarks,
+        facts=tuple(facts),
+        sections=tuple(section for section in sections if section is not None),
+        footer=footer(seed),
+    )
+
+
+def table_of(
+    items: Iterable[Item],
+    columns: Mapping[str, Callable[[Item], Cell]],
+    *,
+    caption: str = "",
+    align: Sequence[str] = (),
+) -> Table:
+    """Makes a table with a row for each item.
+
+    Args:
+        items: in the order of the rows.
+        columns: what each column shows of an item, by its heading.
+        caption: what the table shows.
+        align: see `Table`.
+    """
+    rows = tuple(tuple(cell(item) for cell in columns.values()) for item in items)
+    return Table(headings=tuple(columns), rows=rows, caption=caption, align=tuple(align))
 
 
 def is_number(value: object) -> bool:

@@ -30,6 +30,8 @@ class LoadSource:
         coefficients: coefficients of its columns (k,).
     """
 
+    ENTRIES = ("effect=effect.name", "joint", "shape", "coefficients")
+
     effect: Effect
     joint: Place
     shape: tuple[float, ...]
@@ -46,6 +48,8 @@ class ExtraGearLoad:
         path: which torque loads the gears.
         sources: the effects.
     """
+
+    ENTRIES = ("how=path", "weights=sources")
 
     path: LoadPath
     sources: Sequence[LoadSource]

@@ -106,7 +106,7 @@ def test_a_result_survives_its_file(identified: Actuators, tmp_path: Path) -> No
     with pytest.raises(InputError):
         identified.save(tmp_path)
     (tmp_path / "other.json").write_text("{}")
-    with pytest.raises(InputError, match="holds no drives"):
+    with pytest.raises(InputError, match="is not an actuators file"):
         load_actuators(tmp_path / "other.json")
 
 

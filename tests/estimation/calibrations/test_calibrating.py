@@ -173,9 +173,9 @@ def test_files_that_are_no_calibrations_are_refused(tmp_path):
     """A file of something else, and a damaged one, are refused by name."""
     other = tmp_path / "calibration.json"
     other.write_text("{}")
-    with pytest.raises(InputError, match="no calibration"):
+    with pytest.raises(InputError, match="not a calibration file"):
         load_calibration(other)
-    other.write_text('{"format": "robot-oed calibration"}')
+    other.write_text('{"format": "robot-oed calibration", "format_version": 1}')
     with pytest.raises(InputError, match="damaged"):
         load_calibration(other)
 

@@ -103,7 +103,7 @@ def test_an_extension_survives_plain_data(arm: Robot, state: Situation) -> None:
         coefficients=np.array([0.3, 0.1]),
         covariance=np.diag([0.01, np.inf, 0.04]),
     )
-    again = read_extension(extension.to_dict(arm), arm)
+    again = read_extension(extension.to_dict(robot=arm), arm)
     assert again.torque(state) == pytest.approx(extension.torque(state))
     assert np.array_equal(again.covariance, extension.covariance)
     expected = (state.t >= 1.5) * (0.3 * state.sign[:, 1] + 0.1 * state.dq[:, 1])

@@ -3,6 +3,7 @@ import pytest
 
 from estimation.predictions.method_table import compare_methods
 from robots.common.errors import InputError
+from robots.common.records import plain
 
 
 @pytest.mark.slow
@@ -35,7 +36,7 @@ def test_an_estimator_that_fails_says_why(arm, arm_log, monkeypatch):
     monkeypatch.setattr(method_table, "identify", fail)
     table = compare_methods(arm, arm_log(), methods=["ols"])
     assert "ols needs something else" in table.summary()
-    assert table.to_dict()[0]["unseen"] is None
+    assert plain(table.rows)[0]["unseen"] is None
 
 
 def test_unknown_methods_are_refused(arm, arm_log):

@@ -71,7 +71,8 @@ def horizontal_arm(ur10: Robot) -> Robot:
     from robots.geometry.chain import Chain
 
     chain = Chain((ur10.chain.joints[1], ur10.chain.joints[2]), gravity=ur10.chain.gravity)
-    limits = type(ur10.limits)(**{name: np.asarray(values)[1:3] for name, values in vars(ur10.limits).items()})
+    stated = {name: values for name, values in vars(ur10.limits).items() if values is not None}
+    limits = type(ur10.limits)(**{name: np.asarray(values)[1:3] for name, values in stated.items()})
     return replace(
         ur10,
         name="arm",

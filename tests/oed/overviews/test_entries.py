@@ -7,8 +7,11 @@ import os
 import time
 from pathlib import Path
 
+import numpy as np
 import pytest
 
+from estimation.payloads.body import Body
+from estimation.payloads.result import PayloadEstimate
 from oed.overviews import find_results
 from robots.common.errors import InputError
 
@@ -144,11 +147,22 @@ def test_foreign_files_have_none(tmp_path: Path, content: str) -> None:
 
 def test_a_payload_that_is_not_there_is_good_news(tmp_path: Path) -> None:
     """A file without a payload has its bound as the verdict, and open quantities are no doubt."""
-    quantities = [{"determined": True, "ci95": [0.0, 0.0123]}, {"determined": False, "ci95": [None, None]}]
-    content = {"format": "robot-oed payload", "format_version": 1, "robot": "ur10", "mass": 0.0, "rows": 9}
-    write(tmp_path, "payload.json", content | {"quantities": quantities})
+    body = Body(np.zeros(10))
+    spread = (0.0123 / 1.96) ** 2 * np.eye(10)
+    result = PayloadEstimate(
+        robot="ur10",
+        method="model",
+        body=body,
+        nearest=np.zeros(10),
+        values=np.zeros(10),
+        covariance=spread,
+        joints=(),
+        rows=9,
+    )
+    result.save(tmp_path)
     (entry,) = find_results(tmp_path)
-    assert (entry.verdict, entry.level) == ("No payload found: at most 0.012 kg at 95 %.", "good")
+    assert (entry.verdict, entry.level) == (f"No payload was found: {result.limit}.", "good")
+    assert entry.verdict == result.conclusion == "No payload was found: at most 0.012 kg at 95 %."
 
 
 def test_robots_are_listed(tmp_path: Path) -> None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,9 +12,8 @@ from estimation.calibrations.result import SHOWN, error_words
 from oed.reports.animations.animation import Animation
 from oed.reports.animations.building import animate
 from oed.reports.rendering.joint_units import joint_titles
-from oed.reports.rendering.page import Cell, Fact, Finding, Page, Section, Table, findings_of
+from oed.reports.rendering.page import Cell, Fact, Page, Section, Table, page_of, table_of
 from oed.reports.rendering.picture import Panel, Picture, Series
-from oed.reports.rendering.provenance import footer
 from oed.reports.rendering.saving import save_page
 from robots.common.files import ResultFolder
 from robots.geometry_errors.poses import approaches
@@ -39,16 +38,10 @@ def calibration_page(calibration: Calibration) -> Page:
     """Builds the page: errors before and after, what was fitted, what is left open, and the worst poses in 3-D."""
     levels, shown = calibration.levels, calibration.shown
     better = levels.held_out < levels.before
-    return Page(
+    return page_of(
+        calibration,
         title="Calibration",
         robot=calibration.robot.name,
-        verdict=(
-            f"The calibrated robot predicts poses that it has not seen to {shown(levels.held_out)} instead of "
-            f"{shown(levels.before)}."
-            if better
-            else "The poses do not support a calibration: the description predicts held-out poses as well."
-        ),
-        findings=_findings(calibration),
         facts=(
             Fact(label="Before", value=shown(levels.before), note=error_words(calibration.measurement)),
             Fact(label="After, held out", value=shown(levels.held_out), status="good" if better else "act"),
@@ -82,26 +75,7 @@ def calibration_page(calibration: Calibration) -> Page:
             Section(title="What was fitted", tables=(_trial_table(calibration), _parameter_table(calibration))),
             Section(title="What the poses leave open", tables=(_open_table(calibration),), folded=True),
         ),
-        footer=footer(),
     )
-
-
-def _findings(calibration: Calibration) -> tuple[Finding, ...]:
-    found = list(findings_of("calibration.doubtful", calibration.warnings))
-    found += [
-        Finding(code="calibration.cause", text=cause["sentence"], action=cause.get("action", ""))
-        for cause in calibration.causes.get("findings", ())
-    ]
-    found += [
-        Finding(
-            code="calibration.outlier",
-            subject=f"Pose {item.pose}:",
-            text=f"line {item.line} of the file is off by {calibration.shown(item.error)}; it was left out.",
-            action="Measure it again, or remove it.",
-        )
-        for item in calibration.outliers
-    ]
-    return tuple(found)
 
 
 def _pose_picture(calibration: Calibration) -> Picture:
@@ -121,29 +95,28 @@ def _pose_picture(calibration: Calibration) -> Picture:
 
 
 def _joint_picture(calibration: Calibration) -> Picture:
+    labels = [f"position [{'m' if kind == 'prismatic' else 'rad'}]" for kind in calibration.robot.chain.kinds]
+    panels = _error_panels(calibration, labels, calibration.poses.q)
+    return Picture(name="joints", title="Error over the position of each joint", panels=panels, columns=2)
+
+
+def _error_panels(calibration: Calibration, labels: Sequence[str], values: Array) -> tuple[Panel, ...]:
+    """The error of all poses over a quantity of each joint (N, n)."""
     unit, factor = SHOWN[calibration.unit]
     poses, robot = calibration.poses, calibration.robot
-    panels = []
-    for j, title in enumerate(joint_titles(robot.joint_names, robot.n)):
-        slides = robot.chain.kinds[j] == "prismatic"
-        panels.append(
-            Panel(
-                title=title,
-                x_label="position [m]" if slides else "position [rad]",
-                y_label=f"error [{unit}]",
-                series=(
-                    Series(x=poses.q[:, j], y=factor * poses.before, name="description", kind="markers", role="second"),
-                    Series(
-                        x=poses.q[:, j],
-                        y=factor * poses.held_out,
-                        name="calibrated, held out",
-                        kind="markers",
-                        role="main",
-                    ),
-                ),
-            )
+    shown = (("description", poses.before, "second"), ("calibrated, held out", poses.held_out, "main"))
+    return tuple(
+        Panel(
+            title=title,
+            x_label=labels[j],
+            y_label=f"error [{unit}]",
+            series=tuple(
+                Series(x=values[:, j], y=factor * errors, name=name, kind="markers", role=role)
+                for name, errors, role in shown
+            ),
         )
-    return Picture(name="joints", title="Error over the position of each joint", panels=tuple(panels), columns=2)
+        for j, title in enumerate(joint_titles(robot.joint_names, robot.n))
+    )
 
 
 def _cause_paragraphs(calibration: Calibration) -> tuple[str, ...]:
@@ -158,7 +131,6 @@ def _cause_paragraphs(calibration: Calibration) -> tuple[str, ...]:
 
 def _load_picture(calibration: Calibration) -> Iterator[Picture]:
     """The error over what bends the arm, and over the direction in which each joint came to the pose."""
-    unit, factor = SHOWN[calibration.unit]
     poses, robot = calibration.poses, calibration.robot
     drivers = []
     if robot.has_masses:
@@ -166,34 +138,18 @@ def _load_picture(calibration: Calibration) -> Iterator[Picture]:
         drivers.append(("loads", "Error over the torque of gravity", "torque of gravity [N m or N]", torque))
     drivers.append(("approaches", "Error over the direction of approach", "direction", approaches(poses.q)))
     for name, title, label, values in drivers:
-        panels = [
-            Panel(
-                title=joint,
-                x_label=label,
-                y_label=f"error [{unit}]",
-                series=(
-                    Series(x=values[:, j], y=factor * poses.before, name="description", kind="markers", role="second"),
-                    Series(
-                        x=values[:, j],
-                        y=factor * poses.held_out,
-                        name="calibrated, held out",
-                        kind="markers",
-                        role="main",
-                    ),
-                ),
-            )
-            for j, joint in enumerate(joint_titles(robot.joint_names, robot.n))
-        ]
-        yield Picture(name=name, title=title, panels=tuple(panels), columns=2)
+        panels = _error_panels(calibration, [label] * robot.n, values)
+        yield Picture(name=name, title=title, panels=panels, columns=2)
 
 
 def _evidence_table(calibration: Calibration) -> Table:
-    evidence = calibration.causes.get("evidence", {})
-    ranked = sorted(evidence.items(), key=lambda pair: pair[1])
-    rows: list[tuple[Cell, ...]] = [(label, "below 0.001" if p < 0.001 else f"{p:.2g}") for label, p in ranked]
-    return Table(
-        headings=("cause", "p-value by itself"),
-        rows=tuple(rows),
+    evidence: Mapping[str, float] = calibration.causes.get("evidence", {})
+    return table_of(
+        sorted(evidence.items(), key=lambda pair: pair[1]),
+        {
+            "cause": lambda pair: pair[0],
+            "p-value by itself": lambda pair: "below 0.001" if pair[1] < 0.001 else f"{pair[1]:.2g}",
+        },
         caption="Each alone beside the setup, corrected for the number of causes.",
     )
 
@@ -219,36 +175,42 @@ def _level_table(calibration: Calibration) -> Table:
 
 def _trial_table(calibration: Calibration) -> Table:
     unit, factor = SHOWN[calibration.unit]
-    rows: list[tuple[Cell, ...]] = [
-        (error_term(t.kind).title, factor * t.without, factor * t.with_it, "yes" if t.added else "no")
-        for t in calibration.trials
-    ]
-    return Table(
-        headings=("kind of errors", f"held-out error without [{unit}]", f"with [{unit}]", "supported"),
-        rows=tuple(rows),
+    return table_of(
+        calibration.trials,
+        {
+            "kind of errors": lambda t: error_term(t.kind).title,
+            f"held-out error without [{unit}]": lambda t: factor * t.without,
+            f"with [{unit}]": lambda t: factor * t.with_it,
+            "supported": lambda t: t.added,
+        },
         caption="Kinds of errors in the order in which they were added; those without support last.",
     )
 
 
 def _parameter_table(calibration: Calibration) -> Table:
-    rows: list[tuple[Cell, ...]] = []
-    for item in calibration.parameters:
-        unit, factor = item.shown
-        half = factor * item.standard_error
-        rows.append((item.name, factor * item.value, half, factor * item.lower, factor * item.upper, unit))
-    return Table(
-        headings=("parameter", "value", "standard error", "lower", "upper", "unit"),
-        rows=tuple(rows),
+    return table_of(
+        calibration.parameters,
+        {
+            "parameter": lambda item: item.name,
+            "value": lambda item: item.shown[1] * item.value,
+            "standard error": lambda item: item.shown[1] * item.standard_error,
+            "lower": lambda item: item.shown[1] * item.lower,
+            "upper": lambda item: item.shown[1] * item.upper,
+            "unit": lambda item: item.shown[0],
+        },
         caption="Lower and upper end of the 95 % interval.",
     )
 
 
 def _open_table(calibration: Calibration) -> Table:
-    rows: list[tuple[Cell, ...]] = [
-        (item.name, "no pose" if item.reason == "redundant" else "other poses", item.sentence())
-        for item in calibration.undetermined
-    ]
-    return Table(headings=("parameter", "what would show it", "why"), rows=tuple(rows))
+    return table_of(
+        calibration.undetermined,
+        {
+            "parameter": lambda item: item.name,
+            "what would show it": lambda item: "no pose" if item.reason == "redundant" else "other poses",
+            "why": lambda item: item.sentence(),
+        },
+    )
 
 
 def _worst(calibration: Calibration) -> list[int]:

@@ -5,14 +5,13 @@ from __future__ import annotations
 import numpy as np
 
 from oed.experiments.pose_designs import PoseDesign, observability_indices
-from oed.experiments.pose_designs.result import SHOWN
 from oed.experiments.safety_checks.freedom import freedom_text, is_free
 from oed.reports.animations.building import animate
-from oed.reports.rendering.page import Cell, Fact, Finding, Page, Section, Table
+from oed.reports.rendering.page import Cell, Fact, Page, Section, Table, page_of, table_of
 from oed.reports.rendering.picture import Panel, Picture, Series
-from oed.reports.rendering.provenance import footer
 from oed.reports.rendering.saving import save_page
 from robots.common.files import ResultFolder
+from robots.common.plain import finite
 
 
 def save_pose_design_report(design: PoseDesign, folder: ResultFolder, *, png: bool = False) -> None:
@@ -22,24 +21,10 @@ def save_pose_design_report(design: PoseDesign, folder: ResultFolder, *, png: bo
 
 def pose_design_page(design: PoseDesign) -> Page:
     """Builds the page: what the poses determine, the robot in 3-D on its way, and the poses."""
-    unit, factor = SHOWN[design.unit]
-    findings = []
-    if design.freedom is None:
-        findings.append(Finding(code="collision.unchecked", text=freedom_text(None)))
-    elif not is_free(design.freedom):
-        findings.append(Finding(code="collision.found", text=freedom_text(design.freedom)))
-    if design.left_out:
-        findings.append(
-            Finding(code="experiment.note", text=f"{design.left_out} poses were left out: no free move reaches them.")
-        )
-    return Page(
+    return page_of(
+        design,
         title="Poses for a calibration",
         robot=design.robot.name,
-        verdict=(
-            f"Measured at these {len(design.q)} poses, the calibrated robot is expected to be right to "
-            f"{factor * design.prediction:.3g} {unit}, if the kinds of errors are these and the noise is as stated."
-        ),
-        findings=tuple(findings),
         facts=(
             Fact(label="Poses", value=len(design.q), note=f"{design.motion.duration:.0f} s of motion"),
             Fact(label="Parameters", value=len(design.parameters)),
@@ -48,14 +33,16 @@ def pose_design_page(design: PoseDesign) -> Page:
         sections=(
             Section(
                 title="Motion",
-                paragraphs=("The robot rests at each pose while it is measured.", freedom_text(design.freedom)),
+                paragraphs=(
+                    "The robot rests at each pose while it is measured.",
+                    *([freedom_text(design.freedom)] if is_free(design.freedom) else []),
+                ),
                 animation=animate(design.robot, design.motion, margins=(), source="tour of the poses"),
             ),
             Section(title="Observability", pictures=(_picture(design),), tables=(_indices(design),)),
             Section(title="Expected standard errors", tables=(_expected(design),)),
             Section(title="Poses", tables=(_poses(design),), folded=True),
         ),
-        footer=footer(),
     )
 
 
@@ -89,11 +76,14 @@ def _indices(design: PoseDesign) -> Table:
 
 
 def _expected(design: PoseDesign) -> Table:
-    rows: list[tuple[Cell, ...]] = []
-    for item, error in zip(design.parameters, design.expected, strict=True):
-        unit, factor = item.shown
-        rows.append((item.name, factor * float(error) if np.isfinite(error) else None, unit))
-    return Table(headings=("parameter", "expected standard error", "unit"), rows=tuple(rows))
+    return table_of(
+        zip(design.parameters, design.expected.tolist(), strict=True),
+        {
+            "parameter": lambda pair: pair[0].name,
+            "expected standard error": lambda pair: finite(pair[0].shown[1] * pair[1]),
+            "unit": lambda pair: pair[0].shown[0],
+        },
+    )
 
 
 def _poses(design: PoseDesign) -> Table:

@@ -21,9 +21,9 @@ from oed.reports.pictures.comparison_pictures import (
     friction_runs_picture,
     significance_picture,
 )
-from oed.reports.rendering.page import Cell, Fact, Finding, Page, Section, Table, findings_of
+from oed.reports.rendering.page import Cell, Fact, Page, Section, Table, page_of
 from oed.reports.rendering.picture import Picture
-from oed.reports.rendering.provenance import Recording, footer
+from oed.reports.rendering.provenance import Recording
 from oed.reports.rendering.saving import save_page
 from robots.common.files import ResultFolder
 
@@ -44,12 +44,11 @@ def comparison_page(comparison: ModelComparison) -> Page:
     """
     damaged, last = comparison.damaged, len(comparison.runs) - 1
     parts = {name for run in comparison.compared for name in comparison.parts(run)}
-    return Page(
+    return page_of(
+        comparison,
         title="Comparison of models",
         robot=comparison.robot_name,
-        verdict=comparison.verdict(),
         logs=tuple(Recording(name=run.label, start=run.date) for run in comparison.runs),
-        findings=_findings(comparison),
         facts=(
             Fact(label="Runs", value=len(comparison.runs), note=f"order: {comparison.order}"),
             Fact(label="Parts that differ", value=len(parts)),
@@ -92,7 +91,6 @@ def comparison_page(comparison: ModelComparison) -> Page:
                 folded=True,
             ),
         ),
-        footer=footer(),
     )
 
 
@@ -110,34 +108,6 @@ def parts_picture(comparison: ModelComparison) -> Picture:
     return significance_picture(smallest, comparison.alpha, joint_names=comparison.runs[0].model.robot.joint_names)
 
 
-def _findings(comparison: ModelComparison) -> tuple[Finding, ...]:
-    found = [
-        Finding(
-            code="difference.joint",
-            subject=f"{comparison.labels[item.run]}:",
-            text=item.sentence(),
-        )
-        for item in comparison.damaged
-    ]
-    found += [
-        Finding(
-            code="difference.payload", subject=f"{comparison.labels[item.run]}:", text=item.sentence(comparison.labels)
-        )
-        for item in comparison.payloads
-    ]
-    runs: dict[str, list[str]] = {}
-    for run in range(1, len(comparison.runs)):
-        for name in comparison.parts(run):
-            runs.setdefault(name, []).append(comparison.labels[run])
-    found += [
-        Finding(
-            code="difference", subject=f"{name}:", text=f"differs from {comparison.labels[0]} in {', '.join(those)}."
-        )
-        for name, those in runs.items()
-    ]
-    return (*found, *findings_of("comparison.note", comparison.warnings))
-
-
 def _friction(comparison: ModelComparison, last: int) -> tuple[Section, ...]:
     curves = comparison.curves
     if not curves:
@@ -146,7 +116,7 @@ def _friction(comparison: ModelComparison, last: int) -> tuple[Section, ...]:
     shown = np.unique(np.linspace(0, last, min(CURVES, last + 1)).round().astype(int))
     joints = [curve.joint for curve in curves]
     base = [100 / np.maximum(np.abs(curve.torque[0]), 1e-12) for curve in curves]
-    sentences = tuple(item.sentence() for item in comparison.friction if item.run == last)
+    sentences = tuple(item.sentence() for item in comparison.friction if item.run == last and item.kind != "own")
     rows: list[tuple[Cell, ...]] = [
         (
             comparison.labels[item.run],

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from estimation.comparisons import ModelComparison
-from oed.reports.rendering.page import Cell, Table
-from oed.reports.rendering.significant import significant, significant_error
+from oed.reports.rendering.page import Cell, Table, table_of
+from robots.common.plain import significant, significant_error
 
 
 def runs_table(comparison: ModelComparison) -> Table:
@@ -21,20 +21,15 @@ def runs_table(comparison: ModelComparison) -> Table:
 
 def whole_table(comparison: ModelComparison) -> Table:
     """Lists the tests of the whole model."""
-    rows = tuple(
-        (
-            "all together" if item.run is None else comparison.labels[item.run],
-            item.statistic,
-            item.dof,
-            f"{item.adjusted:.2g}",
-            item.adjusted < comparison.alpha,
-        )
-        for item in comparison.differences
-        if item.level == "whole"
-    )
-    return Table(
-        headings=("run", "chi-square", "degrees of freedom", "adjusted p", "significant"),
-        rows=rows,
+    return table_of(
+        (item for item in comparison.differences if item.level == "whole"),
+        {
+            "run": lambda item: "all together" if item.run is None else comparison.labels[item.run],
+            "chi-square": lambda item: item.statistic,
+            "degrees of freedom": lambda item: item.dof,
+            "adjusted p": lambda item: f"{item.adjusted:.2g}",
+            "significant": lambda item: item.significant(comparison.alpha),
+        },
         caption=f"Whole model against {comparison.labels[0]}.",
     )
 
@@ -102,22 +97,18 @@ def parameters_table(comparison: ModelComparison) -> Table:
 
 def drift_table(comparison: ModelComparison) -> Table:
     """Lists trend and settling of each quantity."""
-    rows: list[tuple[Cell, ...]] = [
-        (
-            item.name,
-            significant(item.slope, item.slope_error),
-            significant_error(item.slope_error),
-            item.unit,
-            f"{item.adjusted:.2g}",
-            "not settled" if item.settled is None else comparison.labels[item.settled],
-            f"{item.percent:+.2f}",
-        )
-        for item in comparison.drifts
-    ]
-    per = "hour" if comparison.hours is not None else "run"
-    return Table(
-        headings=("quantity", f"trend per {per}", "standard error", "unit", "adjusted p", "settled from", "first [%]"),
-        rows=tuple(rows),
+    labels, per = comparison.labels, "hour" if comparison.hours is not None else "run"
+    return table_of(
+        comparison.drifts,
+        {
+            "quantity": lambda item: item.name,
+            f"trend per {per}": lambda item: significant(item.slope, item.slope_error),
+            "standard error": lambda item: significant_error(item.slope_error),
+            "unit": lambda item: item.unit,
+            "adjusted p": lambda item: f"{item.adjusted:.2g}",
+            "settled from": lambda item: "not settled" if item.settled is None else labels[item.settled],
+            "first [%]": lambda item: f"{item.percent:+.2f}",
+        },
         caption="Settled: from this run on all stay within the noise of the last third. First: distance from its mean.",
     )
 

@@ -5,10 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from oed.experiments.drives import DriveDesign
-from oed.reports.rendering.page import Fact, Page, Section, Table, findings_of
+from oed.reports.rendering.page import Fact, Page, Section, Table, page_of
 from oed.reports.rendering.palette import sequence_role
 from oed.reports.rendering.picture import Panel, Picture, Series
-from oed.reports.rendering.provenance import footer
 from oed.reports.rendering.saving import save_page
 from robots.common.files import ResultFolder
 
@@ -36,13 +35,10 @@ def drive_design_page(design: DriveDesign) -> Page:
         (i.parameter, i.group, f"{i.standard_error:.2g}", f"{i.of_chirp:.2g}", f"{i.ratio:.2g}", i.unit)
         for i in design.expected
     )
-    return Page(
+    return page_of(
+        design,
         title="Motion for drives",
         robot=design.robot,
-        verdict=f"Do not play this motion. {design.collisions}"
-        if design.collides
-        else f"Standard errors will be {design.ratio:.2g} times those of a chirp of the same time and limits.",
-        findings=findings_of("experiment.note", [design.collisions]),
         facts=(
             Fact(label="Duration", value=f"{design.t[-1] - design.t[0]:.3g} s"),
             Fact(label="Ratio to a chirp", value=f"{design.ratio:.2g}", note="median of the standard errors"),
@@ -65,5 +61,4 @@ def drive_design_page(design: DriveDesign) -> Page:
                 ),
             ),
         ),
-        footer=footer(),
     )

@@ -6,8 +6,8 @@ import numpy as np
 
 from estimation.external_forces import ForceEstimate
 from oed.reports.pictures.force_pictures import external_torque_picture, load_picture, statistic_picture
-from oed.reports.rendering.page import Cell, Fact, Finding, Page, Section, Table, findings_of
-from oed.reports.rendering.provenance import Recording, footer
+from oed.reports.rendering.page import Fact, Page, Section, Table, page_of, table_of
+from oed.reports.rendering.provenance import Recording
 from oed.reports.rendering.saving import save_page
 from robots.common.files import ResultFolder
 from robots.common.plain import finite
@@ -43,21 +43,14 @@ def force_page(forces: ForceEstimate, kinds: tuple[str, ...], logs: tuple[Record
     """
     threshold, count = forces.calibration.threshold, len(forces.contacts)
     windows = [(contact.start, contact.end) for contact in forces.contacts]
-    largest = max(forces.contacts, key=lambda contact: contact.magnitude, default=None)
-    verdict = "No contact was found in this log."
-    if largest is not None:
-        verdict = f"Check the robot's surroundings: {'one contact' if count == 1 else f'{count} contacts'}"
-        verdict += f", at {largest.start:.4g} s" if count == 1 else f", the largest at {largest.start:.4g} s"
-        verdict += f" with {largest.magnitude:.3g} N at the tool."
     deviation = forces.force_deviation
     known = deviation[np.isfinite(deviation).all(axis=1)]
     level = f"{np.median(np.linalg.norm(known, axis=1)):.2g} N" if len(known) else "unknown"
-    return Page(
+    return page_of(
+        forces,
         title="External forces",
         robot=forces.robot,
-        verdict=verdict,
         logs=logs,
-        findings=_findings(forces),
         facts=(
             Fact(label="Contacts", value=count),
             Fact(label="Duration", value=f"{forces.duration:.4g} s"),
@@ -95,7 +88,6 @@ def force_page(forces: ForceEstimate, kinds: tuple[str, ...], logs: tuple[Record
                 ),
             ),
         ),
-        footer=footer(),
     )
 
 
@@ -107,42 +99,22 @@ def _verdict(forces: ForceEstimate) -> str:
     return "confirmed" if check.confirmed else "contradicted" if check.contradicted else "not confirmed"
 
 
-def _findings(forces: ForceEstimate) -> tuple[Finding, ...]:
-    return (
-        *(
-            Finding(
-                code="contact",
-                subject=f"{contact.start:.4g} s:",
-                text=f"contact at {contact.place.text(forces.joint_names)}, {contact.magnitude:.3g} N, for "
-                f"{contact.end - contact.start:.2g} s.",
-                action="Check what the robot touched.",
-            )
-            for contact in forces.contacts
-        ),
-        *findings_of("force.note", forces.warnings),
-    )
-
-
 def _contacts(forces: ForceEstimate) -> Table:
-    rows: list[tuple[Cell, ...]] = [
-        (
-            contact.start,
-            contact.end - contact.start,
-            contact.magnitude,
-            *(finite(value) for value in contact.magnitude_interval),
-            *contact.force.tolist(),
-            ", ".join(map(str, contact.place.reacting)) or None,
-            contact.place.text(forces.joint_names),
-            contact.extrapolates,
-        )
-        for contact in forces.contacts
-    ]
-    return Table(
-        headings=(
-            *("start [s]", "duration [s]", "force [N]", "95 % from [N]", "95 % to [N]", "x [N]", "y [N]", "z [N]"),
-            *("joints that react", "where", "extrapolates"),
-        ),
-        rows=tuple(rows),
+    return table_of(
+        forces.contacts,
+        {
+            "start [s]": lambda contact: contact.start,
+            "duration [s]": lambda contact: contact.end - contact.start,
+            "force [N]": lambda contact: contact.magnitude,
+            "95 % from [N]": lambda contact: finite(contact.magnitude_interval[0]),
+            "95 % to [N]": lambda contact: finite(contact.magnitude_interval[1]),
+            "x [N]": lambda contact: contact.force[0],
+            "y [N]": lambda contact: contact.force[1],
+            "z [N]": lambda contact: contact.force[2],
+            "joints that react": lambda contact: ", ".join(map(str, contact.place.reacting)) or None,
+            "where": lambda contact: contact.place.text(forces.joint_names),
+            "extrapolates": lambda contact: contact.extrapolates,
+        },
         caption="Mean force at the tool along the axes of the base, as if no moment acts. The 95 % interval of its "
         "size holds noise and the model's error.",
     )

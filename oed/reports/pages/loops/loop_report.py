@@ -9,16 +9,14 @@ import numpy as np
 from oed.campaigns.loops.result import LoopResult
 from oed.campaigns.loops.state import Experiment, Verdict, name_of
 from oed.exports import read_trajectory
-from oed.reports.pages.diagnosis_actions import action_for
-from oed.reports.pictures.trajectory_pictures import trajectory_picture
-from oed.reports.rendering.page import Cell, Fact, Finding, Page, Section, Table, findings_of
+from oed.reports.pictures.trajectory_pictures import motion_picture
+from oed.reports.rendering.page import Cell, Fact, Page, Section, Table, page_of
 from oed.reports.rendering.palette import joint_role
 from oed.reports.rendering.picture import Panel, Picture, Series
-from oed.reports.rendering.provenance import Recording, footer
+from oed.reports.rendering.provenance import Recording
 from oed.reports.rendering.saving import save_page
 from robots.common.files import ResultFolder
 from robots.common.plain import two_digits
-from robots.terms.effects import EFFECTS
 
 CHANCE = 1e-3
 """Smallest p-value that is written as a number."""
@@ -32,17 +30,16 @@ def save_loop_report(result: LoopResult, folder: ResultFolder, *, png: bool = Fa
 def loop_page(result: LoopResult) -> Page:
     """Builds the page: the end, the errors over the experiments, and a section for each experiment."""
     last, rows = result.diagnosis, sum(_rows(experiment) for experiment in result.experiments)
-    return Page(
+    return page_of(
+        result,
         title="Loop of experiments",
         robot=result.robot.title or result.robot.name,
-        verdict=f"{result.ended[:1].upper()}{result.ended[1:]}.",
         logs=tuple(
             Recording(name=run.recorded.log)
             for experiment in result.experiments
             for run in experiment.runs
             if run.recorded is not None
         ),
-        findings=_findings(result),
         facts=(
             Fact(label="Experiments", value=len(result.experiments), note=f"{rows} rows of feedback"),
             Fact(label="Effects found", value=len(last.findings), note=", ".join(last.causes)),
@@ -53,23 +50,6 @@ def loop_page(result: LoopResult) -> Page:
             ),
         ),
         sections=(_course(result), *(_section(result, k) for k in range(len(result.experiments)))),
-        footer=footer(),
-    )
-
-
-def _findings(result: LoopResult) -> tuple[Finding, ...]:
-    found = [
-        Finding(
-            code=f"effect.{item['effect']}" if item["effect"] in EFFECTS else "diagnosis.unexplained",
-            subject=f"{name_of(item)}:",
-            text=str(item.get("sentence", "")),
-            action=action_for(item["effect"], [item["joint"]]) if item["effect"] in EFFECTS else "",
-        )
-        for item in result.diagnosis.findings
-    ]
-    return (
-        *found,
-        *findings_of("loop.unfinished", [] if result.success else [f"The loop ended early: {result.ended}."]),
     )
 
 
@@ -118,6 +98,8 @@ def _course(result: LoopResult) -> Section:
 
 def _section(result: LoopResult, index: int) -> Section:
     experiment, robot = result.experiments[index], result.robot
+    # What the last one shows stands among the findings.
+    earlier = index + 1 < len(result.experiments)
     verdict = _seen(experiment)
     chance = "" if experiment.resolves is None else f" Stated probability: {100 * experiment.resolves:.0f} %."
     motion, _ = read_trajectory(Path(result.folder) / experiment.runs[0].trajectory, n=robot.n)
@@ -127,22 +109,20 @@ def _section(result: LoopResult, index: int) -> Section:
             f"{experiment.why[:1].upper()}{experiment.why[1:]}.{chance}",
             f"Diagnosis: {verdict.verdict}. Files: {verdict.folder}.",
         ),
-        pictures=(
-            trajectory_picture(
-                motion.t,
-                motion.q,
-                motion.dq,
-                motion.ddq,
-                limits=robot.limits,
-                joint_names=robot.joint_names,
-                kinds=robot.chain.kinds,
-                name=f"trajectory_{index + 1}",
-            ),
-        ),
+        pictures=(motion_picture(robot, motion, name=f"trajectory_{index + 1}"),),
         tables=(
             Table(
-                headings=("cause", "p-value", "held-out error [%]", "with it [%]", "what it does"),
-                rows=tuple(_finding(finding) for finding in verdict.findings),
+                headings=(
+                    "cause",
+                    "p-value",
+                    "held-out error [%]",
+                    "with it [%]",
+                    *(("what it does",) if earlier else ()),
+                ),
+                rows=tuple(
+                    (*_finding(finding), *((str(finding.get("sentence", "")),) if earlier else ()))
+                    for finding in verdict.findings
+                ),
                 caption="What the logs up to here show beyond the base model.",
             ),
             Table(
@@ -159,7 +139,7 @@ def _finding(finding: dict[str, object]) -> tuple[Cell, ...]:
     assert isinstance(gain, dict)
     chance = "-" if not isinstance(p, float) else f"{p:.2g}" if p >= CHANCE else f"< {CHANCE:g}"
     before, after = (None if gain[key] is None else 100 * gain[key] for key in ("nrmse_before", "nrmse_after"))
-    return name_of(finding), chance, before, after, str(finding.get("sentence", ""))
+    return name_of(finding), chance, before, after
 
 
 def _run(experiment: Experiment, index: int) -> tuple[Cell, ...]:

@@ -5,10 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from estimation.monitoring.fleets import FleetResult, RobotRow
-from oed.reports.rendering.page import Cell, Fact, Finding, Page, Section, Status, Table
+from oed.reports.rendering.page import Fact, Page, Section, Status, Table, page_of, table_of
 from oed.reports.rendering.palette import joint_role
 from oed.reports.rendering.picture import Line, Panel, Picture, Series
-from oed.reports.rendering.provenance import footer
 from oed.reports.rendering.saving import save_page
 from robots.common.files import ResultFolder
 
@@ -25,13 +24,9 @@ def fleet_page(result: FleetResult) -> Page:
     """Builds the page: lights, the table of robots, the trends of the worst, and logs that were left out."""
     left_out = tuple((row.name, log.name, log.note) for row in result.rows for log in row.logs if not log.used)
     drawn = [row for row in result.rows if row.trend.hours][:DRAWN]
-    return Page(
+    return page_of(
+        result,
         title="Fleet",
-        verdict=_verdict(result),
-        findings=tuple(
-            Finding(code=f"fleet.{row.light}", subject=f"{row.name}:", text=row.text, action=row.advice)
-            for row in result.rows
-        ),
         facts=(
             _count(result, "red", "need action", "act"),
             _count(result, "amber", "to be watched", "note"),
@@ -68,13 +63,7 @@ def fleet_page(result: FleetResult) -> Page:
                 else ()
             ),
         ),
-        footer=footer(),
     )
-
-
-def _verdict(result: FleetResult) -> str:
-    worst = result.rows[0]
-    return f"{result.verdict()} Begin with {worst.name}. {worst.advice}".strip() if worst.advice else result.verdict()
 
 
 def _count(result: FleetResult, light: str, note: str, status: Status = "neutral") -> Fact:
@@ -83,22 +72,15 @@ def _count(result: FleetResult, light: str, note: str, status: Status = "neutral
 
 
 def _robots(result: FleetResult) -> Table:
-    rows: list[tuple[Cell, ...]] = []
-    for row in result.rows:
-        low, high = row.heat
-        rows.append(
-            (
-                row.light,
-                row.name,
-                row.text,
-                row.since or None,
-                row.advice or None,
-                f"{len(row.logs) - row.left_out} of {len(row.logs)}",
-                f"{low:+.0f} to {high:+.0f} %" if row.trend.hours else None,
-            )
-        )
-    return Table(
-        headings=("light", "robot", "finding", "since", "what to do", "logs used", "by temperature"), rows=tuple(rows)
+    return table_of(
+        result.rows,
+        {
+            "light": lambda row: row.light,
+            "robot": lambda row: row.name,
+            "since": lambda row: row.since or None,
+            "logs used": lambda row: f"{len(row.logs) - row.left_out} of {len(row.logs)}",
+            "by temperature": lambda row: f"{row.heat[0]:+.0f} to {row.heat[1]:+.0f} %" if row.trend.hours else None,
+        },
     )
 
 

@@ -8,9 +8,9 @@ from estimation.monitoring import MonitorResult
 from estimation.monitoring.findings import LIGHTS
 from estimation.monitoring.result import HEAT_WORDS
 from oed.reports.pictures.monitor_pictures import trend_picture
-from oed.reports.rendering.page import Cell, Fact, Finding, Page, Section, Status, Table, findings_of
+from oed.reports.rendering.page import Cell, Fact, Page, Section, Status, Table, page_of, table_of
 from oed.reports.rendering.picture import Picture
-from oed.reports.rendering.provenance import Recording, footer
+from oed.reports.rendering.provenance import Recording
 from oed.reports.rendering.saving import save_page
 from robots.common.files import ResultFolder
 
@@ -27,14 +27,13 @@ def monitor_page(result: MonitorResult) -> Page:
     """Builds the page: findings, trends of all joints, and the logs."""
     low, high = result.heat_range
     left_out = [row for row in result.logs if not row.used]
-    return Page(
+    return page_of(
+        result,
         title="Monitoring",
         robot=result.robot,
-        verdict=_verdict(result),
         logs=tuple(
             Recording(name=row.name, start=row.start, duration=row.end - row.start) for row in result.logs if row.used
         ),
-        findings=_findings(result),
         facts=(
             Fact(label="Light", value=result.light, status=STATUS[result.light]),
             Fact(label="Findings", value=len(result.findings)),
@@ -62,39 +61,23 @@ def monitor_page(result: MonitorResult) -> Page:
             Section(title="Logs", tables=(_logs(result),), folded=len(result.logs) > 40),
             *_change_points(result),
         ),
-        footer=footer(),
-    )
-
-
-def _verdict(result: MonitorResult) -> str:
-    urgent = [finding for finding in result.findings if LIGHTS[finding.severity] == result.light]
-    if not urgent or result.light == "green":
-        return "No change beyond what temperature explains."
-    return " ".join(dict.fromkeys(finding.advice() for finding in urgent))
-
-
-def _findings(result: MonitorResult) -> tuple[Finding, ...]:
-    return (
-        *(
-            Finding(code=f"change.{item.kind}", text=item.sentence(result.origin), action=item.advice())
-            for item in result.findings
-        ),
-        *(
-            Finding(code="log.left_out", subject=f"{row.name}:", text=f"left out: {row.note}")
-            for row in result.logs
-            if not row.used
-        ),
-        *findings_of("monitor.note", result.notes),
     )
 
 
 def findings_table(result: MonitorResult) -> Table:
     """A row per finding."""
-    rows: list[tuple[Cell, ...]] = [
-        (LIGHTS[f.severity], f.kind, f.joint, f.sentence(result.origin), f.log or None, f.advice())
-        for f in result.findings
-    ]
-    return Table(headings=("light", "kind", "joint", "finding", "log", "what to do"), rows=tuple(rows))
+    return table_of(
+        result.findings,
+        {
+            "light": lambda f: LIGHTS[f.severity],
+            "kind": lambda f: f.kind,
+            "joint": lambda f: f.joint,
+            "size": lambda f: f"{f.size:+.3g} {f.unit}".rstrip() if f.unit else None,
+            "95 %": lambda f: f"{f.low:+.3g} to {f.high:+.3g}" if f.unit else None,
+            "since": lambda f: f.date(result.origin),
+            "log": lambda f: f.log or None,
+        },
+    )
 
 
 def trends(result: MonitorResult, name: str = "trends") -> Picture:
@@ -125,18 +108,22 @@ def trends(result: MonitorResult, name: str = "trends") -> Picture:
 
 
 def _logs(result: MonitorResult) -> Table:
-    rows: list[tuple[Cell, ...]] = []
-    for row in result.logs:
-        start = result.since(row.start) if np.isfinite(row.start) else None
-        rows.append((row.name, start, "used" if row.used else "left out", ", ".join(row.findings) or row.note or None))
-    return Table(headings=("log", "start", "", "findings"), rows=tuple(rows))
+    return table_of(
+        result.logs,
+        {
+            "log": lambda row: row.name,
+            "start": lambda row: result.since(row.start) if np.isfinite(row.start) else None,
+            "": lambda row: "used" if row.used else "left out",
+            "findings": lambda row: ", ".join(row.findings) or row.note or None,
+        },
+    )
 
 
 def _change_points(result: MonitorResult) -> tuple[Section, ...]:
     if result.change_points is None:
         return ()
     rows: tuple[tuple[Cell, ...], ...] = tuple(
-        (joint, result.since(time), f"{percent:+.3g} %") for joint, time, percent in result.change_points.points
+        (point.joint, result.since(point.time), f"{point.percent:+.3g} %") for point in result.change_points
     )
     return (
         Section(

@@ -5,8 +5,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from oed.reports.animations.animation import NEAR, Animation
-from oed.reports.rendering.page import Fact, Finding, Page, Section, Status
+from oed.reports.rendering.page import Fact, Page, Section, Status
 from oed.reports.rendering.provenance import Recording, footer
+from robots.common.records import Finding
 from robots.limits import Margin
 
 TITLE = "Robot in 3-D"
@@ -28,7 +29,7 @@ def motion_page(animation: Animation, *, logs: Sequence[Recording] = (), finding
         Finding(
             code="limit.exceeded_in_log" if recorded else "limit.exceeded",
             subject=f"Joint {margin.joint}:",
-            text=f"the {animation.source} exceeds the limit of {approach_text(margin)}.",
+            text=f"the {animation.source} exceeds the limit of {margin.text}.",
             action="Check the limits in the robot's description." if recorded else "Do not play it.",
         )
         for margin in beyond
@@ -76,20 +77,14 @@ def tightest_fact(margin: Margin, *, exceeded: Status = "act") -> Fact:
     return Fact(
         label="Tightest limit",
         value=f"{100 * margin.slack_fraction:.2f} % left",
-        note=approach_text(margin),
+        note=margin.text,
         status=exceeded if margin.violated else "good",
     )
 
 
-def approach_text(margin: Margin) -> str:
-    """Names a limit, its joint and the time, such as "velocity of joint 3 at 1.204 s"."""
-    quantity = "position" if margin.quantity in ("lower", "upper") else margin.quantity
-    return f"{quantity} of joint {margin.joint} at {margin.time:.3f} s"
-
-
 def _verdict(animation: Animation, beyond: Sequence[Margin], tightest: Margin | None, effects: int) -> str:
     if beyond:
-        return f"The {animation.source} exceeds {len(beyond)} of the robot's limits, first {approach_text(beyond[0])}."
+        return f"The {animation.source} exceeds {len(beyond)} of the robot's limits, first {beyond[0].text}."
     if tightest is None:
         return f"The robot's description states no limits; the {animation.source} was not checked."
     kept = f"The {animation.source} of {animation.duration:.1f} s keeps the robot's limits"

@@ -15,7 +15,7 @@ from estimation.diagnosis.hypothesis_tests.fitted_effects import FittedEffect
 from estimation.diagnosis.hypothesis_tests.hypotheses import Hypothesis
 from estimation.diagnosis.recordings.log_reading import build_recording
 from estimation.diagnosis.simulations.forward_simulation import FittedRobot, simulate_both
-from estimation.diagnosis.simulations.simulation_result import Simulation, read_simulation
+from estimation.diagnosis.simulations.simulation_result import Simulation
 from robots.base_parameters import find_base_parameters
 from robots.plants import simulate
 from robots.plants.closed_loop import Loop
@@ -179,4 +179,4 @@ def test_the_file_says_what_is_assumed() -> None:
     data = simulation.to_dict()
     assert data["loop"] == {"bandwidth_hz": 4.0, "damping": 1.0}
     assert data["torque"]["after"] == [0.01, None]
-    assert read_simulation(data).to_dict() == data
+    assert Simulation.from_dict(data).to_dict() == data

@@ -64,7 +64,7 @@ def test_worst_first_and_resumed(place, arm, tmp_path, monkeypatch):
 def test_rows_survive_their_files():
     """A row that is read from its file is the row."""
     row = RobotRow.failed("one", "no rows")
-    assert RobotRow.from_state(json.loads(json.dumps(row.to_state()))) == row
+    assert RobotRow.from_dict(json.loads(json.dumps(row.to_dict(whole=True))), whole=True) == row
 
 
 def test_folders_that_are_no_fleet(tmp_path):

@@ -89,7 +89,7 @@ def test_heat_with_pauses_is_restored(geared):
     state = HeatState("model", geared)
     worked(state, 1.0, 25.0)
     state.work.duties = [0.8, 0.9]
-    other = HeatState.from_dict(state.to_dict(), geared)
+    other = HeatState.from_dict(state.to_dict(), kind="model", baseline=geared)
     for each in (state, other):
         each.advance(np.full(6, 50.0), 10.0, None)
         each.pause(600.0, None)

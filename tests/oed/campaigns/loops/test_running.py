@@ -173,7 +173,7 @@ def test_what_is_refused(two, designed, tmp_path: Path) -> None:
     with pytest.raises(InputError, match="a speed of 0"):
         run(speed=0.0)
     (folder / "loop.json").write_text("{")
-    with pytest.raises(InputError, match="no state of a loop"):
+    with pytest.raises(InputError, match="not a loop file"):
         run()
     (folder / "mine.txt").write_text("kept")
     with pytest.raises(LinkError):

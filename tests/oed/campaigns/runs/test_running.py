@@ -88,7 +88,7 @@ def test_what_is_refused(campaign: Path, tmp_path: Path, monkeypatch: pytest.Mon
     with pytest.raises(InputError, match="planned again"):
         run_campaign(campaign, NOWHERE)
     (campaign / "run.json").write_text("{}")
-    with pytest.raises(InputError, match="no state of a run"):
+    with pytest.raises(InputError, match="not a campaign run file"):
         run_campaign(campaign, NOWHERE)
     (campaign / "run.json").unlink()
     (campaign / "logs").mkdir(exist_ok=True)

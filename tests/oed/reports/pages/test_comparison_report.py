@@ -15,6 +15,7 @@ from oed.reports.pages.comparisons.comparison_report import parts_picture
 from robots import load_robot
 from robots.base_parameters import find_base_parameters
 from robots.regressor import default_model
+from tests.oed.reports.said_once import said_twice
 
 pytestmark = pytest.mark.slow
 
@@ -79,8 +80,9 @@ def test_damage_is_never_green(model):
     page = comparison_page(compare(runs_of(model, 2, 1.3)))
     assert page.level == "act"
     assert "Friction changed on joint 2 alone: inspect it." in page.verdict
-    friction = next(section for section in page.sections if section.title == "Friction")
-    assert any(text.startswith("Joint 2: friction +3") and "inspect this joint" in text for text in friction.paragraphs)
+    texts = [finding.text for finding in page.listed]
+    assert any(text.startswith("Joint 2: friction +3") and "inspect this joint" in text for text in texts)
+    assert said_twice(page) == []
 
 
 def test_works_in_a_browser(model: Model, in_browser: Callable[[Page], None]) -> None:

@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 
 from oed.experiments import Design, Effort, Ipopt
+from oed.experiments.quality import excitation_findings
 from oed.reports import Page, design_page, render, save_design_report, significant
-from oed.reports.pages.design_report import excitation_findings
 from robots.common.files import ResultFolder
 from robots.geometry.chain import Chain, Joint
 from robots.limits import Limits

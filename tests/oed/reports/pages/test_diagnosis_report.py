@@ -4,21 +4,28 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
+from estimation.diagnosis.experiment_plans.choices import Proposal
 from estimation.diagnosis.experiment_plans.detection_limits import Limit
+from estimation.diagnosis.experiment_plans.experiment_motions import Stage
+from estimation.diagnosis.experiment_plans.next_experiment import NextExperiment
+from estimation.diagnosis.findings import Finding, Gain, Parameter
+from estimation.diagnosis.results.diagnosis import Diagnosis, Trace
 from estimation.diagnosis.simulations.simulation_result import Curves, Simulation
 from oed.reports import Page
 from oed.reports.pages.diagnosis_limits import limits_page, limits_section
 from oed.reports.pages.diagnosis_report import diagnosis_page
-from oed.reports.pages.diagnosis_view import DiagnosisView, FindingView
 from oed.reports.pictures.diagnosis_pictures import binned, cause_picture, gain_picture
 from oed.reports.rendering.html import render
 from robots.common.errors import InputError
 from robots.plants.closed_loop import Loop
+from robots.signals import Motion
 from robots.terms.effects import EFFECTS
+from tests.oed.reports.said_once import said_twice
 
 N = 400
 LIMITS = tuple(
@@ -35,61 +42,60 @@ LIMITS = tuple(
 
 
 @pytest.fixture
-def view():
+def found():
     random = np.random.default_rng(0)
     t = 0.01 * np.arange(N)
     speed = np.sin(t)
     base = random.normal(size=(N, 2))
     bend = np.column_stack([np.zeros(N), np.exp(-np.abs(speed) / 0.1) * np.sign(speed)])
-    finding = FindingView(
+    finding = Finding(
         effect="stribeck",
-        title="Stribeck friction",
         sentence="Joint 2 needs 1 N m more than its Coulomb friction to break away.",
         joint=2,
-        parameters=(
-            ("stribeck_torque", 1.0, "N m", 0.9, 1.1),
-            ("exponent", 1.3, "1", np.nan, np.nan),
-            ("order", 320.0, "periods per turn", 319.967, 320.033),
-            ("friction_share", 1.0, "1", 1.0, 1.0),
+        parameters=tuple(
+            Parameter(name=name, value=value, unit=unit, ci95=(low, high), standard_error=np.nan, determined=True)
+            for name, value, unit, low, high in (
+                ("stribeck_torque", 1.0, "N m", 0.9, 1.1),
+                ("exponent", 1.3, "1", np.nan, np.nan),
+                ("order", 320.0, "periods per turn", 319.967, 320.033),
+                ("friction_share", 1.0, "1", 1.0, 1.0),
+            )
         ),
         p_value=0.001,
         delta_bic=86.0,
-        before=0.1,
-        after=0.05,
-        interval=(0.03, 0.07),
+        gain=Gain(nrmse_before=0.1, nrmse_after=0.05, ci95=(0.03, 0.07)),
         rivals=(("presliding", 40.0),),
-        shown_on=2,
-        label="velocity of joint 2 [rad/s]",
-        coordinate=speed,
-        residual_before=bend[:, 1] + 0.1 * random.normal(size=N),
-        residual_after=0.1 * random.normal(size=N),
+        visible=0.5,
+        coordinate="velocity of joint 2 [rad/s]",
     )
-    return DiagnosisView(
-        robot="two <joints>",
+    kinds = SimpleNamespace(kinds=("prismatic", "revolute"))
+    robot = SimpleNamespace(name="two", title="two <joints>", joint_names=("lift", "swing"), chain=kinds, n=2)
+    noise = 0.1 * random.normal(size=(N, 2))
+    return Diagnosis(
         verdict="named",
         findings=(finding,),
-        joint_names=("lift", "swing"),
-        kinds=("prismatic", "revolute"),
-        t=t,
-        measured=base + bend,
-        base=base,
-        extended=base + bend,
-        nrmse_before=np.array([0.05, 0.1]),
-        nrmse_after=np.array([0.05, 0.05]),
-        nrmse_every=np.array([0.07, np.nan]),
-        unseen="a log that the fit has not seen",
+        baseline=np.array([0.05, 0.1]),
+        extended=np.array([0.05, 0.05]),
+        explained=1.0,
+        excess=np.full((2, 3), np.nan),
         limits=LIMITS,
-        next_kind="constant speeds",
-        next_why="it would show them apart",
-        next_resolves=0.98,
-        next_ranking=(("constant speeds", 0.98, 60.0),),
+        next_experiment=NextExperiment(
+            kind="sweep",
+            joint=None,
+            why="it would show them apart",
+            resolves=0.98,
+            ranking=(Proposal(kind="sweep", resolves=0.98, duration=60.0),),
+        ),
+        model=SimpleNamespace(robot=robot, provenance={"unseen_nrmse": [0.07, None]}),
+        how_unseen="a log that the fit has not seen",
+        trace=Trace(t=t, measured=base + bend, before=bend + noise, after=noise, coordinate=(speed,)),
     )
 
 
 @pytest.mark.slow
-def test_the_page_tells_all(view):
+def test_the_page_tells_all(found):
     """The page holds verdict, finding, parameters, rivals, gain, limits and next step, and escapes names."""
-    text = render(diagnosis_page(view))
+    text = render(diagnosis_page(found))
     for part in ("Joint 2 needs 1 N m more", "stribeck torque", "0.900 to 1.10", "presliding", "10 → 5 %", "hidden"):
         assert part in text, part
     assert "not determined by these logs" in text
@@ -99,9 +105,24 @@ def test_the_page_tells_all(view):
     assert "two <joints>" not in text
 
 
+def test_a_finding_is_said_once(found):
+    """One finding stands in the verdict, several stand in rows; sections show the evidence without their sentences."""
+    (one,) = found.findings
+    other = replace(one, effect="spring", sentence="A spring acts on joint 2 that is stiffer than the gear.")
+    pattern = replace(
+        one, effect="unexplained", pattern="p", sentence="A pattern repeats with the position of joint 1."
+    )
+    trace = replace(found.trace, coordinate=found.trace.coordinate * 3)
+    several = replace(found, findings=(one, other, pattern), trace=trace)
+    for verdict in ("named", "unexplained", "ambiguous"):
+        assert said_twice(diagnosis_page(replace(several, verdict=verdict))) == []
+    assert said_twice(diagnosis_page(found)) == []
+    assert one.sentence in diagnosis_page(found).verdict
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize(
-    ("verdict", "expected", "found", "following", "level"),
+    ("verdict", "expected", "stated", "following", "level"),
     [
         (
             "none",
@@ -120,55 +141,56 @@ def test_the_page_tells_all(view):
         ),
     ],
 )
-def test_a_page_without_findings(verdict, expected, found, following, level, view):
+def test_a_page_without_findings(verdict, expected, stated, following, level, found):
     """Where nothing is named, the verdict says so, what would have been seen, and what to do."""
-    page = diagnosis_page(replace(view, verdict=verdict, findings=(), next_kind=""))
+    page = diagnosis_page(replace(found, verdict=verdict, findings=(), next_experiment=None))
     assert expected in page.verdict
     assert page.level == level
-    assert found in render(page)
+    assert stated in render(page)
     assert following in render(page)
 
 
 @pytest.mark.slow
-def test_no_chance_is_reported_that_nobody_knows(view):
+def test_no_chance_is_reported_that_nobody_knows(found):
     """What the smallest number of a computer says of a probability is no probability."""
-    sure = replace(view, findings=(replace(view.findings[0], p_value=2.2e-308),))
+    sure = replace(found, findings=(replace(found.findings[0], p_value=2.2e-308),))
     text = render(diagnosis_page(sure))
     assert "e-308" not in text
     assert "1e-12" in text
 
 
 @pytest.mark.parametrize(("interval", "stated"), [((0.03, 0.07), True), ((-0.01, 0.02), False)])
-def test_what_brings_nothing_explains_nothing(interval, stated, view):
+def test_what_brings_nothing_explains_nothing(interval, stated, found):
     """A free function that stands out of the noise and does not surely help elsewhere explains no part of the error."""
-    finding = replace(view.findings[0], interval=interval)
-    page = diagnosis_page(replace(view, verdict="unexplained", findings=(finding,)))
+    finding = replace(found.findings[0], gain=replace(found.findings[0].gain, ci95=interval))
+    page = diagnosis_page(replace(found, verdict="unexplained", findings=(finding,)))
     assert ("part of the error has no known cause" in page.verdict) == stated
     assert page.level == "act"
-    assert any(found.text == finding.sentence for found in page.findings)
+    assert any(one.text == finding.sentence for one in page.findings)
 
 
-def test_the_error_of_every_row_is_reported_where_it_is_known(view):
+def test_the_error_of_every_row_is_reported_where_it_is_known(found):
     """Beside the error of rows that count stands that of `oed predict`, which has them all."""
-    (table,) = next(s for s in diagnosis_page(view).sections if s.title.startswith("Measured")).tables
+    (table,) = next(s for s in diagnosis_page(found).sections if s.title.startswith("Measured")).tables
     assert table.headings[-1] == "all rows [%]"
     assert [row[-1] for row in table.rows] == [pytest.approx(7.0), None]
 
 
-def test_the_error_reported_is_that_of_a_joint_with_a_finding(view):
+def test_the_error_reported_is_that_of_a_joint_with_a_finding(found):
     """Another joint may change by more, for what the base model makes of it: that is not what was found."""
-    page = diagnosis_page(replace(view, nrmse_before=np.array([0.2, 0.1]), nrmse_after=np.array([0.1, 0.11])))
+    page = diagnosis_page(replace(found, baseline=np.array([0.2, 0.1]), extended=np.array([0.1, 0.11])))
     assert page.facts[1].label == "Error of joint 2, held-out data"
-    whole = replace(view.findings[0], joint=None)
-    page = diagnosis_page(replace(view, findings=(whole,), nrmse_before=np.array([0.2, 0.1])))
+    whole = replace(found.findings[0], joint=None)
+    page = diagnosis_page(replace(found, findings=(whole,), baseline=np.array([0.2, 0.1])))
     assert page.facts[1].label == "Error of joint 1, held-out data"
 
 
 @pytest.mark.slow
-def test_what_has_no_name_is_not_stated_to_need_no_experiment(view):
+def test_what_has_no_name_is_not_stated_to_need_no_experiment(found):
     """Findings without a name leave the cause open: the page says how to look for it."""
     named, unexplained = (
-        render(diagnosis_page(replace(view, verdict=verdict, next_kind=""))) for verdict in ("named", "unexplained")
+        render(diagnosis_page(replace(found, verdict=verdict, next_experiment=None)))
+        for verdict in ("named", "unexplained")
     )
     assert "No further experiment is needed" in named
     assert "No further experiment is needed" not in unexplained
@@ -176,20 +198,23 @@ def test_what_has_no_name_is_not_stated_to_need_no_experiment(view):
 
 
 @pytest.mark.slow
-def test_a_rare_rival_that_fits_as_well_is_not_passed_over(view):
+def test_a_rare_rival_that_fits_as_well_is_not_passed_over(found):
     """A cause is named although what few robots have fits about as well: the next step says so."""
-    close = replace(view.findings[0], rivals=(("shear thinning", 7.9), ("presliding", 40.0)))
-    text = render(diagnosis_page(replace(view, findings=(close,), next_kind="")))
+    close = replace(found.findings[0], rivals=(("shear thinning", 7.9), ("presliding", 40.0)))
+    text = render(diagnosis_page(replace(found, findings=(close,), next_experiment=None)))
     assert "If your robot may have it" in text
     assert "about as well: shear thinning." in text
 
 
 @pytest.mark.slow
-def test_what_to_play_next_is_reported(view):
+def test_what_to_play_next_is_reported(found):
     """The page lists which motion is played when, with what payload and base, and where the motion comes from."""
-    run = {"motion": 1, "pause_s": 2.0, "payload_kg": 0.0, "gravity": None}
-    tilted = run | {"pause_s": 60.0, "payload_kg": 4.5, "gravity": [2.54, 0.0, -9.475]}
-    text = render(diagnosis_page(replace(view, next_logged="monday from t = 0 to 40 s", next_runs=(run, tilted))))
+    t = 0.1 * np.arange(4)
+    motion = Motion(t=t, q=np.zeros((4, 2)), dq=np.zeros((4, 2)), ddq=np.zeros((4, 2)))
+    run = Stage(motion=motion, pause=2.0, payload=0.0, gravity=None)
+    tilted = replace(run, pause=60.0, payload=4.5, gravity=np.array([2.54, 0.0, -9.475]))
+    plan = replace(found.next_experiment, logged="monday from t = 0 to 40 s", stages=(run, tilted))
+    text = render(diagnosis_page(replace(found, next_experiment=plan)))
     for part in ("next_experiment_1.csv", "2.54, 0, -9.475", "4.5", "The motion is that of monday from t = 0 to 40 s"):
         assert part in text, part
 
@@ -218,7 +243,7 @@ def test_a_note_is_reported_of_the_places_it_is_of():
 
 
 @pytest.mark.slow
-def test_the_simulated_motion_is_reported(view):
+def test_the_simulated_motion_is_reported(found):
     """The page says what was simulated under which loop, per joint in its unit, and draws the joint that changes."""
     t = 0.01 * np.arange(N)
     two = np.column_stack([np.sin(t), np.cos(t)])
@@ -232,7 +257,7 @@ def test_the_simulated_motion_is_reported(view):
         note="As it is.",
         curves=curves,
     )
-    page = diagnosis_page(replace(view, simulation=simulation))
+    page = diagnosis_page(replace(found, simulation=simulation))
     (picture,) = (picture for picture in page.pictures if picture.name == "simulation")
     assert "swing" in picture.title
     assert picture.panels[1].y_label == "error [mrad]"
@@ -240,23 +265,23 @@ def test_the_simulated_motion_is_reported(view):
     text = render(page)
     for part in ("Simulated motion", "from 2.0 to 7.0 s", "The controller is assumed", "5 Hz", "As it is.", "mm"):
         assert part in text, part
-    again = diagnosis_page(replace(view, simulation=replace(simulation, curves=None)))
+    again = diagnosis_page(replace(found, simulation=replace(simulation, curves=None)))
     assert "simulation" not in [picture.name for picture in again.pictures]
 
 
-def test_an_ambiguous_verdict_is_no_good_news(view):
+def test_an_ambiguous_verdict_is_no_good_news(found):
     """An ambiguous diagnosis says so, and warns."""
-    page = diagnosis_page(replace(view, verdict="ambiguous"))
+    page = diagnosis_page(replace(found, verdict="ambiguous"))
     assert page.level == "act"
     assert "several causes fit" in page.verdict
 
 
 @pytest.mark.slow
-def test_without_unseen_data_no_gain_is_claimed(view):
+def test_without_unseen_data_no_gain_is_claimed(found):
     """Where no run was left to measure on, the page shows no error bars and no percentages."""
     none = np.full(2, np.nan)
-    finding = replace(view.findings[0], before=np.nan, after=np.nan, interval=(np.nan, np.nan))
-    page = diagnosis_page(replace(view, nrmse_before=none, nrmse_after=none, findings=(finding,)))
+    finding = replace(found.findings[0], gain=Gain(nrmse_before=np.nan, nrmse_after=np.nan, ci95=(np.nan, np.nan)))
+    page = diagnosis_page(replace(found, baseline=none, extended=none, findings=(finding,)))
     assert [picture.name for picture in page.pictures] == ["torque", "cause-1"]
     assert "percentage points" not in render(page)
     assert all("unseen" not in fact.label for fact in page.facts)
@@ -315,7 +340,7 @@ def test_the_page_of_a_plan():
 
 
 @pytest.mark.slow
-def test_works_in_a_browser(view: DiagnosisView, in_browser: Callable[[Page], None]) -> None:
+def test_works_in_a_browser(found: Diagnosis, in_browser: Callable[[Page], None]) -> None:
     """The pages of a diagnosis and of a plan pass all checks of `browser_checks`."""
-    in_browser(diagnosis_page(view))
+    in_browser(diagnosis_page(found))
     in_browser(limits_page(LIMITS, "two"))

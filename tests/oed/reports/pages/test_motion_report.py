@@ -44,7 +44,7 @@ def test_verdicts() -> None:
     # A robot that has made a motion can make it.
     assert motion_page(replace(beyond, source="log")).level == "note"
     assert motion_page(replace(kept, approaches=())).verdict.startswith("The robot's description states no limits")
-    found = motion_page(kept, findings=[Finding(code="effect.spring", text="A spring.")])
+    found = motion_page(kept, findings=[Finding(code="effect.design", text="A spring.")])
     assert "the diagnosis has 1 finding." in found.verdict
     assert found.level == "note"
 

@@ -32,6 +32,7 @@ from oed.reports.pages.thermal_report import thermal_page
 from robots import load_robot
 from robots.signals import Log, Motion
 from robots.thermal import SecondOrder
+from tests.oed.reports.said_once import said_twice
 
 pytestmark = pytest.mark.slow
 
@@ -216,6 +217,21 @@ def prediction() -> Prediction:
     )
 
 
+def test_what_was_found_is_said_once(tmp_path: Path) -> None:
+    """The verdict or one row says what was found; tables and sections show the evidence."""
+    result = monitored()
+    fleet = FleetResult(rows=(RobotRow.of("robot 7", result), RobotRow(name="x", light="green", text="-")))
+    pages = [
+        monitor_page(result),
+        fleet_page(fleet),
+        payload_page(payload()),
+        force_page(forces(), ("revolute",) * 2),
+        loop_page(loop(tmp_path)),
+    ]
+    assert [said_twice(page) for page in pages] == [[]] * len(pages)
+    assert any(page.findings for page in pages)
+
+
 def test_external_forces(in_browser: Callable[[Page], None]) -> None:
     """A contact asks for action, and the page passes all checks of `browser_checks`."""
     page = force_page(forces(), KINDS)
@@ -243,7 +259,7 @@ def test_monitor_and_fleet(in_browser: Callable[[Page], None]) -> None:
     page = monitor_page(result)
     assert page.level == "act"
     assert page.verdict.startswith("Inspect joint 2")
-    assert [finding.code for finding in page.findings] == ["change.damage", "log.left_out", "monitor.note"]
+    assert [finding.code for finding in page.findings] == ["change.act", "log.left_out", "monitor.note"]
     in_browser(page)
     fleet = fleet_page(FleetResult(rows=(RobotRow.of("robot 7", result), RobotRow(name="x", light="green", text="-"))))
     assert fleet.level == "act"

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import pytest
 
+from estimation.diagnosis.results.actions import ACTIONS, sentence_for
 from oed.reports import Finding, Page, severity
-from oed.reports.pages.diagnosis_actions import ACTIONS, sentence_for
-from oed.reports.rendering.severity import FAULTS, LEVELS
 from robots.common.errors import InputError
+from robots.common.records import effect_code
+from robots.common.records.findings import FAULTS, LEVELS
 from robots.terms.effects import EFFECTS
 
 
@@ -18,9 +19,9 @@ from robots.terms.effects import EFFECTS
         (("done",), "good"),
         (("done", "value.assumed"), "note"),
         (("value.assumed", "limit.exceeded", "done"), "act"),
-        (("effect.spring",), "note"),
-        (("effect.backlash",), "act"),
-        (("change.damage",), "act"),
+        (("effect.design",), "note"),
+        (("effect.fault",), "act"),
+        (("change.act",), "act"),
         (("log.refuse",), "act"),
     ],
 )
@@ -32,7 +33,7 @@ def test_the_most_urgent_finding_decides(codes: tuple[str, ...], level: str) -> 
 
 def test_findings_that_ask_for_action_are_never_green() -> None:
     """Each effect of the catalogue has a level above good; faults ask for action and say which."""
-    assert all(LEVELS[f"effect.{name}"] == ("act" if name in FAULTS else "note") for name in EFFECTS)
+    assert all(LEVELS[effect_code(name)] == ("act" if name in FAULTS else "note") for name in EFFECTS)
     assert set(ACTIONS) == set(FAULTS) <= set(EFFECTS)
 
 

@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from oed.reports import percent, significant, significant_error, with_error
+from oed.reports import rounded_percent, significant, significant_error, with_error
 
 
 @pytest.mark.parametrize(
@@ -49,7 +49,7 @@ def test_error_has_two_digits() -> None:
     """A standard error shows two digits, and a value is written with it."""
     assert [significant_error(error) for error in (0.0342, 0.0996, 12.0, 0.0)] == ["0.034", "0.10", "12", "0"]
     assert with_error(12.34567, 0.0342, "kg") == "12.346 ± 0.034 kg"
-    assert percent(0.0342) == "3.42 %"
+    assert rounded_percent(0.0342) == "3.42 %"
 
 
 @pytest.mark.slow

@@ -1,15 +1,12 @@
-"""How urgent a report is: one table of codes, and one function that decides."""
+"""What a result says to its reader: how urgent it is, in a sentence, and what to do."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable
+from dataclasses import dataclass
 from typing import Literal
 
-from estimation.gate.finding import Severity as LogSeverity
-from estimation.monitoring.findings import SEVERITIES as CHANGES
-from estimation.monitoring.findings import Severity as ChangeSeverity
 from robots.common.errors import InputError
-from robots.terms.effects import EFFECTS
 
 Level = Literal["good", "note", "act"]
 
@@ -32,9 +29,6 @@ FAULTS = (
     "torque_sensor_drift",
 )
 """Effects that a healthy, correctly set up robot does not have; the others belong to a robot's design."""
-
-_OF_LOGS: dict[LogSeverity, Level] = {"info": "good", "warning": "note", "refuse": "act"}
-_OF_CHANGES: dict[ChangeSeverity, Level] = {"info": "good", "watch": "note", "act": "act"}
 
 LEVELS: dict[str, Level] = {
     "done": "good",
@@ -85,17 +79,69 @@ LEVELS: dict[str, Level] = {
     "difference.payload": "note",
     "contact": "act",
     "loop.unfinished": "act",
-    # Logs.
+    # Logs and robots.
     "log.left_out": "note",
-    **{f"log.{name}": level for name, level in _OF_LOGS.items()},
-    **{f"change.{kind}": _OF_CHANGES[severity] for kind, severity in CHANGES.items()},
+    "log.info": "good",
+    "log.warning": "note",
+    "log.refuse": "act",
+    "change.info": "good",
+    "change.watch": "note",
+    "change.act": "act",
     "fleet.red": "act",
     "fleet.amber": "note",
     "fleet.grey": "act",
     "fleet.green": "good",
-    **{f"effect.{name}": "act" if name in FAULTS else "note" for name in EFFECTS},
+    "effect.design": "note",
+    "effect.fault": "act",
 }
-"""What a code of a result asks of its reader: nothing, to know it, or to act."""
+"""What a code of a finding asks of its reader: nothing, to know it, or to act."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Finding:
+    """One thing that a reader must know.
+
+    Args:
+        code: a key of `LEVELS`, which decides how urgent it is.
+        text: what was found, in a sentence.
+        subject: joint, log or part that it is about; empty for the whole.
+        action: what to do; empty where there is nothing to do.
+
+    Raises:
+        InputError: an unknown code.
+    """
+
+    code: str
+    text: str
+    subject: str = ""
+    action: str = ""
+
+    def __post_init__(self) -> None:
+        severity([self.code])
+
+    @property
+    def level(self) -> Level:
+        """How urgent it is."""
+        return LEVELS[self.code]
+
+
+def findings_of(code: str, texts: Iterable[str]) -> tuple[Finding, ...]:
+    """Makes one finding of each text.
+
+    Args:
+        code: a key of `LEVELS`, of all of them.
+        texts: what was found, each in a sentence or two.
+    """
+    return tuple(Finding(code=code, text=text) for text in texts)
+
+
+def effect_code(effect: str) -> str:
+    """Gives the code of an effect that was found: a fault of the robot, or a part of its design.
+
+    Args:
+        effect: its name in the catalogue.
+    """
+    return "effect.fault" if effect in FAULTS else "effect.design"
 
 
 def severity(codes: Iterable[str]) -> Level:
