@@ -1,6 +1,6 @@
-"""The checks of a log, one a file.
+"""The checks of a log, a file for each thing that they look at.
 
-`Check.stage` and `Check.order` give their sequence. A new check is a new file here.
+`Check.stage` and `Check.order` give their sequence. A new check is a new class here.
 """
 
 from __future__ import annotations

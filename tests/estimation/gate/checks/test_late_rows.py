@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from estimation.gate import Context
-from estimation.gate.checks.late_rows import LateRows
+from estimation.gate.checks.rows import LateRows
 
 STALLS = ((500, 7), (900, 11), (2100, 3), (3000, 10))
 RUSHED = 2e-4  # s between the times of rows that waited in a queue
