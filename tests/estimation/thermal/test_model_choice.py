@@ -30,6 +30,7 @@ class Listener:
 
 
 @pytest.mark.slow
+@pytest.mark.longer
 def test_two_time_constants_are_chosen_where_there_are_two(four_duties: Callable[[int], list[ThermalRun]]) -> None:
     """On the thesis' data the second order wins, and the first order's mean error is five times as large (Table 6)."""
     runs = [four_duties(11)[k] for k in (1, 3)]

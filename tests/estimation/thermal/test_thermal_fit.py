@@ -117,6 +117,7 @@ def test_heating_alone_is_said(heated: Callable[..., ThermalRun]) -> None:
     assert found["slow time constant at 97.65 W"].value == pytest.approx(SLOW, rel=0.08)
 
 
+@pytest.mark.longer
 def test_a_short_log_gives_a_bound(heated: Callable[..., ThermalRun]) -> None:
     """A quarter of an hour does not determine a time constant of half an hour: that is said, with a bound below it."""
     found = fit_thermal(heated(1.0, 4, heating=900.0, cooling=0.0), alpha=TRUTH["alpha"])
@@ -154,6 +155,7 @@ def test_motor_heat_is_distinguished_from_friction_heat(stages: Callable[..., tu
     assert found["K13"].value == found["K23"].value == 0.0
 
 
+@pytest.mark.longer
 def test_the_fractional_order_is_found() -> None:
     """From its own data, made by the closed form, the order comes out within 0.01."""
     truth = Fractional(alpha=-0.0141, beta=1.0, K=2.3, C=150.0, nu=0.6121)

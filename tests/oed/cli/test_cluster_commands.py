@@ -16,6 +16,7 @@ from tests.estimation.monitoring.arm import Arm, write
 
 
 @pytest.mark.slow
+@pytest.mark.longer
 def test_design_is_the_same_file(run, robot, dask_cluster, tmp_path: Path, monkeypatch) -> None:
     """Searches on a cluster give the files of searches in one process, byte for byte."""
     monkeypatch.setitem(EFFORTS, "quick", replace(EFFORTS["quick"], islands=2))

@@ -79,7 +79,9 @@ def ended(watch: Watch, feedback: Iterator[tuple[float, Array]]) -> tuple[float,
 
 @pytest.mark.slow
 @pytest.mark.parametrize("stamped", [True, False])
-@pytest.mark.parametrize(("kind", "runs"), [(TimedWatch, 100), (PathWatch, 25)])
+@pytest.mark.parametrize(
+    ("kind", "runs"), [(TimedWatch, 25), pytest.param(TimedWatch, 100, marks=pytest.mark.longer), (PathWatch, 25)]
+)
 def test_clean_runs_go_on(kind: type[Watch], runs: int, stamped: bool) -> None:
     """Runs with drives that lag, brakes that sag, a clock that drifts and late messages end at their end."""
     for seed in range(runs):

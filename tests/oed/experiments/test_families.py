@@ -102,6 +102,7 @@ class Power(oed.StateLimit):
 
 
 @pytest.mark.slow
+@pytest.mark.longer
 def test_own_limit_of_motion_decides_and_is_reported():
     """An own limit is used up by the optimised part, kept by the whole experiment, and stated with its margin.
 

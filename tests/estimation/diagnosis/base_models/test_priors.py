@@ -73,6 +73,7 @@ def test_what_a_description_lacks_is_not_taken_for_noise(arm: Robot, arm_log: Ca
 
 
 @pytest.mark.slow
+@pytest.mark.longer
 def test_friction_at_low_speed_is_no_difference_of_large_parts(data: Callable) -> None:
     """A log that its authors filtered: a third of the rows of joint 2 are too slow to count.
 

@@ -66,6 +66,7 @@ def test_the_chance_is_that_of_the_form_that_imitates_best(problem: Problem) -> 
 
 
 @pytest.mark.slow
+@pytest.mark.longer
 def test_a_plan_counts_with_such_forms(problem: Problem) -> None:
     """The planned chance is below that of causes with fixed shapes."""
     causes = [_cause(problem, "shear_thinning", (0.3,), 8.0), _cause(problem, "stribeck", (0.2, 2.0), 8.0)]

@@ -77,6 +77,7 @@ def test_a_spring_is_no_other_robot(er3a, good):
 
 
 @pytest.mark.slow
+@pytest.mark.longer
 def test_measured_logs_are_of_their_robots(data):
     """Published logs, wholes and halves, are of the robot that their source describes."""
     pairs = [

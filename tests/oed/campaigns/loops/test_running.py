@@ -126,6 +126,7 @@ def test_goes_on_after_an_interruption(two, designed, controllers, tmp_path: Pat
 
 
 @pytest.mark.slow
+@pytest.mark.longer
 def test_budget_and_probability(two, designed, controllers, tmp_path: Path, monkeypatch) -> None:
     """The loop ends with its reason where no experiment is left or will help, and goes on with a larger budget."""
     place = controllers()
@@ -203,6 +204,7 @@ def test_controllers_that_are_refused(settings, error, problem: str, two, design
 
 
 @pytest.mark.slow
+@pytest.mark.longer
 def test_two_hidden_effects_are_named(two, designed, controllers, tmp_path: Path) -> None:
     """On a virtual robot with two hidden effects the loop ends with both named, and the error at the noise.
 

@@ -86,6 +86,7 @@ def child(script: str, campaign: Path, endpoint: Endpoint, *further: object, **s
     return subprocess.run(list(map(str, words)), capture_output=True, text=True, check=False, timeout=120, **settings)
 
 
+@pytest.mark.longer
 def test_kills_while_files_are_written(campaign: Path, endpoint: Endpoint) -> None:
     """Killed while its files are written, and at a random time, a run ends with every stage recorded once."""
     moments = [*MOMENTS, f"after:{random.uniform(0.1, 2.5):.3f}"]

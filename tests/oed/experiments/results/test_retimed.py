@@ -39,6 +39,7 @@ def result(robot, given):
     return retime(robot, given)
 
 
+@pytest.mark.longer
 def test_assumed_limits_are_named(robot, result, given):
     """Limits that the description does not state are in the file, and on the page."""
     free = np.full(robot.n, np.inf)

@@ -97,6 +97,7 @@ def test_a_design_without_the_check_says_so_everywhere(er3a, tmp_path):
 
 
 @pytest.mark.slow
+@pytest.mark.longer
 def test_a_box_to_keep_out_of_is_kept_out_of(er3a):
     """A box in the arm's reach is never entered, and the sentence names it."""
     pose = np.eye(4)

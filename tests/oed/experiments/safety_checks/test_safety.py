@@ -76,6 +76,7 @@ def test_the_torque_limit_decides(er3a):
 
 
 @pytest.mark.slow
+@pytest.mark.longer
 def test_the_rms_torque_decides(er3a):
     """Where the free design is too hard on a motor in the mean, the limited one is not, by pinocchio."""
     free = design(er3a, periods=3)
@@ -134,6 +135,7 @@ def test_clearance_decides_and_is_proved(er3a, free_design):
 
 
 @pytest.mark.slow
+@pytest.mark.longer
 def test_strokes_that_would_collide_are_left_out_or_free():
     """With strokes the whole experiment is still free; joints without a stroke are named."""
     robot = load_robot("panda")

@@ -31,6 +31,7 @@ def file_of(design: Design, folder: Path) -> bytes:
     return (folder / "trajectory.csv").read_bytes()
 
 
+@pytest.mark.longer
 def test_same_seed_same_file(make_robot, tiny, brief, tmp_path: Path) -> None:
     """The same seed gives the same file byte for byte, in this process and in two others; another seed does not."""
     robot, effort = make_robot("RR", "two"), replace(tiny, islands=2)
