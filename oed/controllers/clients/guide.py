@@ -3,23 +3,21 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 
 import numpy as np
-from numpy.typing import NDArray
 
 from oed.controllers.clients.command_lag import CommandLag
 from oed.controllers.clients.options import StreamOptions
+from oed.controllers.clients.sender import Advance, Array, Sender, Watch
 from oed.controllers.clients.traffic import Traffic
 from oed.controllers.egm.link import EgmLink
 from oed.controllers.egm.messages import EgmForm
-from oed.controllers.errors import ControllerError, NoReplyError
+from oed.controllers.errors import NoReplyError
 from oed.controllers.recording.recorder import Recorder
 from oed.exports.simple_message import FullPoint, MessageError, Point
 from robots.robot import Robot
 from robots.signals import Motion
-
-Array = NDArray[np.float64]
 
 CYCLE = 0.004
 """Of the controller [s]."""
@@ -36,8 +34,8 @@ DECELERATION = 5.0
 TURN = 0.005
 
 
-class GuidePlayer:
-    """Plays by answers; see `Requests`.
+class GuidePlayer(Sender):
+    """Plays by answers; see `Sender`.
 
     Args:
         link: to the controller.
@@ -69,23 +67,12 @@ class GuidePlayer:
         self._command: Array = motion.q[0]
         self._speed: Array = np.zeros(motion.n)
         self._stopping: float | None = None
-        self.lag = CommandLag(motion)
+        self.lag = self._lag = CommandLag(motion)
 
-    def see(self, _: float, q: Array) -> None:
-        """Takes a row of feedback; see `Recorder.watch`."""
+    def see(self, stamp: float, q: Array) -> None:
+        """Takes a row of feedback; see `Sender.see`."""
         if self._elapsed > APPROACH and self._stopping is None:
-            self.lag.see(self._elapsed - APPROACH, q)
-
-    def ping(self, patience: float | None = None) -> float:
-        """There are no pings.
-
-        Raises:
-            ControllerError: always.
-        """
-        raise ControllerError("EGM knows no pings")
-
-    def keep_alive(self) -> None:
-        """The answers go on by themselves."""
+            self._lag.see(self._elapsed - APPROACH, q)
 
     def start(self) -> None:
         """Begins to answer: the robot is brought to the first point."""
@@ -95,24 +82,8 @@ class GuidePlayer:
         self.traffic.begun = True
         self._link.answer = self._answer
 
-    def stream(
-        self,
-        points: Iterable[FullPoint | Point],
-        watch: Callable[[], None],
-        advance: Callable[[int], None],
-        longest_step: float,
-    ) -> None:
-        """Waits until the last point is the answer.
-
-        Args:
-            points: of no use: positions are those of the controller's time.
-            watch: raises where the stream must end for another reason.
-            advance: is given the number of points up to now.
-            longest_step: of no use.
-
-        Raises:
-            NoReplyError: nothing is asked for within the patience.
-        """
+    def stream(self, points: Iterable[FullPoint | Point], watch: Watch, advance: Advance, longest_step: float) -> None:
+        """Waits until the last point is the answer: positions are those of the controller's time."""
         count, last, changed = len(self._motion), -1.0, time.monotonic()
         while self.traffic.sent < count:
             watch()
@@ -125,14 +96,6 @@ class GuidePlayer:
             self.traffic.sent = int(np.clip(np.floor(place + 1e-6) + 1, 0, count))
             advance(self.traffic.sent)
             time.sleep(TURN)
-
-    def download(self, points: Iterable[FullPoint | Point], watch: Callable[[], None], advance: object) -> None:
-        """There is no download.
-
-        Raises:
-            ControllerError: always.
-        """
-        raise ControllerError("EGM takes no download", remedy="leave out --download")
 
     def stop(self) -> bool:
         """Brings the robot to rest, then answers nothing more; says whether it stands."""

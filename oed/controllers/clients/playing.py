@@ -10,7 +10,6 @@ from os import PathLike, fspath
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from oed.controllers.clients.checks import check_start, check_status, require_known_form, status_problem
 from oed.controllers.clients.ending import Ending
@@ -19,6 +18,7 @@ from oed.controllers.clients.options import StreamOptions
 from oed.controllers.clients.program import ProgramPlayer
 from oed.controllers.clients.requests import Requests
 from oed.controllers.clients.result import StreamResult
+from oed.controllers.clients.sender import Array, Sender
 from oed.controllers.clients.traffic import Traffic
 from oed.controllers.clients.watching import tolerances, watch_of
 from oed.controllers.egm.link import EgmLink
@@ -43,10 +43,6 @@ from robots.common.progress import SILENT, Progress
 from robots.robot import Robot
 from robots.signals import Motion
 from robots.version import VERSION
-
-Array = NDArray[np.float64]
-
-Sender = Requests | ProgramPlayer | GuidePlayer
 
 CLEAR = "clear it at the controller, move the robot to the start of the trajectory, and play it again"
 
@@ -191,7 +187,7 @@ def stream(
             "sent_points": traffic.sent,
             "resent_points": traffic.resent,
             "message_delay": traffic.delay,
-            **({"command_lag": requests.lag.lags()} if isinstance(requests, (ProgramPlayer, GuidePlayer)) else {}),
+            **({} if requests is None or requests.lag is None else {"command_lag": requests.lag.lags()}),
         }
         with signals_held():
             try:
@@ -245,7 +241,7 @@ def _sender(
 
 def _lag_in_words(requests: Sender | None) -> str:
     """Says how far the joints follow behind their commands, where that is measured."""
-    lags = requests.lag.lags() if isinstance(requests, (ProgramPlayer, GuidePlayer)) else []
+    lags = [] if requests is None or requests.lag is None else requests.lag.lags()
     known = [lag for lag in lags if lag is not None]
     if not known:
         return ""
@@ -274,13 +270,11 @@ def _play(
     )
     ending = Ending(motion, recorder, options.start_tolerance, options.patience)
     path = watch_of(motion, robot, options.tolerance, options.timed, 1.0 if recorder.layout.stamped else options.speed)
-    watched = [
-        each.see for each in (path, requests if isinstance(requests, (ProgramPlayer, GuidePlayer)) else None) if each
-    ]
 
-    def see(s: float, q: Array) -> None:
-        for each in watched:
-            each(s, q)
+    def see(stamp: float, q: Array) -> None:
+        requests.see(stamp, q)
+        if path is not None:
+            path.see(stamp, q)
 
     recorder.watch = see
 
