@@ -30,7 +30,7 @@ from oed.exports.simple_message import (
     Reply,
     Status,
 )
-from robots.common.errors import OedError
+from robots.common.errors import InputError, OedError
 from robots.robot import Robot
 
 Array = NDArray[np.float64]
@@ -279,6 +279,11 @@ class Recorder:
         assert layout is not None
         self._feed.problem, self._last_row = "", now
         positions = np.array(message.positions)  # type: ignore[union-attr]
+        if len(positions) < self._robot.n:
+            raise InputError(
+                f"the controller reports {len(positions)} joints, {self._robot.name} has {self._robot.n}",
+                remedy="the controller is of another robot: correct --robot",
+            )
         if self.positions is None or np.abs(positions - self.positions).max() > REST:
             self.rest_since = now
         self.positions, self.stamp = positions, stamp
