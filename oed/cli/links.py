@@ -17,7 +17,7 @@ DriverOption = Annotated[
     str | None,
     typer.Option(
         "--driver",
-        help="Program on the controller: efort, fanuc, motoman, abb, ur or generic. Sets what no other option states.",
+        help="Program on the controller: efort, fanuc, motoman, abb, egm, ur or generic. Sets what is not stated.",
         show_default=False,
     ),
 ]

@@ -53,3 +53,14 @@ class ControllerAxes:
         turned = self.sign * (np.asarray(axes, dtype=np.float64) - self.zero)
         solved = np.linalg.inv(np.eye(len(self.sign)) + self.coupling) @ turned.T
         return np.asarray(solved.T, dtype=np.float64)
+
+
+def axes_of(axes: ControllerAxes | None, q: ArrayLike) -> Array:
+    """Gives the axes of a controller in degrees at joint positions (N, n) [rad]; the joints where nothing is stated."""
+    return np.rad2deg(np.asarray(q, dtype=np.float64) if axes is None else axes.axes(q))
+
+
+def joints_of(axes: ControllerAxes | None, degrees: ArrayLike) -> Array:
+    """Gives the joint positions (N, n) [rad] from the axes of a controller [deg]."""
+    turned = np.deg2rad(np.asarray(degrees, dtype=np.float64))
+    return turned if axes is None else axes.joints(turned)

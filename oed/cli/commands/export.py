@@ -29,7 +29,7 @@ def export(
             "--to",
             help=(
                 "Format: csv, ros, ros-goal, rosbag, mcap, moveit-limits, simple-message, urscript, kuka, abb, "
-                "franka or franka-player."
+                "abb-egm, franka or franka-player."
             ),
         ),
     ] = "csv",
@@ -61,7 +61,7 @@ def export(
         str | None,
         typer.Option(
             "--name",
-            help="urscript, kuka, abb: name of the program or module. Default: that of the file for kuka and abb, else "
+            help="Programs: name of the program or module. Default: that of the file for kuka and abb, else "
             "trajectory.",
             show_default=False,
         ),

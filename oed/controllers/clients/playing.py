@@ -10,16 +10,18 @@ from os import PathLike, fspath
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from oed.controllers.clients.checks import check_start, check_status, require_known_form, status_problem
 from oed.controllers.clients.ending import Ending
+from oed.controllers.clients.guide import GuidePlayer
 from oed.controllers.clients.options import StreamOptions
 from oed.controllers.clients.program import ProgramPlayer
 from oed.controllers.clients.requests import Requests
 from oed.controllers.clients.result import StreamResult
+from oed.controllers.clients.sender import Array, Sender
 from oed.controllers.clients.traffic import Traffic
 from oed.controllers.clients.watching import tolerances, watch_of
+from oed.controllers.egm.link import EgmLink
 from oed.controllers.errors import ControllerError, NoReplyError, PointRefusedError
 from oed.controllers.interrupts import signals_held
 from oed.controllers.links import Endpoint, Link, open_link
@@ -41,8 +43,6 @@ from robots.common.progress import SILENT, Progress
 from robots.robot import Robot
 from robots.signals import Motion
 from robots.version import VERSION
-
-Array = NDArray[np.float64]
 
 CLEAR = "clear it at the controller, move the robot to the start of the trajectory, and play it again"
 
@@ -135,7 +135,7 @@ def stream(
     source = f"feedback of {endpoint.place(endpoint.state_port)}"
     known = {"robot": robot.name, "source": source, "tool": VERSION, **(header or {})}
     traffic = Traffic()
-    requests: Requests | ProgramPlayer | None = None
+    requests: Sender | None = None
     begin, ended = time.monotonic(), "interrupted"
     failure: OedError | None = None
     try:
@@ -153,9 +153,12 @@ def stream(
         with ExitStack() as links:
             # A motion port may belong to a driver that moves on what it does not know, or drops its client.
             if options.ping or not dry_run:
-                link = links.enter_context(open_link(endpoint, endpoint.motion_port))
+                # A controller that is guided has one port for all.
+                guided = isinstance(state, EgmLink)
+                link = state if guided else links.enter_context(open_link(endpoint, endpoint.motion_port))
                 # A port that serves another client closes the link, or says something.
-                link.receive(CLOSES)
+                if not guided:
+                    link.receive(CLOSES)
                 requests = _sender(link, state, motion, robot, endpoint, options, recorder, traffic)
                 for number in range(PINGS if options.ping else 0):
                     requests.ping(None if number else max(options.patience, endpoint.connect_time))
@@ -184,7 +187,7 @@ def stream(
             "sent_points": traffic.sent,
             "resent_points": traffic.resent,
             "message_delay": traffic.delay,
-            **({"command_lag": requests.lag.lags()} if isinstance(requests, ProgramPlayer) else {}),
+            **({} if requests is None or requests.lag is None else {"command_lag": requests.lag.lags()}),
         }
         with signals_held():
             try:
@@ -227,26 +230,28 @@ def _sender(
     options: StreamOptions,
     recorder: Recorder,
     traffic: Traffic,
-) -> Requests | ProgramPlayer:
+) -> Sender:
     """Gives what sends points over a link, by the protocol of the controller."""
+    if isinstance(state, EgmLink):
+        return GuidePlayer(state, motion, robot, options, recorder, traffic)
     if isinstance(link, ScriptLink) and isinstance(state, RtdeLink):
         return ProgramPlayer(link, state.own_address, motion, robot, options, recorder, traffic)
     return Requests(link, endpoint.wire_form, options, traffic)
 
 
-def _lag_in_words(requests: Requests | ProgramPlayer | None) -> str:
+def _lag_in_words(requests: Sender | None) -> str:
     """Says how far the joints follow behind their commands, where that is measured."""
-    lags = requests.lag.lags() if isinstance(requests, ProgramPlayer) else []
+    lags = [] if requests is None or requests.lag is None else requests.lag.lags()
     known = [lag for lag in lags if lag is not None]
     if not known:
         return ""
-    return f"the joints follow {1e3 * min(known):.0f} to {1e3 * max(known):.0f} ms behind the commands (servoj)"
+    return f"the joints follow {1e3 * min(known):.0f} to {1e3 * max(known):.0f} ms behind the commands"
 
 
 def _play(
     motion: Motion,
     robot: Robot,
-    requests: Requests | ProgramPlayer,
+    requests: Sender,
     recorder: Recorder,
     options: StreamOptions,
     progress: Progress,
@@ -265,11 +270,11 @@ def _play(
     )
     ending = Ending(motion, recorder, options.start_tolerance, options.patience)
     path = watch_of(motion, robot, options.tolerance, options.timed, 1.0 if recorder.layout.stamped else options.speed)
-    watched = [each.see for each in (path, requests if isinstance(requests, ProgramPlayer) else None) if each]
 
-    def see(s: float, q: Array) -> None:
-        for each in watched:
-            each(s, q)
+    def see(stamp: float, q: Array) -> None:
+        requests.see(stamp, q)
+        if path is not None:
+            path.see(stamp, q)
 
     recorder.watch = see
 

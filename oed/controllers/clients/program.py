@@ -7,13 +7,14 @@ import socket
 import struct
 import time
 from collections import deque
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 from contextlib import suppress
 
 import numpy as np
 
 from oed.controllers.clients.command_lag import CommandLag
 from oed.controllers.clients.options import StreamOptions
+from oed.controllers.clients.sender import Advance, Array, Sender, Watch
 from oed.controllers.clients.traffic import Traffic
 from oed.controllers.errors import ControllerError, NoReplyError
 from oed.controllers.recording.recorder import Recorder
@@ -86,8 +87,8 @@ end
 """
 
 
-class ProgramPlayer:
-    """Sends a program to a UR controller, then the points to the program; see `Requests`.
+class ProgramPlayer(Sender):
+    """Sends a program to a UR controller, then the points to the program; see `Sender`.
 
     Args:
         link: to the port for programs.
@@ -124,7 +125,7 @@ class ProgramPlayer:
         self._points: socket.socket | None = None
         self._listener: socket.socket | None = None
         self._finished = False
-        self.lag = CommandLag(motion)
+        self.lag = self._lag = CommandLag(motion)
 
     @property
     def played(self) -> int:
@@ -132,20 +133,12 @@ class ProgramPlayer:
         count = self._recorder.played - self._token
         return count if 0 <= count < TOKENS else 0
 
-    def see(self, _: float, q: np.ndarray) -> None:
-        """Takes a row of feedback; see `Recorder.watch`."""
+    def see(self, stamp: float, q: Array) -> None:
+        """Takes a row of feedback; see `Sender.see`."""
         # A point is counted when the next one begins.
         count = self.played
         if count:
-            self.lag.see(min(count, self._count - 1) * self._period, q)
-
-    def ping(self, patience: float | None = None) -> float:
-        """There are no pings.
-
-        Raises:
-            ControllerError: always.
-        """
-        raise ControllerError("a UR controller knows no pings")
+            self._lag.see(min(count, self._count - 1) * self._period, q)
 
     def keep_alive(self) -> None:
         """Reads what the port for programs says."""
@@ -177,25 +170,8 @@ class ProgramPlayer:
             "computer",
         )
 
-    def stream(
-        self,
-        points: Iterable[FullPoint | Point],
-        watch: Callable[[], None],
-        advance: Callable[[int], None],
-        longest_step: float,
-    ) -> None:
-        """Sends points, each `AHEAD` of its time.
-
-        Args:
-            points: in order.
-            watch: raises where the stream must end for another reason.
-            advance: is given the number of executed points.
-            longest_step: of no use here.
-
-        Raises:
-            ControllerError: the program has ended.
-            NoReplyError: no point is executed within the patience.
-        """
+    def stream(self, points: Iterable[FullPoint | Point], watch: Watch, advance: Advance, longest_step: float) -> None:
+        """Sends points, each `AHEAD` of its time; see `Sender.stream`."""
         assert self._points is not None
         data = deque(
             struct.pack(">7i", 1, *(round(q * SCALE) for q in point.positions[: len(self._first)])) for point in points
@@ -236,14 +212,6 @@ class ProgramPlayer:
                     remedy="check the controller and the network",
                 )
             time.sleep(TURN)
-
-    def download(self, points: Iterable[FullPoint | Point], watch: Callable[[], None], advance: object) -> None:
-        """There is no download.
-
-        Raises:
-            ControllerError: always.
-        """
-        raise ControllerError("a UR controller takes no download", remedy="leave out --download")
 
     def stop(self) -> bool:
         """Replaces the program by one that stops the robot; says whether it stands."""

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import time
 from collections import OrderedDict
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import suppress
 
 from oed.controllers.clients.channel import Channel
 from oed.controllers.clients.options import StreamOptions
 from oed.controllers.clients.replies import Verdict, answer_of, confirms_stop, described, reason
+from oed.controllers.clients.sender import Advance, Sender, Watch
 from oed.controllers.clients.traffic import Request, Traffic
 from oed.controllers.errors import ControllerError, NoReplyError, PointRefusedError
 from oed.controllers.links import Link
@@ -43,7 +44,7 @@ TURN = 0.02
 """Longest wait between two looks at what else happens [s]."""
 
 
-class Requests(Channel):
+class Requests(Channel, Sender):
     """Sends points and stops as requests and looks at the replies; see `Channel`."""
 
     def __init__(self, link: Link, form: WireFormat, options: StreamOptions, traffic: Traffic | None = None) -> None:
@@ -83,13 +84,7 @@ class Requests(Channel):
             remedy="check the motion port and --driver",
         )
 
-    def stream(
-        self,
-        points: Iterable[FullPoint | Point],
-        watch: Callable[[], None],
-        advance: Callable[[int], None],
-        longest_step: float,
-    ) -> None:
+    def stream(self, points: Iterable[FullPoint | Point], watch: Watch, advance: Advance, longest_step: float) -> None:
         """Sends points as requests, each once it may be; returns when all are confirmed.
 
         Args:
@@ -137,9 +132,7 @@ class Requests(Channel):
                         self._drain(request.tries - 1)
             self._again(waiting, now, patience)
 
-    def download(
-        self, points: Iterator[FullPoint | Point], watch: Callable[[], None], advance: Callable[[int], None]
-    ) -> None:
+    def download(self, points: Iterator[FullPoint | Point], watch: Watch, advance: Advance) -> None:
         """Sends points as topics, the first and the last with their special numbers.
 
         Args:

@@ -8,7 +8,7 @@ from typing import Literal
 from oed.exports.simple_message.kinds import MOTION_PORT, STATE_PORT
 from oed.exports.simple_message.points import PointType
 
-Protocol = Literal["simple_message", "rtde"]
+Protocol = Literal["simple_message", "rtde", "egm"]
 Pings = Literal["answered", "point", "end", "unknown"]
 Replies = Literal["bare", "echo", "position", "motoman"]
 
@@ -21,7 +21,7 @@ class Driver:
         name: as ``--driver`` takes it.
         title: its name in messages.
         source: where its behaviour is written down.
-        protocol: ``simple_message``, or ``rtde`` of UR.
+        protocol: ``simple_message``, ``rtde`` of UR, or ``egm`` of ABB.
         transport: udp or tcp.
         motion_port: takes points.
         state_port: gives feedback.

@@ -8,6 +8,7 @@ from typing import Any, Literal
 
 from oed.controllers.drivers import Driver
 from oed.controllers.drivers.base import Protocol
+from oed.controllers.egm.messages import EgmForm
 from oed.controllers.rtde.state import RtdeForm
 from oed.exports.simple_message import DEFAULT, WireFormat
 from oed.exports.simple_message.kinds import MOTION_PORT, STATE_PORT
@@ -16,6 +17,9 @@ from robots.common.errors import InputError
 HANDSHAKE = 0x8E
 """The one byte that opens a link by UDP; 0xFF in old versions."""
 
+FORMS: dict[str, type[RtdeForm | EgmForm]] = {"rtde": RtdeForm, "egm": EgmForm}
+"""Forms of the messages of protocols that have one only."""
+
 
 @dataclass(frozen=True, kw_only=True)
 class Endpoint:
@@ -23,7 +27,7 @@ class Endpoint:
 
     Attributes:
         host: name or address.
-        protocol: ``simple_message``, or ``rtde`` of UR.
+        protocol: ``simple_message``, ``rtde`` of UR, or ``egm`` of ABB.
         transport: udp or tcp.
         motion_port: takes points.
         state_port: gives feedback.
@@ -40,7 +44,7 @@ class Endpoint:
     transport: Literal["udp", "tcp"] = "udp"
     motion_port: int = MOTION_PORT
     state_port: int = STATE_PORT
-    form: WireFormat | RtdeForm = DEFAULT
+    form: WireFormat | RtdeForm | EgmForm = DEFAULT
     handshake: int = HANDSHAKE
     connect_time: float = 5.0
     handshake_interval: float = 1.0
@@ -63,7 +67,7 @@ class Endpoint:
             "transport": driver.transport,
             "motion_port": driver.motion_port,
             "state_port": driver.state_port,
-            "form": RtdeForm() if driver.protocol == "rtde" else WireFormat(byte_order=driver.byte_order),
+            "form": FORMS[driver.protocol]() if driver.protocol in FORMS else WireFormat(byte_order=driver.byte_order),
             "one_address": driver.one_handshake,
         }
         return cls(host=host, **(usual | changes))
@@ -81,9 +85,9 @@ class Endpoint:
         for name in ("motion_port", "state_port"):
             if not 0 < getattr(self, name) < 65536:
                 raise InputError(f"{name} {getattr(self, name)}", allowed="1 to 65535")
-        if (self.protocol == "rtde") != isinstance(self.form, RtdeForm):
+        if not isinstance(self.form, FORMS.get(self.protocol, WireFormat)):
             raise InputError(
-                "a byte order or size of reals for a UR controller, whose numbers are big-endian with 8 bytes",
+                f"a byte order or size of reals for {self.protocol}, whose messages have one form",
                 remedy="leave out --byte-order and --real-bytes",
             )
         if not 0 <= self.handshake < 256:
@@ -98,8 +102,8 @@ class Endpoint:
         Raises:
             InputError: a controller of another protocol.
         """
-        if isinstance(self.form, RtdeForm):
-            raise InputError("a UR controller speaks no simple_message", remedy="correct --driver")
+        if not isinstance(self.form, WireFormat):
+            raise InputError(f"{self.protocol} is no simple_message", remedy="correct --driver")
         return self.form
 
     def place(self, port: int) -> str:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from oed.controllers.egm.link import EgmLink
 from oed.controllers.links.base import Endpoint, Link
 from oed.controllers.links.tcp import TcpLink
 from oed.controllers.links.udp import UdpLink
@@ -19,6 +20,8 @@ def open_link(endpoint: Endpoint, port: int) -> Link:
         InputError: a host that has no address.
         LinkError: nothing answers within the time, or the connection is refused.
     """
+    if endpoint.protocol == "egm":
+        return EgmLink(endpoint, port)
     if endpoint.protocol == "rtde":
         return (RtdeLink if port == endpoint.state_port else ScriptLink)(endpoint, port)
     return (UdpLink if endpoint.transport == "udp" else TcpLink)(endpoint, port)

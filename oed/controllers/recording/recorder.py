@@ -5,12 +5,14 @@ from __future__ import annotations
 import threading
 import time
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 from os import PathLike
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from oed.controllers.egm.messages import EgmForm
 from oed.controllers.errors import LinkError, ProtocolError, RecordingError
 from oed.controllers.links import Link
 from oed.controllers.recording.clock import ClockAnchor
@@ -28,7 +30,7 @@ from oed.exports.simple_message import (
     Reply,
     Status,
 )
-from robots.common.errors import OedError
+from robots.common.errors import InputError, OedError
 from robots.robot import Robot
 
 Array = NDArray[np.float64]
@@ -58,7 +60,8 @@ class Recorder:
     def __init__(
         self, link: Link, robot: Robot, form: MessageForm, patience: float, connect_time: float, answers: bool = True
     ) -> None:
-        self._link, self._robot, self._form, self._answers = link, robot, form, answers
+        self._link, self._robot, self._answers = link, robot, answers
+        self._form = replace(form, axes=robot.axes) if isinstance(form, EgmForm) else form
         self._patience, self._connect_time = patience, connect_time
         self._lock = threading.Lock()
         self._end = threading.Event()
@@ -276,6 +279,11 @@ class Recorder:
         assert layout is not None
         self._feed.problem, self._last_row = "", now
         positions = np.array(message.positions)  # type: ignore[union-attr]
+        if len(positions) < self._robot.n:
+            raise InputError(
+                f"the controller reports {len(positions)} joints, {self._robot.name} has {self._robot.n}",
+                remedy="the controller is of another robot: correct --robot",
+            )
         if self.positions is None or np.abs(positions - self.positions).max() > REST:
             self.rest_since = now
         self.positions, self.stamp = positions, stamp

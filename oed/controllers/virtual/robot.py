@@ -85,8 +85,9 @@ class VirtualRobot:
     def stand(self, q: Array) -> Array:
         """Gives the measured torque (n,) of a robot that stands at positions (n,); its noise differs each time."""
         if self._standing is None or not np.array_equal(self._standing[0], q):
-            zero = np.zeros((1, len(q)))
-            self._standing = (q, self._plant.model.torque(q[None], zero, zero, self._plant.parameters))
+            zero = np.zeros((2, len(q)))
+            rest = Motion(np.array([0.0, self._period]), np.array([q, q]), zero, zero)
+            self._standing = (q, self._plant.torque(rest)[:1])
         return self._measured(self._standing[1], self._resting)[0]
 
     def _measured(self, tau: Array, rng: np.random.Generator) -> Array:

@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from oed.controllers.virtual.controller import VirtualController
+from oed.controllers.virtual.egm import VirtualEgm
 from oed.controllers.virtual.options import ControllerOptions
 from oed.controllers.virtual.ur.controller import VirtualUr
 from robots.plants import Plant
@@ -19,7 +20,7 @@ def virtual_controller(
     options: ControllerOptions | None = None,
     pose: NDArray[np.float64] | None = None,
     seed: int = 0,
-) -> VirtualController | VirtualUr:
+) -> VirtualController | VirtualUr | VirtualEgm:
     """Makes a controller to test against, by the protocol of its driver.
 
     Args:
@@ -30,9 +31,11 @@ def virtual_controller(
         seed: of the sensors' noise.
 
     Raises:
-        InputError: see `VirtualController` and `VirtualUr`.
+        InputError: see `VirtualController`, `VirtualUr` and `VirtualEgm`.
     """
     options = options or ControllerOptions()
     if options.driver is not None and options.driver.protocol == "rtde":
         return VirtualUr(robot, plant, options=options, pose=pose, seed=seed)
+    if options.driver is not None and options.driver.protocol == "egm":
+        return VirtualEgm(robot, options=options, pose=pose)
     return VirtualController(robot, plant, options=options, pose=pose, seed=seed)

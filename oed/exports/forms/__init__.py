@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from oed.exports.forms.abb import Abb
+from oed.exports.forms.abb import Abb, AbbEgm
 from oed.exports.forms.base import ExportOptions, Form
 from oed.exports.forms.franka import Franka, FrankaPlayer
 from oed.exports.forms.kuka import Kuka
@@ -24,6 +24,7 @@ FORMS: dict[str, Form] = {
         UrScript(),
         Kuka(),
         Abb(),
+        AbbEgm(),
         Franka(),
         FrankaPlayer(),
     )

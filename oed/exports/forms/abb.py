@@ -11,13 +11,13 @@ import numpy as np
 from oed.exports.forms.base import Array, ExportOptions, Form, number, require_joints
 from oed.exports.forms.controller_programs import (
     axes_in_degrees,
-    joints_from_degrees,
     pieces,
     require_name,
     reserved_words,
     spline_points,
 )
 from robots.common.errors import InputError
+from robots.joints.controller_axes import joints_of
 from robots.robot import Robot
 from robots.signals import Motion
 
@@ -25,6 +25,18 @@ AXES = 6
 
 PLAY = "_play"
 """What follows the module's name in that of its procedure."""
+
+DEVICE = "OED"
+"""Name of the device of transmission (UDPUC) that the controller has to have for EGM."""
+
+NEAR = 0.1
+"""A guided axis has arrived within this [deg]."""
+
+STANDS = 60
+"""The guided motion ends once the robot has stood for so long [s]; pauses of a trajectory must be shorter."""
+
+WAITS = 60
+"""The guided motion ends without messages for so long [s]; it waits so long for `oed stream`, too."""
 
 NAME = 32
 """Characters of a name, at most."""
@@ -87,7 +99,53 @@ class Abb(Form):
         if period is None or not rows:
             raise InputError("no joint targets", allowed="a module of this form")
         axes = np.array([[float(value) for value in row.split(",")][: robot.n] for row in rows])
-        return float(period[1]) * np.arange(len(axes), dtype=np.float64), joints_from_degrees(axes, robot)
+        return float(period[1]) * np.arange(len(axes), dtype=np.float64), joints_of(robot.axes, axes)
+
+
+class AbbEgm(Form):
+    """A .mod file for `oed stream --driver egm`: a start check, a slow MoveAbsJ to the start, then guided motion.
+
+    The samples come by UDP while it runs. It ends some seconds after the robot stands, or without messages.
+    """
+
+    name: ClassVar[str] = "abb-egm"
+    suffixes: ClassVar[tuple[str, ...]] = (".mod",)
+    comment: ClassVar[Mapping[str, str]] = {".mod": "!"}
+    named: ClassVar[bool] = True
+    has_samples: ClassVar[bool] = False
+
+    def write(self, motion: Motion, robot: Robot, options: ExportOptions, suffix: str) -> bytes:
+        """See `Form.write`."""
+        require_joints(robot, 1, AXES, "jointtarget")
+        require_name(options.name, NAME - len(PLAY), RESERVED, "RAPID")
+        start = np.pad(axes_in_degrees(motion.q[:1], robot), ((0, 0), (0, AXES - robot.n)))[0].tolist()
+        joints, external = range(1, AXES + 1), ",".join(["9E9"] * 6)
+        within, run = ("".join(f"\\J{joint}{end}" for joint in joints) for end in (":=near", ""))
+        lines = [
+            f"MODULE {options.name}",
+            "  VAR egmident guided;",
+            f"  CONST egm_minmax near:=[-{NEAR},{NEAR}];",
+            "  CONST jointtarget points{1}:=[",
+            f"    [[{','.join(number(value, 7) for value in start)}],[{external}]]",
+            "  ];",
+            f"  PROC {options.name}{PLAY}()",
+            *_start(robot.n, options),
+            "    EGMReset guided;",
+            "    EGMGetId guided;",
+            f'    EGMSetupUC ROB_1,guided,"default","{DEVICE}"\\Joint\\CommTimeout:={WAITS};',
+            f"    EGMActJoint guided\\Tool:=tool0{within}\\LpFilter:=0\\SampleRate:=4\\MaxSpeedDeviation:=1000;",
+            f"    EGMRunJoint guided,EGM_STOP_HOLD{run}\\CondTime:={STANDS}\\RampInTime:=0.01\\PosCorrGain:=1;",
+            "    EGMReset guided;",
+            "  ERROR",
+            "    IF ERRNO=ERR_UDPUC_COMM THEN",
+            "      EGMReset guided;",
+            "      TRYNEXT;",
+            "    ENDIF",
+            "  ENDPROC",
+            "ENDMODULE",
+            "",
+        ]
+        return "\n".join(lines).encode()
 
 
 def _start(n: int, options: ExportOptions) -> list[str]:

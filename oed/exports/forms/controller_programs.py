@@ -13,6 +13,7 @@ from scipy.interpolate import CubicSpline
 from oed.exports.forms.base import Array
 from oed.exports.forms.sampling import at_period
 from robots.common.errors import AssumedValueWarning, InputError
+from robots.joints.controller_axes import axes_of
 from robots.robot import Robot
 from robots.signals import Motion
 
@@ -57,14 +58,7 @@ def axes_in_degrees(q: Array, robot: Robot) -> Array:
             "robot YAML): the axes are taken as the joints of the description. Compare both at two poses first"
         )
         warnings.warn(AssumedValueWarning(text), stacklevel=5)
-        return np.rad2deg(q)
-    return np.rad2deg(robot.axes.axes(q))
-
-
-def joints_from_degrees(axes: Array, robot: Robot) -> Array:
-    """Gives joint positions (N, n) [rad] from the axes of the controller [deg]."""
-    turned = np.deg2rad(axes)
-    return turned if robot.axes is None else robot.axes.joints(turned)
+    return axes_of(robot.axes, q)
 
 
 def spline_points(motion: Motion) -> tuple[Motion, float]:

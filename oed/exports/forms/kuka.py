@@ -11,13 +11,13 @@ import numpy as np
 from oed.exports.forms.base import Array, ExportOptions, Form, number, require_joints
 from oed.exports.forms.controller_programs import (
     axes_in_degrees,
-    joints_from_degrees,
     pieces,
     require_name,
     reserved_words,
     spline_points,
 )
 from robots.common.errors import InputError
+from robots.joints.controller_axes import joints_of
 from robots.robot import Robot
 from robots.signals import Motion
 
@@ -130,4 +130,4 @@ def _aggregate(row: Array) -> str:
 
 
 def _positions(rows: list[str], robot: Robot) -> Array:
-    return joints_from_degrees(np.array([[float(axis.split()[1]) for axis in row.split(",")] for row in rows]), robot)
+    return joints_of(robot.axes, [[float(axis.split()[1]) for axis in row.split(",")] for row in rows])

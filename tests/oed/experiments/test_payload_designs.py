@@ -13,6 +13,7 @@ from oed.experiments import design as run
 from robots.catalog import __path__ as catalog
 from robots.common.errors import InputError
 from robots.geometry.inertia import inertial_parameters
+from robots.limits import BOUNDS, Limits
 from robots.loading import load_robot
 from robots.regressor import default_model
 from robots.robot import Robot
@@ -71,8 +72,7 @@ def horizontal_arm(ur10: Robot) -> Robot:
     from robots.geometry.chain import Chain
 
     chain = Chain((ur10.chain.joints[1], ur10.chain.joints[2]), gravity=ur10.chain.gravity)
-    stated = {name: values for name, values in vars(ur10.limits).items() if values is not None}
-    limits = type(ur10.limits)(**{name: np.asarray(values)[1:3] for name, values in stated.items()})
+    limits = Limits(**{name: getattr(ur10.limits, name)[1:3] for name in BOUNDS})
     return replace(
         ur10,
         name="arm",

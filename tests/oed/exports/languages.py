@@ -28,6 +28,8 @@ class Parser:
     )
 
     def __init__(self, text: str, comment: str, lines: bool) -> None:
+        # How two values are compared.
+        self.equal = "==" if lines else "="
         self.tokens: list[tuple[str, str]] = []
         for line in text.splitlines():
             # The end of a statement in RAPID is what begins a comment in KRL.
@@ -114,7 +116,7 @@ class Parser:
     def expression(self) -> str:
         """Takes operands and the operators between them."""
         text = self.primary()
-        while self.next in ("+", "-", "*", "/", "==", "<>", "<", ">", "<=", ">=", "AND", "OR"):
+        while self.next in ("+", "-", "*", "/", self.equal, "<>", "<", ">", "<=", ">=", "AND", "OR"):
             text += self.take() + self.primary()
         return text
 
@@ -346,6 +348,8 @@ class Rapid(Parser):
             self.expression()
             self.take("DO")
             self._statements("ENDFOR")
+        elif first == "ERROR":
+            self.take()
         elif self.tokens[self.at + 1][1] == ":=" or "." in (self.tokens[self.at + 1][1],):
             self.variable()
             self.take(":=")

@@ -27,12 +27,12 @@ from oed.controllers.rtde.packages import (
     package,
 )
 from oed.controllers.rtde.state import PLAYING, RUNNING, STOPPED, Safety
+from oed.controllers.virtual.arm import Arm, ArmSample
 from oed.controllers.virtual.options import ControllerOptions
 from oed.controllers.virtual.path_faults import PathFault
 from oed.controllers.virtual.ports import Client, TcpPort
 from oed.controllers.virtual.robot import VirtualRobot
 from oed.controllers.virtual.service import Service
-from oed.controllers.virtual.ur.arm import Arm, ArmSample
 from oed.controllers.virtual.ur.script import Halt, Run, ScriptError, program_of, run_program
 from oed.exports.forms.base import require_joints
 from oed.exports.forms.urscript import CYCLES
@@ -354,16 +354,15 @@ class VirtualUr(Service):
             yield
 
         def socket_read_binary_integer(count: int, name: str, timeout: float) -> Run:
-            begin, waited = time.monotonic(), 0
+            begin, first = time.monotonic(), self._ticks
             while len(self._data) < 4 * count:
                 if self._wire is not None:
                     with suppress(OSError):
                         self._data += self._wire.recv(65536)
                 if len(self._data) >= 4 * count:
                     break
-                if waited * self.cycle > timeout:
+                if (self._ticks - first) * self.cycle > timeout:
                     return [0]
-                waited += 1
                 self._starved = begin
                 yield
             data, self._data = self._data[: 4 * count], self._data[4 * count :]

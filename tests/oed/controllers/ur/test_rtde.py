@@ -95,6 +95,10 @@ def test_refused_starts_send_no_program(ur10: Robot, log: Path) -> None:
         panda = load_robot("panda")
         with pytest.raises(InputError, match="a UR controller takes"):
             stream(swing(panda, 500, 0.05), panda, place_of(tap), log=log, options=options)
+    tap = RtdeTap([0.0] * 6, missing=(AS_TORQUE,))
+    with tap, pytest.raises(InputError, match="reports 6 joints, panda has 7"):
+        record(panda, place_of(tap), log)
+    assert not log.exists()
 
 
 @pytest.mark.slow

@@ -1,4 +1,4 @@
-"""The arm behind a UR controller: it follows its commands after a fixed time, with the torque of a plant."""
+"""The arm behind a controller that is commanded in each cycle: it follows after a fixed time, with a plant's torque."""
 
 from __future__ import annotations
 

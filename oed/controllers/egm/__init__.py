@@ -1,0 +1,1 @@
+"""ABB's Externally Guided Motion (EGM): positions in each cycle, by UDP."""
