@@ -159,6 +159,8 @@ class Reader:
     def _sequence(self, origin: Any, args: tuple[Any, ...], data: Any, path: str, null: Sequence[float]) -> Any:
         if not isinstance(data, list | tuple):
             raise self.fail(path, f"found {_short(data)}", "a list")
+        if origin is list and args == (float,) and all(type(item) is float for item in data):
+            return list(data)
         if origin is tuple and args[-1] is not Ellipsis:
             if len(data) != len(args):
                 raise self.fail(path, f"{len(data)} values", f"{len(args)}")
