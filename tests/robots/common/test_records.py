@@ -182,6 +182,12 @@ def test_foreign_and_newer_files_are_refused(content: bytes, words: str, tmp_pat
     assert "do it again" in str(caught.value)
 
 
+def test_a_missing_file_is_answered_with_what_to_give(tmp_path: Path):
+    """The message says which file would do."""
+    with pytest.raises(InputError, match="no such file; do it again"):
+        read_json(tmp_path / "none.json", remedy="do it again")
+
+
 def test_values_of_other_kinds_are_refused():
     """A whole number may be written as 8.0; a truth value is no number."""
     assert read(int, 8.0) == 8
