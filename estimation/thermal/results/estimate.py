@@ -246,4 +246,4 @@ def load_thermal_model(path: str | PathLike[str]) -> ThermalModel:
     file = Path(path)
     file, remedy = file / ThermalEstimate.FILE if file.is_dir() else file, "fit the model again with oed thermal"
     data = read_json(file, ThermalEstimate.FORMAT, ThermalEstimate.FORMAT_VERSION, remedy=remedy)
-    return build_thermal_model(read(dict[str, Any], data.get("model"), file=file, remedy=remedy))
+    return build_thermal_model(read(dict[str, Any], data.get("model"), "model", file=file, remedy=remedy))
