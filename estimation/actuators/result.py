@@ -348,7 +348,7 @@ def actuators_of(data: Mapping[str, Any], file: str | Path | None = None) -> Act
     Raises:
         InputError: data that are damaged.
     """
-    drives = read(list[_Law], data.get("joints"), file=file, remedy=_REMEDY)
+    drives = read(list[_Law], data.get("joints"), "joints", file=file, remedy=_REMEDY)
     return Actuators.from_dict(
         data,
         file=file,

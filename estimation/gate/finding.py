@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from typing import Literal, get_args
 
 from estimation.gate.explanations import CODES
+from robots.common.records import Finding as Remark
 from robots.common.records import Record
 
 Severity = Literal["info", "warning", "refuse"]
@@ -44,6 +45,14 @@ class Finding(Record):
     def code(self) -> str | None:
         """Code under which `oed explain` explains it; None of a finding that has none."""
         return CODES.get(self.name)
+
+    def remark(self, subject: str = "") -> Remark:
+        """Gives the finding as reports show it.
+
+        Args:
+            subject: log that it is about, where there are several.
+        """
+        return Remark(code=f"log.{self.severity}", subject=subject, text=f"{self}.")
 
     def __str__(self) -> str:
         named = (("joint", self.joint), ("column", self.column), ("row", self.row))

@@ -15,6 +15,7 @@ from estimation.gate.measurements.outliers import interpolated
 from estimation.gate.measurements.timing import FEWEST
 from estimation.logs.torque_source import NO_TORQUE
 from robots.common.errors import InputError, NotIdentifiableError
+from robots.common.records import Finding as Remark
 from robots.common.records import Result
 from robots.signals import Log
 
@@ -226,18 +227,31 @@ class GateReport(Result):
         """Rows (K,) that repeat the one before, counted from 1."""
         return self.stale + 1
 
+    @property
+    def verdict(self) -> str:
+        """What the log can be used for, in words."""
+        if self.refused:
+            return "refused"
+        lacks_torque = any(finding.name == NO_TORQUE for finding in self.findings)
+        return "no torque, its motion is usable" if lacks_torque else "usable"
+
+    @property
+    def conclusion(self) -> str:
+        """Whether the log is usable, and what to do first."""
+        worst = f" First: {self.findings[0].action}." if self.refused else ""
+        return f"{self.log or 'log'}: {self.verdict}.{worst}"
+
+    @property
+    def remarks(self) -> tuple[Remark, ...]:
+        """The findings, the worst first."""
+        return tuple(finding.remark() for finding in self.findings)
+
     def summary(self) -> str:
         """Gives the verdict and lists the findings, the worst first."""
-        lacks_torque = any(finding.name == NO_TORQUE for finding in self.findings)
-        verdict = "refused" if self.refused else "no torque, its motion is usable" if lacks_torque else "usable"
         rate = 1.0 / self.period if self.period > 0 else float("nan")
-        head = f"{self.log or 'log'}: {verdict}; {self.samples} samples, {self.duration:.4g} s at {rate:.4g} Hz"
-        return "\n".join(
-            [
-                head,
-                *(f"  {finding.severity} {finding.code or ''}".rstrip() + f": {finding}" for finding in self.findings),
-            ]
-        )
+        head = f"{self.log or 'log'}: {self.verdict}; {self.samples} samples, {self.duration:.4g} s at {rate:.4g} Hz"
+        rows = (f"  {finding.severity} {finding.code or ''}".rstrip() + f": {finding}" for finding in self.findings)
+        return "\n".join([head, *rows])
 
     def to_frame(self) -> pd.DataFrame:
         """Tabulates the findings, one a row."""

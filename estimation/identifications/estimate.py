@@ -216,11 +216,7 @@ class Estimate(Result):
         )
         codes = chain((code for code, applies in urgent if applies), repeat("model.warning"))
         found = [Finding(code=code, text=text) for code, text in zip(codes, self.warnings, strict=False)]
-        found += [
-            Finding(code=f"log.{finding.severity}", subject=f"{gate.log}:", text=f"{finding}.")
-            for gate in self.gates
-            for finding in gate.findings
-        ]
+        found += [finding.remark(f"{gate.log}:") for gate in self.gates for finding in gate.findings]
         return tuple(found)
 
     def summary(self) -> str:

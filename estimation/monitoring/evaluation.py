@@ -294,7 +294,7 @@ class Evaluation(Record):
         known = {name: data[name] for name in ("measured", "begin")}
         found = cls.from_dict(data, whole=True, baseline=baseline, settings=settings, **known)
         found.heat = HeatState.from_dict(data["heat"], kind=data["heat"]["kind"], baseline=baseline)
-        found.history.rows = read(list[list[float]], data["history"])
+        found.history.rows = read(list[list[float]], data["history"], "history")
         # A state of an older version has one number for all joints.
         found.colour_count = np.ones(found.n) * found.colour_count
         return found

@@ -216,14 +216,15 @@ class Monitor(Record, format="robot-oed monitor", whole=True):
         try:
             data = read_json(path, cls.FORMAT, cls.FORMAT_VERSION, remedy=remedy)
             found = cls(
-                baseline_of(model_from_dict(data["model"]), data["model"]), read(MonitorSettings, data["settings"])
+                baseline_of(model_from_dict(data["model"]), data["model"]),
+                read(MonitorSettings, data["settings"], "settings"),
             )
-            found.logs = read(list[str], data["logs"])
+            found.logs = read(list[str], data["logs"], "logs")
             # A state of an older version has no rows.
             old = [LogRow(name=name) for name in found.logs]
-            found.rows = read(list[LogRow], data["rows"]) if "rows" in data else old
-            found._payload = read(Array | None, data["payload"])
-            found._gravity = read(Array | None, data["gravity"])
+            found.rows = read(list[LogRow], data["rows"], "rows") if "rows" in data else old
+            found._payload = read(Array | None, data["payload"], "payload")
+            found._gravity = read(Array | None, data["gravity"], "gravity")
             found._windows.restore(data["stream"])
             if data["evaluation"] is not None:
                 found._evaluation = Evaluation.restored(data["evaluation"], found.baseline, found.settings)

@@ -157,7 +157,7 @@ def body_from_dict(data: dict[str, Any], file: str | Path) -> Body:
     Raises:
         InputError: numbers that are missing, or that no body has.
     """
-    parameters = read(Array, data.get("parameters"), file=file, remedy=DAMAGED)
+    parameters = read(Array, data.get("parameters"), "parameters", file=file, remedy=DAMAGED)
     if parameters.shape != (SIZE,) or not np.isfinite(parameters).all():
         raise InputError(f"parameters of shape {parameters.shape}", file=file, allowed=f"{SIZE} finite numbers")
     if not parameters.any():

@@ -166,10 +166,9 @@ class Prediction(Result):
         texts = []
         if share is not None and share.any():
             texts = [f"{percent(float(share.mean()))} of the torques extrapolate: the fit has seen no such motion."]
-        gate = () if self.gate is None else self.gate.findings
         return (
             *findings_of("prediction.extrapolates", (*texts, *self.beyond)),
-            *(Finding(code=f"log.{finding.severity}", text=f"{finding}.") for finding in gate),
+            *(() if self.gate is None else self.gate.remarks),
         )
 
     def summary(self) -> str:

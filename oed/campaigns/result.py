@@ -25,7 +25,7 @@ from oed.exports import read_trajectory, write_trajectory
 from robots.collision import Surroundings
 from robots.common.errors import InputError
 from robots.common.files import existing_file, sha256
-from robots.common.records import Finding, axes_for, findings_of, plain, read, write_json
+from robots.common.records import Finding, axes_for, findings_of, plain, write_json
 from robots.loading import load_robot
 from robots.robot import Robot
 from robots.thermal import KnownThermal, SecondOrder
@@ -317,19 +317,15 @@ class Campaign(Planned, format="robot-oed campaign", tool=True):
             if expected["models"] is not None:
                 models = tuple(SecondOrder(**model) for model in expected["models"])
                 thermal = KnownThermal(models=models, sources=tuple(expected["sources"]))
-            return cls(
+            return cls.from_dict(
+                data,
+                file=file,
+                remedy="run oed campaign again",
                 robot=known,
-                programme=Programme.from_dict(data["programme"], file=file),
-                home=np.array(data["home"]),
                 stages=tuple(stages),
-                slots=read(tuple[Slot, ...], data["timetable"], file=file),
                 thermal=thermal,
                 ambient=expected["ambient"],
                 cold_friction=expected["cold_friction"],
-                torque_margin=data["torque_margin"],
-                notes=tuple(data["notes"]),
-                # Older files lack this entry.
-                settings=data.get("settings", {}),
             )
         except (OSError, UnicodeDecodeError, json.JSONDecodeError, KeyError, TypeError) as error:
             raise InputError(f"is damaged, or no campaign: {type(error).__name__} {error}", file=file) from error

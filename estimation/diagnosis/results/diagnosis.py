@@ -287,13 +287,13 @@ class Diagnosis(Result):
             InputError: a file is missing or not a valid diagnosis.
         """
         file, remedy = Path(folder) / DIAGNOSIS, "give the folder written by `oed diagnose`"
-        data = read_json(file, remedy=remedy)
-        read(Verdict, data.get("verdict"), file=file, remedy=remedy)
-        rows = read(list[dict[str, float]], data.get("excess"), file=file, remedy=remedy)
+        data, model = read_json(file, remedy=remedy), load_model(Path(folder) / MODEL)
+        read(Verdict, data.get("verdict"), "verdict", file=file, remedy=remedy)
+        rows = read(list[dict[str, float]], data.get("excess"), "excess", file=file, remedy=remedy)
         return Diagnosis.from_dict(
             data,
             file=file,
             remedy=remedy,
-            model=load_model(Path(folder) / MODEL),
+            model=model,
             excess=np.array([list(row.values()) for row in rows]),
         )

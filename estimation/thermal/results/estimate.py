@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from estimation.thermal.results.derived import SPAN, Quantity
 from robots.common.errors import InputError
-from robots.common.records import Result, axes_for, read, read_json
+from robots.common.records import Finding, Result, axes_for, findings_of, read, read_json
 from robots.thermal import ThermalModel, build_thermal_model
 
 if TYPE_CHECKING:
@@ -157,6 +157,27 @@ class ThermalEstimate(Result, format="robot-oed thermal model"):
         error = np.concatenate([run.measured - run.predicted for run in parts])
         return float(np.sqrt(np.mean(error**2) / np.mean(np.concatenate([run.measured for run in parts]) ** 2)))
 
+    @property
+    def conclusion(self) -> str:
+        """How well the model explains the measurements."""
+        if not self.success:
+            return f"The fit did not succeed: {self.status}."
+        if np.isfinite(self.residual):
+            return (
+                f"The {self.model.name} thermal model explains the friction to {100 * self.residual:.2g} % of its RMS."
+            )
+        return f"The {self.model.name} thermal model explains {self.rows} temperatures."
+
+    @property
+    def remarks(self) -> tuple[Finding, ...]:
+        """What the measurements do not determine, and notes."""
+        open_ = [item.name for item in self.parameters if not item.determined]
+        text = f"The measurements do not determine {', '.join(open_)}."
+        return (
+            *findings_of("thermal.undetermined", [text] if open_ else []),
+            *findings_of("model.warning", self.notes),
+        )
+
     def summary(self) -> str:
         """Lists determined and undetermined quantities."""
         head = f"{self.model.name} thermal model from {self.rows} measurements"
@@ -225,4 +246,4 @@ def load_thermal_model(path: str | PathLike[str]) -> ThermalModel:
     file = Path(path)
     file, remedy = file / ThermalEstimate.FILE if file.is_dir() else file, "fit the model again with oed thermal"
     data = read_json(file, ThermalEstimate.FORMAT, ThermalEstimate.FORMAT_VERSION, remedy=remedy)
-    return build_thermal_model(read(dict[str, Any], data.get("model"), file=file, remedy=remedy))
+    return build_thermal_model(read(dict[str, Any], data.get("model"), "model", file=file, remedy=remedy))

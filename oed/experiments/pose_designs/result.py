@@ -222,8 +222,8 @@ def load_pose_design(folder: str | Path, robot: Robot | None = None) -> PoseDesi
 
     file, remedy = Path(folder) / DESIGN, "give the folder written by `oed design --for calibration`"
     data = read_json(file, PoseDesign.FORMAT, PoseDesign.FORMAT_VERSION, remedy=remedy)
-    parameters = read(list[_Parameter], data.get("parameters"), file=file, remedy=remedy)
-    origin = read(_Origin, data.get("robot"), file=file, remedy=remedy).origin
+    parameters = read(list[_Parameter], data.get("parameters"), "parameters", file=file, remedy=remedy)
+    origin = read(_Origin, data.get("robot"), "robot", file=file, remedy=remedy).origin
     return PoseDesign.from_dict(
         data,
         file=file,

@@ -11,15 +11,11 @@ import numpy as np
 from oed.criteria import Criterion
 from oed.criteria import criterion as choose_criterion
 from oed.experiments.problems.essential import restricted
-from oed.experiments.quality import Quality, design_model
-from oed.experiments.results.outcome import Outcome
-from oed.experiments.safety_checks.spatial_check import SpatialMargin
+from oed.experiments.quality import design_model
 from oed.exports import read_trajectory
 from robots.base_parameters import find_base_parameters
 from robots.common.errors import InputError
 from robots.common.files import existing_file
-from robots.common.records import read
-from robots.limits import Margin
 from robots.loading import load_robot
 from robots.robot import Robot
 from robots.terms.situations.flange_body import carrying, payload_part
@@ -29,8 +25,8 @@ TRAJECTORY, DESIGN = "trajectory.csv", "design.json"
 
 def read_design(
     folder: str | Path, robot: Robot | None = None, criterion: str | Criterion | None = None
-) -> dict[str, Any]:
-    """Reads the attributes of a saved design.
+) -> tuple[dict[str, Any], dict[str, Any]]:
+    """Reads the file of a saved design, and the attributes that it holds in another form.
 
     Args:
         folder: where `save` wrote.
@@ -53,22 +49,12 @@ def read_design(
         if list(base.names) != data["model"]["columns"]:
             raise InputError(f"the design is for {data['robot']['name']}, not for {known.name}", file=file)
         motion = read_trajectory(Path(folder) / TRAJECTORY)[0]
-        return {
+        return data | {"home": data.get("home", motion.q[0].tolist())}, {
             "robot": known,
             "base": base,
             "criterion": choose_criterion(criterion or data["criterion"]),
             "motion": motion,
-            "segments": tuple(data["segments"]),
-            "qualities": read(tuple[Quality, ...], data["quality"], file=file),
-            "margins": read(tuple[Margin, ...], data["smallest_margins"], file=file),
-            "islands": read(tuple[Outcome, ...], data["solver"]["islands"], file=file),
-            "settings": settings,
             "coefficients": np.array((data.get("fourier") or data["excitation"])["coefficients"]),
-            "home": np.array(data["home"]) if "home" in data else motion.q[0],
-            "home_moved": data.get("home_moved", False),
-            "space": read(tuple[SpatialMargin, ...], data.get("limits_in_space", []), file=file),
-            "freedom": data["collision"],
-            "strokes_left_out": tuple(data["strokes_left_out"]),
         }
     except (OSError, UnicodeDecodeError, json.JSONDecodeError, KeyError, TypeError) as error:
         raise InputError(f"is not a design file, or is damaged ({type(error).__name__}: {error})", file=file) from error

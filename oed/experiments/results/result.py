@@ -312,7 +312,8 @@ class Design(Planned, format="robot-oed design", tool=True, shares=("limits=robo
         Raises:
             InputError: a missing or damaged file, or another robot than the design's.
         """
-        return cls(**read_design(folder, robot, criterion))
+        data, given = read_design(folder, robot, criterion)
+        return cls.from_dict(data, file=Path(folder) / cls.FILE, remedy="design the experiment again", **given)
 
     def metadata(self) -> dict[str, Any]:
         """Gives the metadata of the trajectory file."""

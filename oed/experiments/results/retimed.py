@@ -24,7 +24,7 @@ from robots.base_parameters import BaseParameters, find_base_parameters
 from robots.common.errors import InputError
 from robots.common.files import existing_file
 from robots.common.plain import number
-from robots.common.records import Finding, Record, findings_of, read
+from robots.common.records import Finding, Record, findings_of
 from robots.limits import Margin
 from robots.loading import load_robot
 from robots.robot import Robot
@@ -219,34 +219,22 @@ class RetimedExperiment(Planned, format="robot-oed design", tool=True, shares=("
             base = find_base_parameters(design_model(known, data["settings"]))
             if list(base.names) != data["model"]["columns"]:
                 raise InputError(f"the experiment is for {data['robot']['name']}, not for {known.name}", file=file)
-            before, after = read(tuple[Quality, Quality], data["quality"], file=file)
             retiming = data["retiming"]
             usage = _usage(retiming["usage"])
             if usage is None:
                 raise KeyError("usage")
-            return cls(
-                robot=known,
-                base=base,
-                criterion=data["criterion"],
-                before=before,
-                after=after,
-                retimed=Retimed(
-                    motion=read_trajectory(Path(folder) / TRAJECTORY)[0],
-                    method=retiming["method"],
-                    duration_before=retiming["duration_before"],
-                    duration_after=retiming["duration_after"],
-                    usage=usage,
-                    usage_before=_usage(retiming["usage_before"]),
-                    deviation=retiming["path_deviation"],
-                    stops=retiming["stops"],
-                    waypoints=retiming.get("waypoints", False),
-                ),
-                torque_before=read(TorqueUse | None, retiming["torque_before"], file=file),
-                torque_after=read(TorqueUse | None, retiming["torque_after"], file=file),
-                margins=read(tuple[Margin, ...], data["smallest_margins"], file=file),
-                settings=data["settings"],
-                freedom=data["collision"],
+            retimed = Retimed(
+                motion=read_trajectory(Path(folder) / TRAJECTORY)[0],
+                method=retiming["method"],
+                duration_before=retiming["duration_before"],
+                duration_after=retiming["duration_after"],
+                usage=usage,
+                usage_before=_usage(retiming["usage_before"]),
+                deviation=retiming["path_deviation"],
+                stops=retiming["stops"],
+                waypoints=retiming.get("waypoints", False),
             )
+            return cls.from_dict(data, file=file, robot=known, base=base, retimed=retimed)
         except (OSError, UnicodeDecodeError, json.JSONDecodeError, KeyError, TypeError, ValueError) as error:
             raise InputError(
                 f"is not a file of a retimed experiment, or is damaged ({type(error).__name__}: {error})", file=file

@@ -42,7 +42,11 @@ def plain(value: Any, **context: Any) -> Any:
         return {str(key): plain(item, **context) for key, item in value.items()}
     if isinstance(value, PathLike):
         return str(value)
-    return [plain(item, **context) for item in value]
+    items = list(value)
+    # Long rows of numbers are most of a file.
+    if all(type(item) is float for item in items):
+        return [item if math.isfinite(item) else None for item in items]
+    return [plain(item, **context) for item in items]
 
 
 @dataclass(frozen=True)

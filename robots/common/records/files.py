@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from os import PathLike
+from pathlib import Path
 from typing import Any
 
 from robots.common.errors import InputError
@@ -40,6 +41,8 @@ def read_json(
     """
     kind = format.removeprefix("robot-oed ")
     wanted = f"is not {'an' if kind[0] in 'aeiou' else 'a'} {kind} file" if kind else "cannot be read as a JSON object"
+    if not Path(path).exists():
+        raise InputError("no such file", file=path, remedy=remedy)
     try:
         data = json.loads(existing_file(path).read_text(encoding="utf-8"))
     except ValueError as error:

@@ -29,13 +29,20 @@ def read_null_as(*numbers: float) -> dict[str, Any]:
 
 
 def read(
-    kind: Any, data: object, *, file: str | PathLike[str] | None = None, remedy: str = "", whole: bool = False
+    kind: Any,
+    data: object,
+    column: str = "",
+    *,
+    file: str | PathLike[str] | None = None,
+    remedy: str = "",
+    whole: bool = False,
 ) -> Any:
     """Reads a value of any kind that `plain` writes.
 
     Args:
         kind: its type, such as ``tuple[Contact, ...]``.
         data: plain data.
+        column: the entry that holds them, for messages.
         file: in which they were found, for messages.
         remedy: what to do if they are damaged.
         whole: whether records hold all fields, whatever `Record.ENTRIES` lists.
@@ -43,7 +50,7 @@ def read(
     Raises:
         InputError: an entry that is missing or of another kind, named with the file.
     """
-    return Reader(file=file, remedy=remedy, whole=whole).value(kind, data, "")
+    return Reader(file=file, remedy=remedy, whole=whole).value(kind, data, column)
 
 
 class Reader:
@@ -159,6 +166,8 @@ class Reader:
     def _sequence(self, origin: Any, args: tuple[Any, ...], data: Any, path: str, null: Sequence[float]) -> Any:
         if not isinstance(data, list | tuple):
             raise self.fail(path, f"found {_short(data)}", "a list")
+        if origin is list and args == (float,) and all(type(item) is float for item in data):
+            return list(data)
         if origin is tuple and args[-1] is not Ellipsis:
             if len(data) != len(args):
                 raise self.fail(path, f"{len(data)} values", f"{len(args)}")

@@ -182,6 +182,12 @@ def test_foreign_and_newer_files_are_refused(content: bytes, words: str, tmp_pat
     assert "do it again" in str(caught.value)
 
 
+def test_a_missing_file_is_answered_with_what_to_give(tmp_path: Path):
+    """The message says which file would do."""
+    with pytest.raises(InputError, match="no such file; do it again"):
+        read_json(tmp_path / "none.json", remedy="do it again")
+
+
 def test_values_of_other_kinds_are_refused():
     """A whole number may be written as 8.0; a truth value is no number."""
     assert read(int, 8.0) == 8
@@ -197,11 +203,13 @@ def subclasses(kind: type) -> set[type]:
 
 @pytest.mark.slow
 def test_entries_of_all_records_name_attributes():
-    """Every entry of every record of the packages names a field or attribute of its class, or what is shared above."""
+    """Every entry names a field or attribute of its class, or what is shared; every result has a conclusion."""
     for package in (robots, estimation, oed):
         for module in pkgutil.walk_packages(package.__path__, f"{package.__name__}."):
             if not module.name.endswith("__main__"):
                 importlib.import_module(module.name)
+    silent = [kind.__name__ for kind in subclasses(Result) if kind.FILE and kind.conclusion is Result.conclusion]
+    assert set(silent) <= {"Planned", "Whole"}
     ours = [kind for kind in subclasses(Record) if kind.__module__.split(".")[0] in ("robots", "estimation", "oed")]
     assert len(ours) > 60
     shared = {text.partition("=")[0] for kind in ours for text in kind._shares}
