@@ -104,11 +104,6 @@ RULES: dict[str, Rule] = {
         ("hypothesis_tests.refinement:gain_from_reversal_errors",), lambda *_: 0.0, lambda result, _: result > 1.0
     ),
     "rows at reversals count": Rule(("searches.search:_trust_reversal_rows",), lambda base, recording: recording),
-    "noise level of each log": Rule(
-        ("searches.acceptance:profile_gain",),
-        lambda problem, candidate: candidate.gain,
-        lambda result, arguments: result > arguments[1].gain + 1.0,
-    ),
     "load of the gears": Rule(
         ("searches.refit:find_gear_load",), lambda *_: NO_GEAR_LOAD, lambda result, _: result is not NO_GEAR_LOAD
     ),
@@ -124,7 +119,6 @@ RULES: dict[str, Rule] = {
     "names against functions in their place": Rule(
         ("validations.name_comparison:_outperformed",), lambda *_: None, lambda result, _: result is not None, late=True
     ),
-    "names keep their gain": Rule(("validations.name_comparison:_retains_gain",), _yes, _denied, late=True),
     "held-out rejection": Rule(
         ("validations.held_out_validation:_is_harmful",), _no, lambda result, _: bool(result), late=True
     ),

@@ -13,7 +13,6 @@ from estimation.diagnosis.hypothesis_tests.joint_agreement import per_joint_evid
 from estimation.diagnosis.hypothesis_tests.problem import Problem
 from estimation.diagnosis.hypothesis_tests.scoring import Accepted, accept, score
 from estimation.diagnosis.hypothesis_tests.shocks import gain_beside_shock
-from estimation.diagnosis.searches.log_noise_levels import profile_gain
 from robots.terms.effect_bases.capabilities import AtReversals
 
 # Time [s] before and after an impact of another effect in which the drives respond to it; share of the rows from which
@@ -23,19 +22,14 @@ ANSWERS, MOSTLY, ASIDE = 0.2, 0.8, 0.5
 SURE = 0.2
 
 
-def passes_bic(problem: Problem, candidate: FittedEffect, members: Sequence[FittedEffect]) -> bool:
+def passes_bic(candidate: FittedEffect, members: Sequence[FittedEffect]) -> bool:
     """Whether the BIC gain of a candidate beside the members is sufficient.
 
-    For the first effect, the noise level of each log may also be free.
-
     Args:
-        problem: whitened data.
         candidate: effect, measured beside the members.
         members: effects in the model.
     """
     worth = candidate.bic_gain - candidate.motion_error_chi2 if members else candidate.local_bic_gain
-    if worth <= MIN_BIC_GAIN and not members and len(problem.recording.runs) > 1:
-        worth += profile_gain(problem, candidate) - candidate.gain
     return worth > MIN_BIC_GAIN
 
 
@@ -51,7 +45,7 @@ def is_accepted(
         others: other effects in the model.
         false_alarm: threshold of the p-values.
     """
-    return passes_bic(problem, candidate, others) or is_certain(problem, candidate, p_value, others, false_alarm)
+    return passes_bic(candidate, others) or is_certain(problem, candidate, p_value, others, false_alarm)
 
 
 def is_certain(

@@ -20,7 +20,7 @@ from estimation.diagnosis.hypothesis_tests.fitted_effects import FittedEffect
 from estimation.diagnosis.hypothesis_tests.problem import Problem
 from estimation.diagnosis.hypothesis_tests.refinement import refine
 from estimation.diagnosis.hypothesis_tests.scan import Entry
-from estimation.diagnosis.hypothesis_tests.scoring import accept, score
+from estimation.diagnosis.hypothesis_tests.scoring import accept
 from estimation.diagnosis.searches.selection import SelectedEffect, Selection
 from estimation.diagnosis.validations.free_functions import free_functions
 
@@ -60,19 +60,14 @@ def compare_with_free_functions(
     kept = _plausible(problem, selection.found)
     while (worst := _outperformed(problem, kept, patterns, false_alarm)) is not None:
         kept.remove(worst)
-    while True:
-        names = [found.effect for found in kept]
-        left, p_values = free_functions(problem, patterns, names, false_alarm, alone=True)
-        explained = accept(problem, tuple(name.group for name in names)).gain
-        total = explained + sum(member.excess_chi2 for member in left)
-        share = explained / total if total > 0 else 1.0
-        if share >= MIN_EXPLAINED_SHARE:
-            return ComparedNames(tuple(kept), (), (), share)
-        # An effect may have been selected for part of an unexplained error that acts on other joints, too.
-        borrowed = [f for f in kept if not _retains_gain(problem, f.effect, [*_others(kept, f), *left])]
-        if not borrowed:
-            return ComparedNames(tuple(kept), tuple(left), tuple(p_values), share)
-        kept.remove(min(borrowed, key=lambda f: f.effect.gain))
+    names = [found.effect for found in kept]
+    left, p_values = free_functions(problem, patterns, names, false_alarm, alone=True)
+    explained = accept(problem, tuple(name.group for name in names)).gain
+    total = explained + sum(member.excess_chi2 for member in left)
+    share = explained / total if total > 0 else 1.0
+    if share >= MIN_EXPLAINED_SHARE:
+        return ComparedNames(tuple(kept), (), (), share)
+    return ComparedNames(tuple(kept), tuple(left), tuple(p_values), share)
 
 
 def has_close_rivals(found: SelectedEffect) -> bool:
@@ -131,12 +126,6 @@ def _explain_as_well(
         return False
     flexible = free.degrees > degrees and share >= NEARLY_EXPLAINED_SHARE
     return flexible or free.best_bic_gain <= own + MIN_BIC_GAIN
-
-
-def _retains_gain(problem: Problem, name: FittedEffect, beside: Sequence[FittedEffect]) -> bool:
-    """Whether a named effect retains most of its chi2 beside other functions."""
-    accepted = accept(problem, tuple(member.group for member in beside))
-    return score(problem, name.group, accepted).gain > MIN_RETAINED_CHI2 * name.gain
 
 
 def _plausible(problem: Problem, founds: Sequence[SelectedEffect]) -> list[SelectedEffect]:

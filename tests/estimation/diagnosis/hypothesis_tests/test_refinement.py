@@ -99,10 +99,9 @@ def test_what_errors_of_the_motion_may_make_of_a_gain_says_nothing_of_its_being_
     doubted = replace(delay, motion_error_chi2=GAIN - 40.0)
     assert doubted.bic_gain == delay.bic_gain
     assert doubted.local_bic_gain == pytest.approx(delay.local_bic_gain - GAIN + 40.0)
-    problem = SimpleNamespace(rows=ROWS, recording=SimpleNamespace(runs=(slice(0, ROWS),)))
     for others in ([], [_member("spring", 1, _boxes()[:1])]):
-        assert passes_bic(problem, delay, others)  # type: ignore[arg-type]
-        assert not passes_bic(problem, replace(doubted, degrees=4), others)  # type: ignore[arg-type]
+        assert passes_bic(delay, others)
+        assert not passes_bic(replace(doubted, degrees=4), others)
 
 
 def test_a_contact_that_cannot_win_is_not_searched() -> None:

@@ -12,7 +12,6 @@ import pytest
 from estimation.diagnosis.calibration import (
     MIN_BIC_GAIN,
     MIN_EXPLAINED_SHARE,
-    MIN_RETAINED_CHI2,
     NEARLY_EXPLAINED_SHARE,
 )
 from estimation.diagnosis.hypothesis_tests.fitted_effects import FittedEffect
@@ -35,7 +34,6 @@ def _compared(
     names: Sequence[FittedEffect],
     in_place: Sequence[FittedEffect] = (),
     left: Sequence[FittedEffect] = (),
-    retained: float = 1.0,
 ) -> ComparedNames:
     """Compares named effects with free functions `in_place` of them, and others for what they have `left`."""
     adding(monkeypatch, {id(m.group): m.gain for m in (*names, *in_place, *left)})
@@ -48,9 +46,6 @@ def _compared(
 
     monkeypatch.setattr(name_comparison, "free_functions", free)
     monkeypatch.setattr(name_comparison, "_is_plausible", lambda *arguments: True)
-    monkeypatch.setattr(
-        name_comparison, "score", lambda problem, group, beside: SimpleNamespace(gain=retained * names[0].gain)
-    )
     selection: Any = SimpleNamespace(found=tuple(SelectedEffect(member, 1e-9) for member in names))
     return compare_with_free_functions(PROBLEM, selection, [], 0.01)
 
@@ -118,17 +113,6 @@ def test_what_names_leave_is_unexplained_if_it_is_much(
     assert result.p_values == ((1e-30,) if unexplained else ())
     assert [found.effect for found in result.named] == [name]
     assert result.explained == pytest.approx(500.0 / (500.0 + left - 4))
-
-
-@pytest.mark.parametrize(("retained", "kept"), [(MIN_RETAINED_CHI2 - 0.05, False), (MIN_RETAINED_CHI2 + 0.05, True)])
-def test_a_name_that_borrows_from_what_is_unexplained_is_left_out(
-    retained: float, kept: bool, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """A finding that keeps too little of its gain beside a free function on another joint is left out."""
-    name, rest = member_of("encoder_offset", 1, 100.0, 1), _function("angle", 2, 80.0, 15)
-    result = _compared(monkeypatch, [name], left=[rest], retained=retained)
-    assert result.free_functions == (rest,)
-    assert [found.effect for found in result.named] == ([name] if kept else [])
 
 
 def test_without_names_and_functions_nothing_is_left(monkeypatch: pytest.MonkeyPatch) -> None:
