@@ -7,6 +7,8 @@ from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
 
+from oed.cli.app import VERBS
+from oed.cli.declarations.reference import with_option_tables
 from robots.version import VERSION
 
 project = "robot-oed"
@@ -26,3 +28,8 @@ autodoc_typehints_format = "short"
 autodoc_preserve_defaults = True
 napoleon_numpy_docstring = False
 napoleon_use_ivar = True
+
+
+def setup(app):
+    """Puts the options of each command into the pages, as its class declares them."""
+    app.connect("source-read", lambda _, __, source: source.__setitem__(0, with_option_tables(source[0], VERBS)))

@@ -8,13 +8,17 @@ from os import PathLike
 from pathlib import Path
 from typing import Any
 
-from oed.exports.forms import FORMS, ExportOptions
+from oed.exports.forms import FORMS as CONTROLLER_FORMS
 from oed.exports.forms.sampling import at_period
+from oed.exports.options import ExportOptions
 from oed.exports.trajectory_checks import check_trajectory, stated_collisions
 from robots.common.errors import InputError
 from robots.common.files import write_atomic
 from robots.robot import Robot
 from robots.signals import Motion
+
+FORMS = ("csv", *CONTROLLER_FORMS)
+"""The forms in which a trajectory goes to a controller."""
 
 
 def export_trajectory(
@@ -35,7 +39,7 @@ def export_trajectory(
         path: the file.
         motion: the trajectory.
         robot: whose joints move.
-        form: a name of `FORMS`.
+        form: a name of `CONTROLLER_FORMS`.
         period: sample period [s]; that of the form or of the trajectory by default.
         options: choices that several forms share.
         metadata: what the trajectory's file says of itself.
@@ -49,9 +53,9 @@ def export_trajectory(
         InputError: another form or suffix, a trajectory that this robot must not play (see `check_trajectory`), a robot
             that the controller cannot have, an uneven trajectory without a period, or a file that cannot be written.
     """
-    if form not in FORMS:
-        raise InputError(f"form {form!r}", allowed=", ".join(FORMS))
-    chosen, path = FORMS[form], Path(path)
+    if form not in CONTROLLER_FORMS:
+        raise InputError(f"form {form!r}", allowed=", ".join(CONTROLLER_FORMS))
+    chosen, path = CONTROLLER_FORMS[form], Path(path)
     suffix = path.suffix.lower()
     if suffix not in chosen.suffixes:
         raise InputError(

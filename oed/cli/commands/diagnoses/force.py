@@ -1,0 +1,120 @@
+"""Estimates external forces from the drives' torques, and finds contacts.
+
+Writes forces.csv with the force at each sample, forces.json with the contacts, and report.html.
+"""
+
+from __future__ import annotations
+
+from contextlib import ExitStack
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from oed.cli.options.heat import Warmth
+from oed.cli.options.logs import KnownLogs
+from oed.cli.options.results import Folder
+from oed.cli.verbs import Printed, Verb
+from robots.common.errors import InputError
+from robots.common.options import Point
+from robots.common.progress import Progress
+
+if TYPE_CHECKING:
+    from estimation.models.model import Model
+    from estimation.predictions.prediction import Prediction
+    from robots.signals import Log
+
+
+@dataclass(frozen=True, kw_only=True)
+class Output(Folder):
+    """What an estimate of forces writes.
+
+    Attributes:
+        c_code: also write the observer as C code for a controller; needs --velocity logged.
+    """
+
+    c_code: Path | None = None
+
+
+@dataclass(frozen=True, kw_only=True)
+class Force(Verb):
+    """``oed force``.
+
+    Attributes:
+        model: a model.json, or its folder.
+        log: a log with positions and torques.
+        healthy: a log without contacts, from which the threshold follows. Repeatable. Default: the log itself.
+        calibration: a forces.json of an earlier run, whose threshold is used instead of --healthy.
+        false_alarms_per_hour: rate of false alarms of a robot without contact.
+        bandwidth: bandwidth of the observer [Hz].
+        tool: tool point in the flange frame, as X,Y,Z [m]. Default: the flange.
+        velocity: velocities: smoothed (from positions) or logged (columns dq1..).
+    """
+
+    examples = (
+        "oed force --model model --log log.csv --healthy healthy.csv --out forces",
+        "oed force --model model --log log.csv --calibration forces/forces.json --out other",
+    )
+    alternatives = (("healthy", "calibration"),)
+
+    model: Path
+    log: Path
+    healthy: tuple[Path, ...] = ()
+    calibration: Path | None = None
+    known: KnownLogs = KnownLogs()
+    warmth: Warmth = Warmth()
+    false_alarms_per_hour: float = 1.0
+    bandwidth: float = 4.0
+    tool: Point = None
+    velocity: str = "smoothed"
+    output: Output = Output(out=Path("forces"))
+
+    def run(self, progress: Progress) -> Printed:
+        """Estimates the forces."""
+        from estimation import load_model, predict
+        from estimation.external_forces import estimate_forces
+        from estimation.external_forces.online.c_export import observer_code
+        from estimation.external_forces.thresholds.calibrations import read_calibration
+        from estimation.predictions.earlier_logs import clock_shift
+        from oed.reports import save_force_report
+        from oed.reports.rendering.provenance import recordings_from
+        from robots.common.files import open_atomic
+
+        output = self.output
+        if output.c_code is not None and self.calibration is None and self.velocity != "logged":
+            raise InputError("--c-code without --velocity logged", remedy="a controller has no smoothed velocities")
+        with ExitStack() as files:
+            folder = files.enter_context(output.opened("forces.csv", "forces.json", "report.html"))
+            code = files.enter_context(open_atomic(output.c_code, force=output.force)) if output.c_code else None
+            identified = load_model(self.model)
+            robot = identified.robot
+            _, (recorded, *normal) = self.known.read_known([self.log, *self.healthy], robot)
+            assumed = ""
+
+            def predicted(sharp: Model, own: Log) -> Prediction:
+                nonlocal assumed
+                later, clock = clock_shift(identified, own)
+                heat = self.warmth.heat_of(self.model, identified, own, self.known.stated, later)
+                if own is recorded:
+                    assumed = "\n".join(words for words in (heat.assumed, clock) if words)
+                return predict(sharp, own, later=later, **heat.options)
+
+            result = estimate_forces(
+                identified,
+                recorded,
+                healthy=normal,
+                calibration=None if self.calibration is None else read_calibration(self.calibration, robot.n),
+                false_alarms=self.false_alarms_per_hour,
+                bandwidth=self.bandwidth,
+                tool=self.tool,
+                velocity=self.velocity,  # type: ignore[arg-type]
+                predictor=predicted,
+                progress=progress,
+            )
+            result.save(folder.path("forces.json").parent)
+            logs = recordings_from([recorded])
+            save_force_report(result, folder, kinds=robot.chain.kinds, logs=logs, png=output.png)
+            if code is not None:
+                gravity, payload = recorded.gravity, recorded.payload
+                text = observer_code(identified, result.calibration, tool=self.tool, gravity=gravity, payload=payload)
+                code.write(text.encode())
+        return output.printed(result, *([assumed] if assumed else []), heat=assumed or None)

@@ -1,0 +1,56 @@
+"""The options of a command as a table in Markdown, for the reference page."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from typing import Any
+
+from oed.cli.declarations.declared import Declared, declared_options
+from oed.cli.verbs import Verb
+
+COMMON = ("force", "json", "quiet")
+"""Fields of most commands, which the page describes once."""
+
+
+def option_table(verb: type[Verb]) -> str:
+    """Writes a row for each option that not all commands have: how it is typed, its default, what it means.
+
+    Args:
+        verb: options class of the command.
+    """
+    options = [option for name, option in declared_options(verb).items() if name not in COMMON]
+    if not options:
+        return ""
+    options.sort(key=lambda option: (not option.how.argument, not option.required))
+    rows = [f"| `{_spelling(option)}` | {_default(option)} | {_cell(option.help)} |" for option in options]
+    return "\n".join(["| option | default | meaning |", "|---|---|---|", *rows, ""])
+
+
+def with_option_tables(page: str, verbs: Mapping[str, type[Verb]]) -> str:
+    """Puts the tables of commands into a page, in the places of lines such as ``<!-- options: design -->``.
+
+    Args:
+        page: in Markdown.
+        verbs: the commands.
+    """
+    return re.sub(r"^<!-- options: (\w+) -->$", lambda found: option_table(verbs[found[1]]), page, flags=re.MULTILINE)
+
+
+def _spelling(option: Declared) -> str:
+    if option.how.argument:
+        return option.name.upper()
+    return f"--{option.name}" + (f" / --{option.negative}" if option.negative else "")
+
+
+def _default(option: Declared) -> str:
+    value: Any = option.default
+    if option.required:
+        return "required"
+    if isinstance(value, bool):
+        return f"`--{option.name}`" if value else "-"
+    return f"`{value}`" if option.has_default else "-"
+
+
+def _cell(text: str) -> str:
+    return text.replace("|", "\\|")
