@@ -2,20 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, TypeVar
 
 from oed.cli.declarations.declared import INPUT
-from robots.common.errors import InputError
 from robots.common.options import Option
 
 if TYPE_CHECKING:
-    import numpy as np
-    from numpy.typing import NDArray
-
     from estimation.logs.mappings.mapping import LogMapping
     from estimation.logs.parquet_streams import LogStream
     from robots.robot import Robot
@@ -98,18 +94,9 @@ class TorqueMeaning(Columns):
         Raises:
             InputError: an unknown meaning, or a description that lacks what is needed.
         """
-        from estimation.logs.torque_source import parse_meaning
-        from estimation.regressions.torque_meanings import as_joint_torque, with_torque_constants
+        from estimation.regressions.torque_meanings import as_joint_torques
 
-        if self.torque_is is not None:
-            parse_meaning(self.torque_is, robot.n)
-        robot = with_torque_constants(robot, logs if without is None else without, self.torque_is)
-        return robot, [
-            log
-            if log.tau is None and log.current is None
-            else as_joint_torque(robot, log, self.torque_is, estimate=False)
-            for log in logs
-        ]
+        return as_joint_torques(robot, logs, self.torque_is, without=without)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -133,18 +120,9 @@ class LoadedLogs(TorqueMeaning):
         Raises:
             InputError: a text of another form, a number without a log, or a number given twice.
         """
-        from dataclasses import replace
+        from estimation.payloads.stated import with_stated_setup
 
-        loads = _by_number("--payload", self.payload, _payload, len(logs))
-        fields = _by_number("--gravity", getattr(self, "gravity", ()), _gravity, len(logs))
-        result = []
-        for number, log in enumerate(logs, start=1):
-            if number in loads:
-                log = replace(log, payload=loads[number])
-            if number in fields:
-                log = replace(log, gravity=fields[number])
-            result.append(log)
-        return result
+        return with_stated_setup(logs, payloads=self.payload, gravities=getattr(self, "gravity", ()))
 
     def read_known(self, paths: Sequence[Path], robot: Robot, **settings: Any) -> tuple[Robot, list[Log]]:
         """Reads logs with all that is known of their setup, as joint torques.
@@ -173,59 +151,3 @@ class KnownLogs(LoadedLogs):
     """
 
     gravity: tuple[str, ...] = ()
-
-
-def _by_number(
-    option: str, texts: Sequence[str], read: Callable[[str], NDArray[np.float64]], count: int
-) -> dict[int, NDArray[np.float64]]:
-    found: dict[int, NDArray[np.float64]] = {}
-    everywhere: NDArray[np.float64] | None = None
-    for text in texts:
-        name, equals, values = text.partition("=")
-        if not equals:
-            name, values = "0", text
-        try:
-            number, value = int(name), read(values)
-        except ValueError:
-            raise InputError(f"{option} {text}", allowed=_EXAMPLES[option]) from None
-        if not equals:
-            if everywhere is not None:
-                raise InputError(f"{option} without a number twice", allowed="one for all logs")
-            everywhere = value
-            continue
-        if not 1 <= number <= count:
-            raise InputError(
-                f"{option} of log {number}", allowed=f"1 to {count}, the number of the log in reading order"
-            )
-        if number in found:
-            raise InputError(f"{option} of log {number} twice", allowed="one per log")
-        found[number] = value
-    return found if everywhere is None else {**dict.fromkeys(range(1, count + 1), everywhere), **found}
-
-
-_EXAMPLES = {
-    "--payload": (
-        "NUMBER=KG,X,Y,Z or NUMBER=payload.json; 2=5,0,0,0.1 means log 2 with 5 kg, centred 0.1 m in front of the "
-        "flange"
-    ),
-    "--gravity": "NUMBER=X,Y,Z; 2=0,-2.54,-9.48 means log 2 with the base tilted by 15 degrees",
-}
-
-
-def _payload(values: str) -> NDArray[np.float64]:
-    """Reads KG,X,Y,Z, or a payload.json: ten inertial parameters in the flange's frame."""
-    from estimation.payloads.body import read_body
-    from robots.terms.situations.flange_body import point_mass
-
-    if values.endswith(".json") or (values and Path(values).exists()):
-        return read_body(values).parameters
-    mass, x, y, z = map(float, values.split(","))
-    return point_mass(mass, (x, y, z))
-
-
-def _gravity(values: str) -> NDArray[np.float64]:
-    """Reads X,Y,Z."""
-    import numpy as np
-
-    x, y, z = map(float, values.split(","))
-    return np.array([x, y, z])

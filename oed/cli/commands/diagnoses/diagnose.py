@@ -16,11 +16,11 @@ from oed.cli.options.logs import KnownLogs
 from oed.cli.options.models import Fit, model_for
 from oed.cli.options.results import ModelFolder
 from oed.cli.options.robots import RobotOptions
-from oed.cli.unfit_models import NEAREST, unfit_of
 from oed.cli.verbs import Printed, Verb
 from robots.common.options import Option
 from robots.common.progress import Progress
 
+NEAREST = "model_for_simulation.json"
 OfLogs, OfLimits = Option(only=("logs",)), Option(only=("limits",))
 
 
@@ -98,6 +98,7 @@ class Diagnose(Verb):
         """Diagnoses logs: diagnosis.json, model.json, report.html, motions of the next experiment; URDF and MJCF."""
         from estimation import diagnose, on_one_clock
         from estimation.diagnosis.experiment_plans.experiment_motions import at_rate
+        from estimation.predictions.simulability import unfit_of
         from oed.exports import write_trajectory
         from oed.reports import save_diagnosis_report
 

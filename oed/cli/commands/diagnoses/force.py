@@ -75,6 +75,7 @@ class Force(Verb):
         from estimation.external_forces.online.c_export import observer_code
         from estimation.external_forces.thresholds.calibrations import read_calibration
         from estimation.predictions.earlier_logs import clock_shift
+        from estimation.predictions.heat import heat_of
         from oed.reports import save_force_report
         from oed.reports.rendering.provenance import recordings_from
         from robots.common.files import open_atomic
@@ -88,12 +89,12 @@ class Force(Verb):
             identified = load_model(self.model)
             robot = identified.robot
             _, (recorded, *normal) = self.known.read_known([self.log, *self.healthy], robot)
-            assumed = ""
+            earlier, assumed = self.known.read(self.warmth.before, robot), ""
 
             def predicted(sharp: Model, own: Log) -> Prediction:
                 nonlocal assumed
                 later, clock = clock_shift(identified, own)
-                heat = self.warmth.heat_of(self.model, identified, own, self.known.stated, later)
+                heat = heat_of(self.model, identified, own, earlier, self.warmth.ambient, later)
                 if own is recorded:
                     assumed = "\n".join(words for words in (heat.assumed, clock) if words)
                 return predict(sharp, own, later=later, **heat.options)

@@ -20,7 +20,7 @@ class Doctor(Verb):
     def run(self, progress: Progress) -> Printed:
         """Describes the installation."""
         from oed.cli.configuration.defaults import configuration_state
-        from oed.cli.first_steps.installation import installation, installation_text, with_configuration
+        from oed.installation import installation, installation_text, with_configuration
 
         found = with_configuration(installation(), configuration_state())
         return Printed(summary=installation_text(found), data=found, code=1 if found["problems"] else 0)

@@ -19,7 +19,7 @@ class Effects(Verb):
 
     def run(self, progress: Progress) -> Printed:
         """Lists the effects."""
-        from oed.cli.first_steps.effect_table import effect_rows, effect_text
+        from robots.terms.effect_table import effect_rows, effect_text
 
         rows = effect_rows()
         return Printed(summary=effect_text(rows), data={"effects": rows})

@@ -36,13 +36,13 @@ class Example(Verb):
         """Writes the files."""
         force, commands = self.overwriting.force, tuple[str, ...]()
         if self.for_ == "calibration":
-            from oed.cli.first_steps.calibration_example import next_calibration_commands, write_calibration_example
+            from oed.examples.poses import next_calibration_commands, write_calibration_example
 
             written = write_calibration_example(self.out, force=force)
             commands = next_calibration_commands(self.out)
             what = "The poses are those of a virtual robot whose zeros and links differ from robot.yaml. Next:"
         elif self.for_ == "dynamics":
-            from oed.cli.first_steps.example_files import next_commands, write_example
+            from oed.examples.files import next_commands, write_example
 
             written, commands = write_example(self.out, force=force), next_commands(self.out)
             what = "The log is that of the virtual robot in worn.yaml, which robot.yaml does not fully describe. Next:"

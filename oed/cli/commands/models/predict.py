@@ -52,6 +52,7 @@ class Predict(Verb):
         from estimation import load_model
         from estimation import predict as run
         from estimation.predictions.earlier_logs import clock_shift
+        from estimation.predictions.heat import heat_of
         from oed.reports import prediction_page, render
         from oed.reports.rendering.provenance import recordings_from
         from robots.common.files import open_atomic
@@ -65,7 +66,8 @@ class Predict(Verb):
             _, (recorded,) = self.known.read_known([self.log], robot, torque=False)
             progress.start("predicting", None)
             later, clock = clock_shift(identified, recorded)
-            heat = self.warmth.heat_of(self.model, identified, recorded, self.known.stated, later)
+            earlier = self.known.read(self.warmth.before, robot)
+            heat = heat_of(self.model, identified, recorded, earlier, self.warmth.ambient, later)
             result = run(identified, recorded, later=later, **heat.options)
             result.save(output.out, force=output.force)
             if page_file is not None:
