@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from estimation.logs.parquet_streams import LogStream
 from estimation.payloads.body import read_body
 from robots.common.errors import InputError
+from robots.robot import Robot
 from robots.signals import Log
 from robots.terms.situations.flange_body import point_mass
 
@@ -94,3 +95,28 @@ def _gravity(values: str) -> NDArray[np.float64]:
     """Reads X,Y,Z."""
     x, y, z = map(float, values.split(","))
     return np.array([x, y, z])
+
+
+def loaded_robot(known: Robot, stated: Robot | None) -> Robot:
+    """Gives the robot of logs with a payload: as it is stated, with the torque constants that only the model knows.
+
+    Args:
+        known: the model's robot.
+        stated: the same robot by another description; None for the model's.
+
+    Raises:
+        InputError: a robot of other joints, or with another flange than the model's.
+    """
+    if stated is None:
+        return known
+    if stated.n != known.n:
+        raise InputError(f"a model of {known.n} joints", allowed=f"{stated.n}, as {stated.name} has")
+    zero = np.zeros((1, stated.n))
+    if not np.allclose(stated.chain.flange(zero), known.chain.flange(zero), atol=1e-4):
+        raise InputError(
+            f"the flange of {stated.name} is elsewhere than that of the model's robot",
+            remedy="leave --robot out, state the flange by --frame, or identify the model with this robot",
+        )
+    constants = np.asarray(stated.torque_constant)
+    filled = np.where(np.isnan(constants), known.torque_constant, constants)
+    return replace(stated, torque_constant=filled)

@@ -71,7 +71,7 @@ def identify_thermal(
 ) -> ThermalIdentification:
     """Identifies rigid body, friction, and the change of friction with temperature.
 
-    The source is the thesis, section 4: thermal models of first and second order, an advanced and a fractional one.
+    The source is thesis section 4: thermal models of first and second order, an advanced and a fractional one.
 
     Args:
         robot: the robot.

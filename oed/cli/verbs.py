@@ -43,6 +43,8 @@ class Verb:
 
     examples: ClassVar[tuple[str, ...]] = ()
     """Command lines to copy."""
+    function: ClassVar[str] = ""
+    """The public function that does the work, by its path; empty for a command that only lists or prints."""
     introduces: ClassVar[bool] = False
     """Whether work on a robot begins with the command: it then shows the notes on its description in full."""
     alternatives: ClassVar[tuple[tuple[str, str], ...]] = ()

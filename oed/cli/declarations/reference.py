@@ -13,6 +13,10 @@ COMMON = ("force", "json", "quiet")
 """Fields of most commands, which the page describes once."""
 
 
+FUNCTIONS = "<!-- functions -->"
+"""The place of the table of functions."""
+
+
 def option_table(verb: type[Verb]) -> str:
     """Writes a row for each option that not all commands have: how it is typed, its default, what it means.
 
@@ -28,13 +32,24 @@ def option_table(verb: type[Verb]) -> str:
 
 
 def with_option_tables(page: str, verbs: Mapping[str, type[Verb]]) -> str:
-    """Puts the tables of commands into a page, in the places of lines such as ``<!-- options: design -->``.
+    """Puts tables into a page: of the functions, and of options in places such as ``<!-- options: design -->``.
 
     Args:
         page: in Markdown.
         verbs: the commands.
     """
+    page = page.replace(FUNCTIONS, function_table(verbs)) if FUNCTIONS in page else page
     return re.sub(r"^<!-- options: (\w+) -->$", lambda found: option_table(verbs[found[1]]), page, flags=re.MULTILINE)
+
+
+def function_table(verbs: Mapping[str, type[Verb]]) -> str:
+    """Writes a row for each command that calls a public function.
+
+    Args:
+        verbs: the commands.
+    """
+    rows = [f"| `oed {name}` | `{verb.function}` |" for name, verb in verbs.items() if verb.function]
+    return "\n".join(["| command | function |", "|---|---|", *rows])
 
 
 def _spelling(option: Declared) -> str:

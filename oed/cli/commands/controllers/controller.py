@@ -69,6 +69,7 @@ class Controller(Verb):
         duration: end after so long [s]. Default: Ctrl-C.
     """
 
+    function = "oed.controllers.VirtualController"
     examples = (
         "oed controller --robot er3a --plant plant.yaml",
         "oed controller --robot er3a --replies echo --lose 0.05 --double 0.05 --late 0.05",

@@ -29,6 +29,7 @@ class Loop(Verb):
         design: folder of an `oed design` result for the first experiment. Default: one is designed.
     """
 
+    function = "oed.run_loop"
     examples = (
         "oed loop --robot er3a --host 192.168.0.10 --out loop",
         "oed loop --robot er3a --host 127.0.0.1 --design experiment --experiments 3 --out loop",

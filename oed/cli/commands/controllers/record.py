@@ -29,6 +29,7 @@ class Record(Verb):
         external_axes: the controller has axes behind those of the robot: they stay where they are.
     """
 
+    function = "oed.record"
     examples = ("oed record --robot er3a --host 192.168.0.10 --log log.csv --duration 60",)
 
     robot: RobotOptions

@@ -42,6 +42,7 @@ class Simulate(Verb):
         seed: seed of the random numbers.
     """
 
+    function = "robots.simulate"
     examples = (
         "oed simulate --trajectory experiment/trajectory.csv --out log.csv",
         "oed simulate --trajectory experiment/trajectory.csv --plant plant.yaml --seed 1 --out log.csv",

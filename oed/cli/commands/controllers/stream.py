@@ -36,6 +36,7 @@ class Stream(Verb):
         dry_run: check trajectory, controller and pose; only listen.
     """
 
+    function = "oed.stream"
     examples = (
         "oed stream experiment/trajectory.csv --host 192.168.0.10 --dry-run",
         "oed stream experiment/trajectory.csv --host 192.168.0.10 --log log.csv",

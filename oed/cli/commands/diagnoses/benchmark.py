@@ -37,6 +37,7 @@ class Benchmark(Verb):
         workers: number of parallel processes. Default: one per core.
     """
 
+    function = "oed.benchmarks.make_benchmark"
     examples = (
         "oed benchmark make blind --cases 24",
         "oed benchmark answer blind --by residual-fit",

@@ -33,6 +33,7 @@ class Compare(Verb):
         false_alarms: probability of any false alarm among all tests.
     """
 
+    function = "estimation.compare"
     examples = (
         "oed compare monday/model.json friday/model.json --out compared",
         "oed compare logs/day1.csv logs/day2.csv logs/day3.csv --robot er3a --out compared",

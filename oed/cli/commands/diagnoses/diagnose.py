@@ -42,6 +42,7 @@ class Diagnose(Verb):
         noise: with --limits: expected torque noise as a fraction of the torque RMS.
     """
 
+    function = "estimation.diagnose"
     examples = ("oed diagnose --robot er3a --log log.csv --held-out held_out.csv --out diagnosed",)
 
     robot: RobotOptions

@@ -28,6 +28,7 @@ class Fleet(Verb):
         model: model of the healthy robots. A model.json in a robot's folder goes before it.
     """
 
+    function = "estimation.monitor_fleet"
     examples = (
         "oed fleet logs_of_all_robots --model model --workers 4 --out fleet",
         "oed fleet logs_of_all_robots --model model --cluster tcp://192.168.1.10:8786 --out fleet",

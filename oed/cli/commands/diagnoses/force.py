@@ -50,6 +50,7 @@ class Force(Verb):
         velocity: velocities: smoothed (from positions) or logged (columns dq1..).
     """
 
+    function = "estimation.estimate_forces"
     examples = (
         "oed force --model model --log log.csv --healthy healthy.csv --out forces",
         "oed force --model model --log log.csv --calibration forces/forces.json --out other",

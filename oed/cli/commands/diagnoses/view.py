@@ -36,6 +36,7 @@ class View(Verb):
         browser: open the page in the browser.
     """
 
+    function = "oed.overviews.find_results"
     examples = ("oed view results", "oed view results --out results.html")
 
     folder: Annotated[Path, Option(argument=True)]

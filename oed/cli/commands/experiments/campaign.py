@@ -44,6 +44,7 @@ class Campaign(Verb):
         seed: seed of the random numbers.
     """
 
+    function = "oed.campaign"
     examples = (
         "oed campaign --robot er3a --design experiment --out campaign",
         "oed campaign --robot er3a --out campaign --run 192.168.0.10",

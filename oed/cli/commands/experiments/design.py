@@ -72,6 +72,7 @@ class Design(Verb):
         seed: seed of the random numbers.
     """
 
+    function = "oed.design"
     examples = (
         "oed design --robot er3a --out experiment",
         "oed design --robot arm.urdf --tip tool0 --criterion d --velocity-fraction 0.7 --out experiment",

@@ -45,6 +45,7 @@ class Export(Verb):
         period: sample period of the controller [s]. Default: see the page.
     """
 
+    function = "oed.export_trajectory"
     examples = (
         "oed export experiment/trajectory.csv --degrees --positions-only --bare --out for_controller.csv",
         "oed export experiment/trajectory.csv --to ros-goal --out goal.yaml",

@@ -31,6 +31,7 @@ class Pareto(Verb):
         seed: seed of the random numbers.
     """
 
+    function = "oed.pareto"
     examples = ("oed pareto --robot er3a --criteria cond,d --points 5 --out pareto",)
 
     robot: PlannedRobot

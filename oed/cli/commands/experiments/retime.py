@@ -31,6 +31,7 @@ class Retime(Verb):
         tolerance: largest allowed deviation of ruckig's straight lines from the path [rad].
     """
 
+    function = "oed.retime"
     examples = (
         "oed retime experiment/trajectory.csv --method toppra --out retimed",
         "oed retime waypoints.csv --robot er3a --out timed",

@@ -8,18 +8,15 @@ from __future__ import annotations
 import warnings
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated, Any
 
 from oed.cli.options.logs import Columns
 from oed.cli.options.results import Overwriting
 from oed.cli.options.robots import FileRobot
 from oed.cli.verbs import Printed, Verb
-from robots.common.errors import InputError, OtherRobotWarning
+from robots.common.errors import OtherRobotWarning
 from robots.common.options import Option
 from robots.common.progress import Progress
-
-if TYPE_CHECKING:
-    from robots.robot import Robot
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -42,6 +39,7 @@ class Show(Verb):
         diagnosis: a diagnosis.json, or its folder: joints with a finding are marked.
     """
 
+    function = "oed.reports.animate"
     examples = (
         "oed show experiment/trajectory.csv --out robot.html",
         "oed show log.csv --robot er3a --diagnosis diagnosed --out robot.html",
@@ -56,7 +54,9 @@ class Show(Verb):
     def run(self, progress: Progress) -> Printed:
         """Writes the page."""
         from oed.exports import is_made_for, read_trajectory
+        from oed.exports.trajectory_csv import is_trajectory
         from oed.reports import animate, motion_page, render
+        from oed.reports.pages.motions.diagnosis_motion import marked_findings
         from oed.reports.rendering.provenance import recordings_from
         from robots.common.files import existing_file, open_atomic
         from robots.signals import Log, Motion
@@ -65,7 +65,7 @@ class Show(Verb):
         # Opened before the work: an existing file ends the command early, and an error leaves no file behind.
         with open_atomic(out, force=self.page.force) as page_file:
             existing_file(motion)
-            planned = columns.mapping is None and columns.rate is None and _is_trajectory(motion)
+            planned = columns.mapping is None and columns.rate is None and is_trajectory(motion)
             played: Motion | Log
             stated: dict[str, Any] = {}
             if planned:
@@ -77,7 +77,7 @@ class Show(Verb):
                 warnings.warn(OtherRobotWarning(text), stacklevel=1)
             if not planned:
                 (played,) = columns.read([motion], described, torque=False)
-            marks, findings = _findings(self.diagnosis, described) if self.diagnosis else ({}, ())
+            marks, findings = marked_findings(self.diagnosis, described) if self.diagnosis else ({}, ())
             animation = animate(described, played, marks=marks)
             logs = recordings_from([played]) if isinstance(played, Log) else ()
             page_file.write(render(motion_page(animation, logs=logs, findings=findings)).encode())
@@ -94,39 +94,3 @@ class Show(Verb):
             "closest_approaches": margins,
         }
         return Printed(f"{animation.summary()}\nwritten to {out}", data)
-
-
-def _is_trajectory(path: Path) -> bool:
-    """Says whether a CSV has velocities and accelerations and nothing that was measured."""
-    if path.suffix.lower() != ".csv":
-        return False
-    with path.open(encoding="utf-8", errors="replace") as stream:
-        header = next((line for line in stream if not line.startswith("#")), "")
-    names = {word.strip().lower() for word in header.split(",")}
-    return {"t", "q1", "dq1", "ddq1"} <= names and not names & {"tau1", "i1", "temp1"}
-
-
-def _findings(path: Path, robot: Robot) -> tuple[dict[int, str], Any]:
-    """Reads the joints that a diagnosis marks, and its findings."""
-    from estimation.diagnosis.results.diagnosis import Diagnosis
-    from oed.reports.pages.motions.diagnosis_motion import joint_marks
-    from oed.reports.rendering.page import Finding
-    from robots.terms.effects import EFFECTS
-
-    found = Diagnosis.load(path.parent if path.name == "diagnosis.json" else path).findings
-    beyond = next((f for f in found if f.joint is not None and f.joint > robot.n), None)
-    if beyond is not None:
-        raise InputError(
-            f"a finding at joint {beyond.joint}, but {robot.name} has {robot.n} joints",
-            file=path,
-            remedy="choose the diagnosis of this robot",
-        )
-    findings = tuple(
-        Finding(
-            code=f"effect.{f.effect}" if f.effect in EFFECTS else "diagnosis.unexplained",
-            subject=f"Joint {f.joint}:" if f.joint else "",
-            text=f.sentence,
-        )
-        for f in found
-    )
-    return joint_marks(found), findings

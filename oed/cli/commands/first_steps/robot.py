@@ -24,6 +24,7 @@ class Robot(Verb):
             [kg]. All results say so.
     """
 
+    function = "robots.load_robot"
     examples = ("oed robot show ur10", "oed robot show arm.urdf --tip tool0 --json")
 
     action: Annotated[str, Option(argument=True)]

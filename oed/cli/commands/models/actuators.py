@@ -26,6 +26,7 @@ class Actuators(Verb):
         held_out: a log that nothing is fitted to. Repeatable. Default: the last 30 % of each run is held out.
     """
 
+    function = "estimation.identify_actuators"
     examples = (
         "oed actuators --robot go2.xml --log run.parquet --gains gains.yaml --out drives",
         "oed actuators --robot arm.xml --log run.csv --held-out other.csv --share all --out drives",

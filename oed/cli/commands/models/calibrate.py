@@ -41,6 +41,7 @@ class Calibrate(Verb):
         check: refuse poses in other units, orders or frames than stated, and lost markers.
     """
 
+    function = "estimation.calibrate"
     examples = (
         "oed calibrate --robot arm.urdf --poses poses.csv --out calibrated",
         "oed calibrate --robot ur10 --poses poses.csv --lengths mm --angles deg --held-out other.csv --out calibrated",

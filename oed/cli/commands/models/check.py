@@ -24,6 +24,7 @@ class Check(Verb):
         logs: logs, or folders of logs.
     """
 
+    function = "estimation.check_log"
     examples = ("oed check log.csv --robot er3a", "oed check logs --robot arm.urdf --torque-is current --json")
 
     logs: Annotated[tuple[Path, ...], Option(argument=True, shown="LOG...")]

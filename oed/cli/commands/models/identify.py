@@ -53,6 +53,7 @@ class Identify(Verb):
             rows.
     """
 
+    function = "estimation.identify"
     examples = (
         "oed identify --robot er3a --log log.csv --out model",
         "oed identify --robot ur10 --log rtde_recording.csv bag_folder --method all --out model",

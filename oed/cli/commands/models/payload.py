@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Collection
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 from oed.cli.options.logs import KnownLogs
 from oed.cli.options.results import Folder
@@ -18,10 +18,6 @@ from oed.cli.verbs import Printed, Verb
 from robots.common.errors import InputError
 from robots.common.options import Numbers, Option, Seed
 from robots.common.progress import Progress
-
-if TYPE_CHECKING:
-    from estimation import Model
-    from robots.robot import Robot as Description
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -50,6 +46,7 @@ class Payload(Verb):
         seed: seed of the random numbers.
     """
 
+    function = "estimation.identify_payload"
     examples = (
         "oed payload --robot ur10 --log with.csv --without without.csv --to urscript --out payload",
         "oed payload --model model --log with.csv --to franka kuka --out payload",
@@ -83,6 +80,7 @@ class Payload(Verb):
 
         from estimation import identify_payload, load_model
         from estimation.payloads.exports import payload_export
+        from estimation.payloads.stated import loaded_robot
         from oed.reports import save_payload_report
         from robots.geometry.chain import pose_of
 
@@ -100,10 +98,13 @@ class Payload(Verb):
         forms = list(dict.fromkeys(payload_export(name) for words in output.to for name in words.split(",")))
         with output.opened("payload.json", "report.html", *(form.file for form in forms)) as folder:
             model = None if self.model is None else load_model(self.model)
-            described = self._described(model)
-            loaded, free = self.known.read(self.log, described), self.known.read(self.without, described)
+            named = None if self.robot is None else self.chain.load(self.robot)
+            if model is not None:
+                named = loaded_robot(model.robot, named)
+            assert named is not None
+            loaded, free = self.known.read(self.log, named), self.known.read(self.without, named)
             both = self.known.with_setup([*loaded, *free])
-            described, logs = self.known.as_joint_torque(described, both, both[len(loaded) :])
+            described, logs = self.known.as_joint_torque(named, both, both[len(loaded) :])
             result = identify_payload(
                 logs[: len(loaded)],
                 robot=described if model is None else None,
@@ -121,29 +122,3 @@ class Payload(Verb):
             written = "\nno controller file written: there is no payload to state"
         printed = output.printed(result)
         return replace(printed, summary=printed.summary + written)
-
-    def _described(self, model: Model | None) -> Description:
-        """The robot that is named, or the model's; with the model's torque constants where it states none.
-
-        Raises:
-            InputError: a robot of other joints, or with another flange than the model's.
-        """
-        import numpy as np
-
-        if model is None:
-            return self.chain.load(self.robot or "")
-        known = model.robot
-        if self.robot is None:
-            return known
-        described = self.chain.load(self.robot)
-        if described.n != known.n:
-            raise InputError(f"a model of {known.n} joints", allowed=f"{described.n}, as {described.name} has")
-        zero = np.zeros((1, described.n))
-        if not np.allclose(described.chain.flange(zero), known.chain.flange(zero), atol=1e-4):
-            raise InputError(
-                f"the flange of {described.name} is elsewhere than that of the model's robot",
-                remedy="leave --robot out, state the flange by --frame, or identify the model with this robot",
-            )
-        stated = np.asarray(described.torque_constant)
-        filled = np.where(np.isnan(stated), known.torque_constant, stated)
-        return replace(described, torque_constant=filled)

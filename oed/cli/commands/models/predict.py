@@ -39,6 +39,7 @@ class Predict(Verb):
         log: a log with the motion.
     """
 
+    function = "estimation.predict"
     examples = ("oed predict --model model --log other.csv --out predicted.csv",)
 
     model: Path

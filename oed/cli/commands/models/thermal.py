@@ -24,6 +24,7 @@ class Thermal(Verb):
         log: a log, or a folder of logs. Repeatable. All logs share one clock; the robot rests between them.
     """
 
+    function = "estimation.identify_thermal"
     examples = ("oed thermal --robot er3a --log logs --order auto --out thermal",)
 
     robot: RobotOptions
