@@ -9,7 +9,8 @@ from pathlib import Path
 from typing import Any
 
 from estimation.models.model import Model
-from estimation.predictions.earlier_logs import warmed
+from estimation.predictions.earlier_logs import clock_shift, warmed
+from estimation.predictions.prediction import Prediction, predict
 from estimation.thermal import start_temperatures, thermal_from_dict
 from robots.common.errors import InputError
 from robots.signals import Log
@@ -67,3 +68,27 @@ def heat_of(path: Path, model: Model, log: Log, earlier: Sequence[Log], ambient:
             "thermal friction: the robot is assumed cold at the start; give earlier logs with --before if it was warm"
         )
     return Heat(options={"thermal": thermal, "start": start, "ambient": ambient}, assumed=assumed)
+
+
+def predict_warm(
+    path: Path, model: Model, log: Log, earlier: Sequence[Log], ambient: float | None, *, by: Model | None = None
+) -> tuple[Prediction, str, str]:
+    """Predicts the torques of a log with what is known of heat and of the time since the model was identified.
+
+    Args:
+        path: of the model.
+        model: as it was read.
+        log: whose torques are predicted.
+        earlier: logs of what the robot did before.
+        ambient: ambient temperature where logs do not state it [degC].
+        by: the same model with another smoothing, that predicts.
+
+    Returns:
+        The prediction, a sentence on the assumed initial state, and one on the clock; empty where there is none.
+
+    Raises:
+        InputError: see `heat_of` and `predict`.
+    """
+    later, clock = clock_shift(model, log)
+    heat = heat_of(path, model, log, earlier, ambient, later)
+    return predict(by or model, log, later=later, **heat.options), heat.assumed, clock

@@ -176,6 +176,16 @@ class Campaign:
         axes.legend(ncols=3)
         return axes
 
+    def choices(self) -> dict[str, Any]:
+        """Gives what the campaign was planned with, by the names of the choices."""
+        return {
+            **self.programme.to_dict(),
+            "ambient": self.ambient,
+            "cold_friction": self.cold_friction,
+            "torque_margin": self.torque_margin,
+            **self.settings,
+        }
+
     def to_dict(self, digests: Mapping[str, str] | None = None) -> dict[str, Any]:
         """Writes everything but the samples as plain data for `campaign.json`.
 

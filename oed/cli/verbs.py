@@ -56,6 +56,9 @@ class Verb:
     json: Annotated[bool, Option(section="Output")] = False
     quiet: Annotated[bool, Option(section="Output")] = False
     typed: frozenset[str] = field(default=frozenset(), repr=False)
+    """Fields whose values are typed."""
+    given: frozenset[str] = field(default=frozenset(), repr=False)
+    """Fields whose values are typed or from the configuration file."""
 
     @property
     def use(self) -> str:

@@ -10,3 +10,4 @@ from oed.exports.waypoints import shorter_way as shorter_way
 from oed.exports.writing import CONTROLLER_FORMS as CONTROLLER_FORMS
 from oed.exports.writing import FORMS as FORMS
 from oed.exports.writing import export_trajectory as export_trajectory
+from oed.exports.writing import write_form as write_form

@@ -26,6 +26,7 @@ class Option:
         several: with `reads`: whether the option may be given again.
         names_file: whether the text may name a file; its place is then relative to a configuration file that has it.
         switch: whether a flag that is off by default has a spelling that switches it off.
+        defaults: of a group: fields with another default here, and these.
         only: the uses of the verb to which the option belongs, see `oed.cli.verbs.Verb.use`; of all if it is empty.
     """
 
@@ -41,6 +42,7 @@ class Option:
     several: bool = False
     names_file: bool = False
     switch: bool = False
+    defaults: tuple[tuple[str, Any], ...] = ()
     only: tuple[str, ...] = ()
 
 
@@ -73,6 +75,23 @@ def point(option: str, text: str) -> tuple[float, ...]:
     values = numbers(option, text)
     if len(values) != 3:
         raise InputError(f"{option} {text}", allowed="three numbers x, y, z")
+    return values
+
+
+def box(option: str, text: str) -> tuple[float, ...]:
+    """Reads a box xmin,xmax,ymin,ymax,zmin,zmax.
+
+    Args:
+        option: for the message.
+        text: as typed.
+
+    Raises:
+        InputError: other than six numbers.
+    """
+    values = numbers(option, text)
+    if len(values) != 6:
+        allowed = "six numbers xmin,xmax,ymin,ymax,zmin,zmax, such as 0.1,0.6,-0.5,0.5,0.05,inf"
+        raise InputError(f"{option} {text}", allowed=allowed)
     return values
 
 

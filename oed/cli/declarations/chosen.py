@@ -6,7 +6,7 @@ from collections.abc import Collection, Iterator, Mapping
 from dataclasses import MISSING, fields, replace
 from typing import Any
 
-from oed.cli.declarations.declared import Declared, declared_options, group_of
+from oed.cli.declarations.declared import Declared, declared_options, group_of, is_option
 from oed.cli.verbs import Verb
 from robots.common.errors import InputError
 
@@ -38,6 +38,7 @@ def chosen(verb: type[Verb], context: Any) -> tuple[Verb, set[str]]:
                 both = " and ".join(f"--{options[name].name}" for name in (first, second))
                 raise InputError(f"{both} together", allowed="one of them")
             _leave_out({second if first in typed else first}, options, values, filed)
+    values["given"] = frozenset(typed | filed)
     made = _made(verb, None, values)
     unused = made.unused()
     wrong = [f"--{options[name].name}" for name in options if name in typed and name in unused]
@@ -45,6 +46,7 @@ def chosen(verb: type[Verb], context: Any) -> tuple[Verb, set[str]]:
         raise made.refusal(wrong)
     if filed.intersection(unused):
         _leave_out(filed.intersection(unused), options, values, filed)
+        values["given"] = frozenset(typed | filed)
         made = _made(verb, None, values)
     return made, filed
 
@@ -73,6 +75,6 @@ def _made(cls: type, instance: Any, values: Mapping[str, Any]) -> Any:
         if group is not None:
             inner = field.default if instance is None else getattr(instance, field.name)
             made[field.name] = _made(group, None if inner is MISSING else inner, values)
-        elif field.name in values:
+        elif field.name in values and (field.name in ("typed", "given") or is_option(cls, field)):
             made[field.name] = values[field.name]
     return cls(**made) if instance is None else replace(instance, **made)

@@ -19,6 +19,7 @@ KINDS = (bool, int, float, str, Path)
 SETTINGS, INPUT = "Settings", "Input"
 
 _ATTRIBUTES = re.compile(r"^(?:Attributes|Args):\n((?: {4}.*\n?|\n)*)", re.MULTILINE)
+_SHAPE = re.compile(r" \(\w+,\)")
 _ENTRY = re.compile(r"^(\w+): ((?:.|\n)*?)(?=^\w+: |\Z)", re.MULTILINE)
 
 
@@ -97,11 +98,8 @@ def declared_options(cls: type) -> dict[str, Declared]:
 
 def group_of(cls: type, field: Field[Any]) -> type | None:
     """Gives the options class of a field that holds a group of options; None for any other field."""
-    hint = _hint(cls, field)
-    if any(isinstance(part, Option) and part.hidden for part in getattr(hint, "__metadata__", ())):
-        return None
-    hint = get_args(hint)[0] if get_origin(hint) is Annotated else hint
-    return hint if isinstance(hint, type) and is_dataclass(hint) else None
+    hint, how = _split(cls, field)
+    return hint if isinstance(hint, type) and is_dataclass(hint) and not how.hidden else None
 
 
 @cache
@@ -117,22 +115,33 @@ def _declared_options(cls: type) -> dict[str, Declared]:
     return found
 
 
+def is_option(cls: type, field: Field[Any]) -> bool:
+    """Whether a field is one option.
+
+    Args:
+        cls: of the field.
+        field: of a dataclass.
+    """
+    hint, how = _split(cls, field)
+    return not how.hidden and _kind(hint, how) is not None
+
+
 def _declared(cls: type, instance: Any, outer: Option) -> Iterator[Declared]:
     texts = _texts(cls)
     for field in fields(cls):
-        hint = _hint(cls, field)
-        how = next((part for part in getattr(hint, "__metadata__", ()) if isinstance(part, Option)), Option())
+        hint, how = _split(cls, field)
         how = replace(how, only=how.only or outer.only, section=how.section or outer.section)
         default = field.default if instance is None else getattr(instance, field.name)
+        default = dict(outer.defaults).get(field.name, default)
         group = group_of(cls, field)
         if group is not None:
             yield from _declared(group, None if default is MISSING else default, how)
             continue
-        read = None if how.hidden else _kind(get_args(hint)[0] if get_origin(hint) is Annotated else hint, how, default)
+        read = None if how.hidden else _kind(hint, how)
         if read is None:
             continue
         kind, several, optional = read
-        if default is MISSING and field.default_factory is not MISSING:
+        if default is MISSING and callable(field.default_factory):
             default = field.default_factory()
         section = how.section or getattr(cls, "section", None) or (INPUT if kind is Path else SETTINGS)
         yield Declared(
@@ -147,6 +156,13 @@ def _declared(cls: type, instance: Any, outer: Option) -> Iterator[Declared]:
         )
 
 
+def _split(cls: type, field: Field[Any]) -> tuple[Any, Option]:
+    """The type of a field, and what is said behind it."""
+    hint = _hint(cls, field)
+    how = next((part for part in getattr(hint, "__metadata__", ()) if isinstance(part, Option)), Option())
+    return (get_args(hint)[0] if get_origin(hint) is Annotated else hint), how
+
+
 def _hint(cls: type, field: Field[Any]) -> Any:
     """The type of a field; None for one that only type checkers know."""
     if not isinstance(field.type, str):
@@ -158,7 +174,7 @@ def _hint(cls: type, field: Field[Any]) -> Any:
         return None
 
 
-def _kind(hint: Any, how: Option, default: Any) -> tuple[type, bool, bool] | None:
+def _kind(hint: Any, how: Option) -> tuple[type, bool, bool] | None:
     """What is typed: its kind, whether several, whether it may be left out; None for a field that is no option."""
     parts = get_args(hint) if get_origin(hint) in (Union, UnionType) else (hint,)
     optional = NoneType in parts
@@ -188,7 +204,7 @@ def _texts(cls: type) -> dict[str, str]:
     for base in reversed(cls.__mro__):
         block = _ATTRIBUTES.search(cleandoc(vars(base).get("__doc__") or ""))
         for name, text in _ENTRY.findall(dedent(block[1]) if block else ""):
-            words = " ".join(text.split())
+            words = _SHAPE.sub("", " ".join(text.split()))
             # A name that is typed keeps its small letter.
             words = words if words.startswith("``") else words[:1].upper() + words[1:]
             found[name] = words.replace("``", "")

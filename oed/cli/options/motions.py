@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, ClassVar
+from typing import TYPE_CHECKING, Annotated, ClassVar
 
-from robots.common.errors import InputError
-from robots.common.options import numbers
+from robots.common.options import Option, box
 
 if TYPE_CHECKING:
     from oed.constraints.geometric import GeometricLimit
@@ -30,28 +30,18 @@ class Obstacles:
 
     floor: float | None = None
     no_floor: bool = False
-    keep_out: tuple[str, ...] = ()
+    keep_out: Annotated[tuple[tuple[float, ...], ...], Option(reads=box, several=True)] = ()
 
     def surroundings(self) -> Surroundings:
         """Makes the floor and the boxes.
 
         Raises:
-            InputError: other than six finite numbers, or an empty box.
+            InputError: numbers that are not finite, or an empty box.
         """
-        import numpy as np
+        from robots.collision import Surroundings
 
-        from robots.collision import Box, Surroundings
-
-        boxes = []
-        for number, text in enumerate(self.keep_out, start=1):
-            low, high = map(np.array, corners("--keep-out", text))
-            if not (np.isfinite(low) & np.isfinite(high) & (low < high)).all():
-                raise InputError(f"--keep-out {text}", allowed="finite numbers, each minimum below its maximum")
-            pose = np.eye(4)
-            pose[:3, 3] = (low + high) / 2.0
-            boxes.append(Box(name=f"keep-out {number}", size=high - low, pose=pose))
         floor = False if self.no_floor else True if self.floor is None else self.floor
-        return Surroundings(floor=floor, keep_out=tuple(boxes))
+        return Surroundings.between(floor, self.keep_out)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -64,23 +54,6 @@ class Collisions(Obstacles):
     """
 
     collision: bool = True
-
-
-def corners(option: str, text: str) -> tuple[tuple[float, ...], tuple[float, ...]]:
-    """Reads the lowest and the highest corner of a box.
-
-    Args:
-        option: for the message.
-        text: as typed.
-
-    Raises:
-        InputError: other than six numbers.
-    """
-    sides = numbers(option, text)
-    if len(sides) != 6:
-        allowed = "six numbers xmin,xmax,ymin,ymax,zmin,zmax, such as 0.1,0.6,-0.5,0.5,0.05,inf"
-        raise InputError(f"{option} {text}", allowed=allowed)
-    return sides[::2], sides[1::2]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -108,23 +81,23 @@ class Excitation:
         return family(self.family, harmonics=self.harmonics, base_frequency=self.base_frequency)
 
 
-def tool_limits(tool_box: str | None, singularity: float | None) -> tuple[GeometricLimit, ...]:
+def tool_limits(tool_box: Sequence[float] | None, singularity: float | None) -> tuple[GeometricLimit, ...]:
     """Makes limits of the flange.
 
     Args:
-        tool_box: six numbers, from and to in x, y and z [m]; None for no box.
+        tool_box: from and to in x, y and z [m]; None for no box.
         singularity: lower bound of the smallest singular value of the Jacobian; None for no such limit.
 
     Raises:
-        InputError: other than six numbers, an empty box, or a value that is not positive.
+        InputError: an empty box, or a value that is not positive.
     """
     from oed.constraints.singularity import SingularityLimit
     from oed.constraints.tool import ToolBox
 
     limits: list[GeometricLimit] = []
     if tool_box is not None:
-        low, high = corners("--tool-box", tool_box)
-        limits.append(ToolBox(lower=(low[0], low[1], low[2]), upper=(high[0], high[1], high[2])))
+        x, x2, y, y2, z, z2 = tool_box
+        limits.append(ToolBox(lower=(x, y, z), upper=(x2, y2, z2)))
     if singularity is not None:
         limits.append(SingularityLimit(smallest=singularity))
     return tuple(limits)

@@ -61,25 +61,9 @@ class PoseSet:
         Raises:
             InputError: another name, or a number that is none.
         """
-        from robots.geometry_errors import BodyPoses, Distances, Inclinometer, Markers
+        from robots.geometry_errors import measurement_of
 
-        text = self.measurement
-        name, _, number = text.partition(":")
-        if number and not (number.isdigit() and int(number) > 0):
-            allowed = "a number of markers or anchors of 1 or more, as markers:3"
-            raise InputError(f"--measurement {text}", allowed=allowed)
-        count = int(number or 1)
-        if name == "markers":
-            return Markers(count=count)
-        if name == "distances":
-            return Distances(count=count)
-        if name == "poses" and not number:
-            return BodyPoses()
-        if name == "inclinometer" and not number:
-            return Inclinometer()
-        raise InputError(
-            f"--measurement {text}", allowed="markers, markers:N, poses, distances, distances:N or inclinometer"
-        )
+        return measurement_of("--measurement", self.measurement)
 
     def noise_levels(self, noise: Sequence[float] | None) -> dict[str, float]:
         """Gives the noise of the measurement's units.

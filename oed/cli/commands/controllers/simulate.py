@@ -20,7 +20,6 @@ from robots.common.options import Option, Seed
 from robots.common.progress import Progress
 
 if TYPE_CHECKING:
-    from robots.plants import Plant
     from robots.robot import Robot
 
 OfTrajectory = Option(only=("trajectory",))
@@ -95,6 +94,8 @@ class Simulate(Verb):
 
     def _trajectory(self, file: Path, progress: Progress) -> Printed:
         from estimation import write_log
+        from estimation.payloads.body import read_body
+        from estimation.predictions.virtual_robot import chosen_plant
         from oed.exports import read_trajectory
         from robots.plants import simulate
 
@@ -102,7 +103,11 @@ class Simulate(Verb):
         motion, metadata = read_trajectory(file, n=given.n if given else None)
         progress.start("simulating", None)
         named = str(metadata.get("robot") or "")
-        plant, robot = self._plant(given or (self.robot.load(named) if named else None))
+        if given is None and not named and self.model is None:
+            raise InputError("the file does not name its robot", file=file, remedy="give --robot")
+        stated = given or (self.robot.load(named) if named else None)
+        body = None if self.payload is None else read_body(self.payload).parameters
+        plant, robot = chosen_plant(stated, plant=self.plant, model=self.model, body=body)
         log = simulate(plant, motion, seed=self.seed)
         target = self.out or Path("log.csv")
         write_log(target, log, force=self.overwriting.force, kinds=robot.chain.kinds)
@@ -111,32 +116,6 @@ class Simulate(Verb):
 
     def _given(self) -> Robot | None:
         return self.robot.load() if self.robot.robot else None
-
-    def _plant(self, robot: Robot | None) -> tuple[Plant, Robot]:
-        """The virtual robot, with its payload.
-
-        Raises:
-            InputError: no robot, or see `load_plant` and `virtual_robot`.
-        """
-        import numpy as np
-
-        from estimation import load_model
-        from estimation.payloads.body import read_body
-        from estimation.predictions.virtual_robot import virtual_robot
-        from robots.plants import load_plant, nominal_plant
-        from robots.terms.situations.flange_body import with_body
-
-        if self.model is not None:
-            obeyed = load_model(self.model)
-            plant, robot = virtual_robot(obeyed, robot), robot or obeyed.robot
-        elif robot is not None:
-            plant = load_plant(self.plant, robot) if self.plant else nominal_plant(robot)
-        else:
-            raise InputError("the file does not name its robot", file=self.trajectory, remedy="give --robot")
-        if self.payload is not None:
-            body = read_body(self.payload).parameters
-            plant = replace(plant, parameters=with_body(plant.model, np.asarray(plant.parameters), body))
-        return plant, robot
 
 
 def _printed(size: str, robot: Robot, target: Path, data: dict[str, Any]) -> Printed:

@@ -71,12 +71,11 @@ class Force(Verb):
 
     def run(self, progress: Progress) -> Printed:
         """Estimates the forces."""
-        from estimation import load_model, predict
+        from estimation import load_model
         from estimation.external_forces import estimate_forces
         from estimation.external_forces.online.c_export import observer_code
         from estimation.external_forces.thresholds.calibrations import read_calibration
-        from estimation.predictions.earlier_logs import clock_shift
-        from estimation.predictions.heat import heat_of
+        from estimation.predictions.heat import predict_warm
         from oed.reports import save_force_report
         from oed.reports.rendering.provenance import recordings_from
         from robots.common.files import open_atomic
@@ -94,11 +93,10 @@ class Force(Verb):
 
             def predicted(sharp: Model, own: Log) -> Prediction:
                 nonlocal assumed
-                later, clock = clock_shift(identified, own)
-                heat = heat_of(self.model, identified, own, earlier, self.warmth.ambient, later)
+                found, *words = predict_warm(self.model, identified, own, earlier, self.warmth.ambient, by=sharp)
                 if own is recorded:
-                    assumed = "\n".join(words for words in (heat.assumed, clock) if words)
-                return predict(sharp, own, later=later, **heat.options)
+                    assumed = "\n".join(word for word in words if word)
+                return found
 
             result = estimate_forces(
                 identified,

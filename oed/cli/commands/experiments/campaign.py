@@ -10,7 +10,7 @@ import os
 from collections.abc import Collection
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 from oed.campaigns.programme import Programme
 from oed.cli.declarations.declared import declared_options
@@ -148,14 +148,7 @@ class Campaign(Verb):
         from oed.campaigns import Campaign as Planned
 
         planned = Planned.load(self.output.out, robot)
-        stored: dict[str, Any] = {
-            **planned.programme.to_dict(),
-            "ambient": planned.ambient,
-            "cold_friction": planned.cold_friction,
-            "torque_margin": planned.torque_margin,
-            **planned.settings,
-            "no_floor": planned.settings.get("floor"),
-        }
+        stored = {**planned.choices(), "no_floor": planned.settings.get("floor")}
         around = self.collisions.surroundings().settings()
         own = ("ambient", "cold_friction", "torque_margin", "velocity_fraction", "seed")
         given = {

@@ -11,22 +11,21 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 
 from oed.cli.options.models import model_for
-from oed.cli.options.motions import Collisions, Excitation, tool_limits
+from oed.cli.options.motions import Excitation, Obstacles, tool_limits
 from oed.cli.options.poses import PoseSet
 from oed.cli.options.results import Folder
 from oed.cli.options.robots import Drives, PlannedRobot
 from oed.cli.options.work import Processes
 from oed.cli.verbs import Printed, Verb
+from oed.experiments.options import LimitOptions, ModelOptions, SearchOptions, TrajectoryOptions, WeightOptions
 from robots.common.errors import InputError
-from robots.common.options import Option, Seed, numbers
+from robots.common.options import Option, box
 from robots.common.progress import Progress
 
 if TYPE_CHECKING:
     from concurrent.futures import Executor
 
-TRAJECTORY, DYNAMICS = ("dynamics", "payload"), ("dynamics",)
-MOTION = (*TRAJECTORY, "discriminate")
-ARM = (*MOTION, "calibration")
+TRAJECTORY = ("dynamics", "payload")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -34,7 +33,6 @@ class Design(Verb):
     """``oed design``.
 
     Attributes:
-        home: pose at start and end [rad or m], comma-separated.
         for_: what the experiment is for: dynamics (a trajectory), calibration (poses), or actuators (commands for
             drives without torque).
         gains: a YAML file with the control law and its gains. Default: the MJCF's actuators.
@@ -42,34 +40,14 @@ class Design(Verb):
         criterion: design criterion: cond (condition number), d (log determinant), a (trace of the inverse), e (smallest
             singular value), i (prediction variance, needs --task), or cond-d (cond and d). Calibration: also an
             observability index, o1 to o5. Default: cond; d for a calibration or a payload.
-        friction: friction model: polynomial (four coefficients a joint) or coulomb-viscous (two).
-        offset: include a constant torque offset per joint in the model.
-        periods: repetitions of the optimised part.
-        strokes: add one velocity stroke per joint: to the velocity limit, forwards and backwards. Default: yes, but for
-            a payload.
-        velocity_fraction: fraction of the velocity limits to use. Default: 1 for robots of the catalogue, 0.5 for
-            others, whose first motion should be slower.
-        torque: respect the torque limits, computed with the robot's nominal dynamics, if its description has both.
-        torque_margin: fraction of the torque limits to keep as reserve.
         payload: payload on the flange: a payload.json, or KG,X,Y,Z: mass [kg] and centre of mass in the flange frame
             [m]. The torque limits count it.
-        clearance: minimum clearance of bodies and obstacles [m].
         tool_box: box for the flange in the base frame: xmin,xmax,ymin,ymax,zmin,zmax [m]; inf means no bound.
         singularity: lower bound for the smallest singular value of the flange's scaled Jacobian.
-        essential: leave out parameters that contribute less than this fraction of each joint's torque.
-        scaling: column scaling of the regressor in the criterion: none, nominal or unit.
-        noise: standard deviation of the torque noise of each joint [N m or N], comma-separated. Calibration: of the
-            measurement [m], of poses also [rad].
         after: an identified model.json. The design adds information to it; its extensions count in the torque limits.
         task: a trajectory.csv whose torques the identified model shall predict (criterion i).
-        payload_only: design the motion that determines a payload: the arm counts as known, the default criterion is d,
-            and there are no strokes.
         discriminate: design an experiment that distinguishes two effects, such as
             stribeck:2,load_dependent_friction:2 (effect:joint).
-        effort: search effort: quick, standard or thorough. It counts local solutions: the same seed gives the same
-            design on a slow machine.
-        time_limit: stop the search after this time [s] and keep the best design.
-        seed: seed of the random numbers.
     """
 
     function = "oed.design"
@@ -80,37 +58,34 @@ class Design(Verb):
     )
     introduces = True
     uses: ClassVar = {"calibration": "with --for calibration", "actuators": "with --for actuators"}
+    shared: ClassVar = {
+        "dynamics": set(),
+        "payload": set(),
+        "discriminate": {"friction", "home", "velocity_fraction", "collision", "noise", "seed"},
+        "calibration": {"home", "velocity_fraction", "collision", "clearance", "noise", "seed"},
+        "actuators": {"home", "seed"},
+    }
+    """Fields of a trajectory's design that other uses have, too."""
 
     robot: PlannedRobot
-    home: Annotated[tuple[float, ...] | None, Option(reads=numbers, section="Robot")] = None
     for_: str = "dynamics"
     gains: Annotated[Path | None, Option(only=("actuators",))] = None
     duration: Annotated[float, Option(only=("actuators",))] = 20.0
     criterion: Annotated[str | None, Option(only=(*TRAJECTORY, "calibration"))] = None
-    friction: Annotated[str, Option(only=MOTION)] = "polynomial"
-    offset: Annotated[bool, Option(only=DYNAMICS)] = False
+    model: Annotated[ModelOptions, Option(only=TRAJECTORY)] = ModelOptions()
     excitation: Annotated[Excitation, Option(only=TRAJECTORY)] = Excitation()
-    periods: Annotated[int, Option(only=TRAJECTORY)] = 3
-    strokes: Annotated[bool | None, Option(only=TRAJECTORY)] = None
-    velocity_fraction: Annotated[float | None, Option(only=ARM)] = None
-    torque: Annotated[bool, Option(only=TRAJECTORY)] = True
-    torque_margin: Annotated[float, Option(only=TRAJECTORY)] = 0.1
+    trajectory: Annotated[TrajectoryOptions, Option(only=TRAJECTORY)]
+    limits: Annotated[LimitOptions, Option(only=TRAJECTORY)]
     payload: Annotated[str | None, Option(only=TRAJECTORY, section="Input", names_file=True)] = None
-    collisions: Annotated[Collisions, Option(only=ARM)] = Collisions()
-    clearance: Annotated[float, Option(only=(*TRAJECTORY, "calibration"))] = 0.01
-    tool_box: Annotated[str | None, Option(only=TRAJECTORY)] = None
+    obstacles: Annotated[Obstacles, Option(only=(*TRAJECTORY, "discriminate", "calibration"))] = Obstacles()
+    tool_box: Annotated[tuple[float, ...] | None, Option(reads=box, only=TRAJECTORY)] = None
     singularity: Annotated[float | None, Option(only=TRAJECTORY)] = None
-    essential: Annotated[float, Option(only=DYNAMICS)] = 0.0
-    scaling: Annotated[str, Option(only=TRAJECTORY)] = "none"
-    noise: Annotated[tuple[float, ...] | None, Option(reads=numbers, only=ARM)] = None
-    after: Annotated[Path | None, Option(only=DYNAMICS)] = None
-    task: Annotated[Path | None, Option(only=DYNAMICS)] = None
-    payload_only: Annotated[bool, Option(only=TRAJECTORY)] = False
+    weights: Annotated[WeightOptions, Option(only=TRAJECTORY)] = WeightOptions()
+    after: Annotated[Path | None, Option(only=("dynamics",))] = None
+    task: Annotated[Path | None, Option(only=("dynamics",))] = None
     discriminate: Annotated[str | None, Option(only=("dynamics", "discriminate"))] = None
     poses: Annotated[PoseSet, Option(only=("calibration",))] = PoseSet()
-    effort: Annotated[str, Option(only=TRAJECTORY)] = "standard"
-    time_limit: Annotated[float | None, Option(only=TRAJECTORY)] = None
-    seed: Seed = 0
+    search: Annotated[SearchOptions, Option(only=TRAJECTORY)]
     work: Annotated[Processes, Option(only=TRAJECTORY)] = Processes()
     output: Folder = Folder()
 
@@ -121,13 +96,17 @@ class Design(Verb):
             raise InputError(f"--for {self.for_}", allowed="dynamics, calibration, actuators")
         if self.for_ != "dynamics":
             return self.for_
-        return "payload" if self.payload_only else "discriminate" if self.discriminate is not None else "dynamics"
+        return "payload" if self.model.payload_only else "discriminate" if self.discriminate is not None else "dynamics"
 
     def unused(self) -> Collection[str]:
         """Names what does not apply; to a payload, the criterion and strokes that a file gives for the arm."""
+        foreign = {*super().unused()} - self.shared[self.use]
+        if self.use == "payload":
+            foreign |= {"offset", "essential"}
+        if self.use == "actuators":
+            foreign |= {"tip", "unlimited", "assume_masses"}
         arm = {"criterion", "strokes"} if "payload_only" in self.typed else set()
-        foreign = {"tip", "unlimited", "assume_masses"} if self.use == "actuators" else set()
-        return {*super().unused(), *foreign, *(arm - self.typed)}
+        return foreign | (arm - self.typed)
 
     def reason(self, names: Collection[str]) -> tuple[str, str]:
         """Names the use."""
@@ -172,47 +151,29 @@ class Design(Verb):
     def _trajectory(self, executor: Executor | None, progress: Progress) -> Any:
         """Designs an excitation trajectory."""
         from estimation.payloads.body import read_body
-        from oed import LimitOptions, ModelOptions, SearchOptions, TrajectoryOptions, WeightOptions, design
+        from oed import design
         from oed.campaigns.loops.priors import prior_from
         from oed.exports import read_trajectory
 
-        robot, alone = self.robot.load(), self.payload_only
+        robot, alone = self.robot.load(), self.model.payload_only
         prior, effects = (None, ()) if self.after is None else prior_from(model_for(self.after, robot.n))
-        strokes = not alone if self.strokes is None else self.strokes
+        strokes = self.trajectory.strokes and not (alone and "strokes" not in self.given)
         return design(
             robot,
             criterion=self.criterion or ("d" if alone else "cond"),
-            model=ModelOptions(
-                friction=self.friction, offset=self.offset, essential=self.essential, payload_only=alone
-            ),
-            trajectory=TrajectoryOptions(
-                family=self.excitation.chosen(), periods=self.periods, strokes=strokes, home=self.home
-            ),
-            limits=LimitOptions(
-                velocity_fraction=self.velocity_fraction,
-                torque=self.torque,
-                torque_margin=self.torque_margin,
-                collision=self.collisions.collision,
-                clearance=self.clearance,
-                surroundings=self.collisions.surroundings(),
+            model=self.model,
+            trajectory=replace(self.trajectory, family=self.excitation.chosen(), strokes=strokes),
+            limits=replace(
+                self.limits,
+                surroundings=self.obstacles.surroundings(),
                 space=tool_limits(self.tool_box, self.singularity),
                 effects=effects,
                 payload=None if self.payload is None else read_body(self.payload).parameters,
             ),
-            weights=WeightOptions(
-                scaling=self.scaling,
-                noise=self.noise,
-                after=prior,
-                task=read_trajectory(self.task, n=robot.n)[0] if self.task else None,
+            weights=replace(
+                self.weights, after=prior, task=read_trajectory(self.task, n=robot.n)[0] if self.task else None
             ),
-            search=SearchOptions(
-                effort=self.effort,
-                seed=self.seed,
-                time_limit=float("inf") if self.time_limit is None else self.time_limit,
-                keep_on_interrupt=True,
-                workers=self.work.workers,
-                executor=executor,
-            ),
+            search=replace(self.search, keep_on_interrupt=True, workers=self.work.workers, executor=executor),
             progress=progress,
         )
 
@@ -220,17 +181,18 @@ class Design(Verb):
         """Designs poses to measure."""
         from oed import PoseOptions, design_poses
 
+        noise: Any = self.weights.noise
         options = PoseOptions(
             measurement=self.poses.instrument(),
             kinds=self.poses.kinds,
-            noise=self.poses.noise_levels(self.noise),
+            noise=self.poses.noise_levels(noise),
             view=self.poses.view(),
-            collision=self.collisions.collision,
-            clearance=self.clearance,
-            surroundings=self.collisions.surroundings(),
-            velocity_fraction=self.velocity_fraction,
-            home=self.home,
-            seed=self.seed,
+            collision=self.limits.collision,
+            clearance=self.limits.clearance,
+            surroundings=self.obstacles.surroundings(),
+            velocity_fraction=self.limits.velocity_fraction,
+            home=self.trajectory.home,
+            seed=self.search.seed,
         )
         count, criterion = self.poses.poses, self.criterion or "d"
         return design_poses(self.robot.load(), count=count, criterion=criterion, options=options, progress=progress)
@@ -240,9 +202,10 @@ class Design(Verb):
         from oed.experiments.drives import DriveDesignOptions, design_drive_motion
 
         named = self.robot.chain
+        home: Any = self.trajectory.home
         drives = Drives(robot=self.robot.robot, gains=self.gains, joints=named.joints, lock=named.lock)
         chains, known = drives.load()
-        options = DriveDesignOptions(duration=self.duration, seed=self.seed, home=self.home)
+        options = DriveDesignOptions(duration=self.duration, seed=self.search.seed, home=home)
         return design_drive_motion(chains, known.drives, options=options, progress=progress)
 
     def _rivals(self, executor: Executor | None, progress: Progress) -> Any:
@@ -252,12 +215,12 @@ class Design(Verb):
         return discriminate(
             self.robot.load(),
             self.discriminate or "",
-            noise=self.noise,
-            friction=self.friction,
-            home=self.home,
-            velocity_fraction=self.velocity_fraction,
-            collision=self.collisions.collision,
-            surroundings=self.collisions.surroundings(),
-            seed=self.seed,
+            noise=self.weights.noise,
+            friction=str(self.model.friction),
+            home=self.trajectory.home,
+            velocity_fraction=self.limits.velocity_fraction,
+            collision=self.limits.collision,
+            surroundings=self.obstacles.surroundings(),
+            seed=self.search.seed,
             progress=progress,
         )

@@ -6,7 +6,7 @@ import warnings
 from collections.abc import Collection
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 from oed.cli.options.results import Overwriting
 from oed.cli.options.robots import FileRobot
@@ -70,15 +70,7 @@ class Export(Verb):
 
     def run(self, progress: Progress) -> Printed:
         """Writes the file."""
-        from oed.exports import (
-            CONTROLLER_FORMS,
-            FORMS,
-            check_trajectory,
-            export_trajectory,
-            read_trajectory,
-            write_trajectory,
-        )
-        from oed.exports.forms.sampling import at_period
+        from oed.exports import CONTROLLER_FORMS, FORMS, read_trajectory, write_form
         from oed.exports.trajectory_checks import stated_collisions
 
         output, file = self.output, self.trajectory
@@ -93,34 +85,9 @@ class Export(Verb):
         # Only the trajectory file itself can be written without knowing whose joints move.
         unknown = output.to == "csv" and not self.robot.robot and not metadata.get("robot")
         described = None if unknown else self.robot.load_for(metadata, file)
-        if described is None or output.to == "csv":
-            if described is None:
-                text = f"{file} names no robot: the limits were not checked; state the robot with --robot"
-                warnings.warn(text, AssumedValueWarning, stacklevel=1)
-                kinds = metadata.get("kinds")
-            else:
-                check_trajectory(motion, described, metadata, file)
-                kinds = described.chain.kinds
-            if output.degrees and kinds is None:
-                text = f"{file} states no units: all joints are taken as revolute; --robot states which axes are linear"
-                warnings.warn(text, AssumedValueWarning, stacklevel=1)
-            if self.period is not None:
-                motion = at_period(motion, self.period)
-                metadata.pop("period", None)
-            how = {"degrees": output.degrees, "positions_only": output.positions_only, "bare": output.bare}
-            write_trajectory(target, motion, metadata, kinds=kinds, **how, force=output.force)
-        else:
-            motion = export_trajectory(
-                target,
-                motion,
-                described,
-                output.to,
-                period=self.period,
-                options=self.options,
-                metadata=metadata,
-                file=file,
-                force=output.force,
-            )
+        table = {"degrees": output.degrees, "positions_only": output.positions_only, "bare": output.bare}
+        settings: dict[str, Any] = {"metadata": metadata, "file": file, "force": output.force, "table": table}
+        motion = write_form(target, motion, described, output.to, period=self.period, options=self.options, **settings)
         has_samples = output.to == "csv" or CONTROLLER_FORMS[output.to].has_samples
         data = {
             "file": str(target),

@@ -51,9 +51,7 @@ class Predict(Verb):
     def run(self, progress: Progress) -> Printed:
         """Predicts the torques."""
         from estimation import load_model
-        from estimation import predict as run
-        from estimation.predictions.earlier_logs import clock_shift
-        from estimation.predictions.heat import heat_of
+        from estimation.predictions.heat import predict_warm
         from oed.reports import prediction_page, render
         from oed.reports.rendering.provenance import recordings_from
         from robots.common.files import open_atomic
@@ -66,23 +64,21 @@ class Predict(Verb):
             robot = identified.robot
             _, (recorded,) = self.known.read_known([self.log], robot, torque=False)
             progress.start("predicting", None)
-            later, clock = clock_shift(identified, recorded)
             earlier = self.known.read(self.warmth.before, robot)
-            heat = heat_of(self.model, identified, recorded, earlier, self.warmth.ambient, later)
-            result = run(identified, recorded, later=later, **heat.options)
+            result, heat, clock = predict_warm(self.model, identified, recorded, earlier, self.warmth.ambient)
             result.save(output.out, force=output.force)
             if page_file is not None:
                 logs = recordings_from([recorded])
                 page = prediction_page(result, robot.title or robot.name, robot.chain.kinds, logs)
                 page_file.write(render(page).encode())
         found = [result.gate.summary()] if result.gate is not None and result.gate.findings else []
-        assumed = [words for words in (heat.assumed, clock) if words]
+        assumed = [words for words in (heat, clock) if words]
         return Printed(
             summary="\n".join([*found, result.summary(), *assumed, f"written to {output.out}"]),
             data={
                 "file": str(output.out),
                 **result.to_dict(),
-                "heat": heat.assumed or None,
+                "heat": heat or None,
                 "clock": clock or None,
             },
         )

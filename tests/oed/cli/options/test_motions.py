@@ -10,13 +10,14 @@ import pytest
 from oed.cli.options.motions import tool_limits
 from oed.exports import read_trajectory
 from robots.common.errors import InputError
+from robots.common.options import box
 from robots.loading import load_robot
 
 
 def test_options_state_a_box_and_a_distance() -> None:
     """The six numbers are from and to in x, y and z; the singular value is kept as stated."""
-    box, distance = tool_limits("0.1,0.6,-0.5,0.5,0.05,inf", 0.03)
-    assert (box.lower, box.upper) == ((0.1, -0.5, 0.05), (0.6, 0.5, np.inf))
+    space, distance = tool_limits(box("--tool-box", "0.1,0.6,-0.5,0.5,0.05,inf"), 0.03)
+    assert (space.lower, space.upper) == ((0.1, -0.5, 0.05), (0.6, 0.5, np.inf))
     assert distance.smallest == 0.03
     assert tool_limits(None, None) == ()
 
@@ -27,7 +28,7 @@ def test_options_state_a_box_and_a_distance() -> None:
 def test_nonsense_is_refused(tool_box: str | None, singularity: float | None) -> None:
     """Other than six numbers, a box without inside, and a distance of zero are refused."""
     with pytest.raises(InputError):
-        tool_limits(tool_box, singularity)
+        tool_limits(None if tool_box is None else box("--tool-box", tool_box), singularity)
 
 
 @pytest.mark.slow
