@@ -10,12 +10,12 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from estimation.external_forces.options import ForceOptions
 from oed.cli.options.heat import Warmth
 from oed.cli.options.logs import KnownLogs
 from oed.cli.options.results import Folder
 from oed.cli.verbs import Printed, Verb
 from robots.common.errors import InputError
-from robots.common.options import Point
 from robots.common.progress import Progress
 
 if TYPE_CHECKING:
@@ -44,10 +44,6 @@ class Force(Verb):
         log: a log with positions and torques.
         healthy: a log without contacts, from which the threshold follows. Repeatable. Default: the log itself.
         calibration: a forces.json of an earlier run, whose threshold is used instead of --healthy.
-        false_alarms_per_hour: rate of false alarms of a robot without contact.
-        bandwidth: bandwidth of the observer [Hz].
-        tool: tool point in the flange frame, as X,Y,Z [m]. Default: the flange.
-        velocity: velocities: smoothed (from positions) or logged (columns dq1..).
     """
 
     function = "estimation.estimate_forces"
@@ -63,10 +59,7 @@ class Force(Verb):
     calibration: Path | None = None
     known: KnownLogs = KnownLogs()
     warmth: Warmth = Warmth()
-    false_alarms_per_hour: float = 1.0
-    bandwidth: float = 4.0
-    tool: Point = None
-    velocity: str = "smoothed"
+    options: ForceOptions = ForceOptions()
     output: Output = Output(out=Path("forces"))
 
     def run(self, progress: Progress) -> Printed:
@@ -81,7 +74,7 @@ class Force(Verb):
         from robots.common.files import open_atomic
 
         output = self.output
-        if output.c_code is not None and self.calibration is None and self.velocity != "logged":
+        if output.c_code is not None and self.calibration is None and self.options.velocity != "logged":
             raise InputError("--c-code without --velocity logged", remedy="a controller has no smoothed velocities")
         with ExitStack() as files:
             folder = files.enter_context(output.opened("forces.csv", "forces.json", "report.html"))
@@ -103,10 +96,7 @@ class Force(Verb):
                 recorded,
                 healthy=normal,
                 calibration=None if self.calibration is None else read_calibration(self.calibration, robot.n),
-                false_alarms=self.false_alarms_per_hour,
-                bandwidth=self.bandwidth,
-                tool=self.tool,
-                velocity=self.velocity,  # type: ignore[arg-type]
+                options=self.options,
                 predictor=predicted,
                 progress=progress,
             )
@@ -115,6 +105,8 @@ class Force(Verb):
             save_force_report(result, folder, kinds=robot.chain.kinds, logs=logs, png=output.png)
             if code is not None:
                 gravity, payload = recorded.gravity, recorded.payload
-                text = observer_code(identified, result.calibration, tool=self.tool, gravity=gravity, payload=payload)
+                text = observer_code(
+                    identified, result.calibration, tool=self.options.tool, gravity=gravity, payload=payload
+                )
                 code.write(text.encode())
         return output.printed(result, *([assumed] if assumed else []), heat=assumed or None)
