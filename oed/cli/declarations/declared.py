@@ -31,7 +31,6 @@ class Declared:
         field: the name in Python, such as ``torque_is``.
         kind: of what is typed: bool, int, float, str or Path.
         several: whether it may be given again.
-        optional: whether it may be left out without a default of its own, as a flag that is neither on nor off.
         default: of the typed value; MISSING if the option is required.
         help: one or more sentences.
         section: of the help.
@@ -41,7 +40,6 @@ class Declared:
     field: str
     kind: type
     several: bool
-    optional: bool
     default: Any
     help: str
     section: str
@@ -140,7 +138,7 @@ def _declared(cls: type, instance: Any, outer: Option) -> Iterator[Declared]:
         read = None if how.hidden else _kind(hint, how)
         if read is None:
             continue
-        kind, several, optional = read
+        kind, several = read
         if default is MISSING and callable(field.default_factory):
             default = field.default_factory()
         section = how.section or getattr(cls, "section", None) or (INPUT if kind is Path else SETTINGS)
@@ -148,7 +146,6 @@ def _declared(cls: type, instance: Any, outer: Option) -> Iterator[Declared]:
             field=field.name,
             kind=kind,
             several=several,
-            optional=optional,
             default=default if default is MISSING or not how.reads else how.typed or _text(default, several),
             help=texts.get(field.name, ""),
             section="Arguments" if how.argument else section,
@@ -174,19 +171,18 @@ def _hint(cls: type, field: Field[Any]) -> Any:
         return None
 
 
-def _kind(hint: Any, how: Option) -> tuple[type, bool, bool] | None:
-    """What is typed: its kind, whether several, whether it may be left out; None for a field that is no option."""
-    parts = get_args(hint) if get_origin(hint) in (Union, UnionType) else (hint,)
-    optional = NoneType in parts
-    inner = next((part for part in parts if part is not NoneType), None)
+def _kind(hint: Any, how: Option) -> tuple[type, bool] | None:
+    """What is typed: its kind, and whether several; None for a field that is no option."""
     if how.reads is not None:
-        several = how.several
-        return str, several, optional
-    if get_origin(inner) is tuple and get_args(inner)[1:] == (...,):
-        return (get_args(inner)[0], True, True) if get_args(inner)[0] in KINDS else None
-    if get_origin(inner) is Literal:
+        return str, how.several
+    parts = get_args(hint) if get_origin(hint) in (Union, UnionType) else (hint,)
+    inner = next((part for part in parts if part is not NoneType), None)
+    several = get_origin(inner) is tuple and get_args(inner)[1:] == (...,)
+    if several:
+        inner = get_args(inner)[0]
+    elif get_origin(inner) is Literal:
         inner = type(get_args(inner)[0])
-    return (inner, False, optional) if inner in KINDS else None
+    return (inner, several) if inner in KINDS else None
 
 
 def _text(value: Any, several: bool) -> Any:
