@@ -27,15 +27,17 @@ def configuration_schema(verbs: Mapping[str, type[Verb]]) -> dict[str, Any]:
                 shared[key].append(schema)
     # A key may be an option and a command; of an option, commands may take different values.
     top = {key: schemas[0] if len(schemas) == 1 else {"anyOf": schemas} for key, schemas in shared.items()}
-    for name, table in tables.items():
+    commands = {name: {"$ref": f"#/definitions/{name}"} for name in tables}
+    for name, table in commands.items():
         top[name] = {"anyOf": [top[name], table]} if name in top else table
-    nested = {"type": "object", "properties": tables, "additionalProperties": False}
+    nested = {"type": "object", "properties": commands, "additionalProperties": False}
     return {
         "$schema": "http://json-schema.org/draft-07/schema#",
         "title": "oed.toml: defaults of options",
         "type": "object",
         "properties": {**top, TABLES: nested},
         "additionalProperties": False,
+        "definitions": tables,
     }
 
 

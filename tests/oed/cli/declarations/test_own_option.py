@@ -99,10 +99,12 @@ def test_what_excludes_what_is_said_once(own: Callable[..., Any]) -> None:
 
 def test_it_is_in_the_schema(verbs: Verbs) -> None:
     """With its text, type, range and default, at the top and in the command's table."""
-    schema = configuration_schema(verbs)["properties"]
+    whole = configuration_schema(verbs)
+    schema = whole["properties"]
     stated = {"description": "How loud it is [dB]. loud is what it is not by default.", "type": "number"}
     assert schema["loudness"] == {**stated, "minimum": 0.0, "default": 3.0}
-    assert schema["own"]["properties"]["loudness"] == schema["loudness"]
+    assert schema["own"] == schema["command"]["properties"]["own"] == {"$ref": "#/definitions/own"}
+    assert whole["definitions"]["own"]["properties"]["loudness"] == schema["loudness"]
     assert {"type": "array", "items": {"type": "number"}} in schema["place"]["anyOf"]
 
 
