@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 from oed.cli.options.links import Behaviour, Link
+from oed.cli.options.results import Overwriting
 from oed.cli.options.robots import SimulatedRobot
 from oed.cli.verbs import Printed, Verb
 from robots.common.errors import InputError
@@ -82,6 +83,7 @@ class Controller(Verb):
     behaviour: Behaviour = Behaviour()
     duration: float | None = None
     faults: Disturbance = Disturbance()
+    overwriting: Overwriting = Overwriting()
 
     def run(self, progress: Progress) -> Printed:
         """Serves until Ctrl-C."""
