@@ -27,10 +27,10 @@ from scipy.stats import kstest
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
 
-from estimation import compare, fit_campaign, identify
+from estimation import compare, identify
 from estimation.comparisons import ModelComparison, identify_runs
 from estimation.preprocessing import resample, smooth
-from estimation.thermal import start_temperatures
+from estimation.thermal import fit_campaign, start_temperatures
 from estimation.uncertainty.quantiles import NORMAL_95
 from oed.benchmarks.truth.description import write_description
 from oed.benchmarks.truth.effects.base import Effect

@@ -34,9 +34,10 @@ import numpy as np
 from benchmarks.monitoring_parts.tables import print_table
 from benchmarks.monitoring_parts.virtual_robot import DAY, Cause, VirtualRobot
 from benchmarks.monitoring_parts.weeks import draw_causes, size_of
-from estimation import fit_campaign, identify
+from estimation import identify
 from estimation.models.model import model_from_dict
 from estimation.monitoring import Baseline, Monitor, MonitorSettings, baseline_of
+from estimation.thermal import fit_campaign
 from oed.benchmarks.truth.description import write_description
 from robots import load_robot
 from robots.signals import Log

@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterable, Iterator
 from contextlib import closing
 from typing import TypeVar
 
-from oed.cli.options import executor_from
+from oed.cli.options.work import Processes
 from robots.common.parallel import as_finished
 
 Item = TypeVar("Item")
@@ -25,7 +25,7 @@ def finished(
 ) -> Iterator[tuple[int, Result]]:
     """Gives each result with the number of its task as it comes, so that an interrupt costs what is under way alone."""
     with (
-        executor_from(options.workers, options.cluster) as executor,
+        Processes(workers=options.workers, cluster=options.cluster).executor() as executor,
         closing(as_finished(function, tasks, executor=executor, workers=options.workers)) as results,
     ):
         yield from results

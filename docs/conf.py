@@ -13,6 +13,8 @@ from sphinx.errors import SphinxError
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
 
+from oed.cli.app import VERBS
+from oed.cli.declarations.reference import with_option_tables
 from robots.version import VERSION
 
 project = "robot-oed"
@@ -57,6 +59,8 @@ def _require_offline(app: Any, exception: Exception | None) -> None:
 
 
 def setup(app: Any) -> None:
-    """Writes formulas as MathML, which browsers draw by themselves."""
+    """Writes formulas as MathML, which browsers draw by themselves, and tables of options."""
     app.add_html_math_renderer("mathml", (_inline, None), (_displayed, None))
     app.connect("build-finished", _require_offline)
+    # The options of each command, as its class declares them.
+    app.connect("source-read", lambda _, __, source: source.__setitem__(0, with_option_tables(source[0], VERBS)))

@@ -1,5 +1,6 @@
 """Estimation: models identified from measured data, with realistic uncertainty."""
 
+from estimation.actuators import identify_actuators as identify_actuators
 from estimation.calibrations import calibrate as calibrate
 from estimation.calibrations import load_calibration as load_calibration
 from estimation.calibrations import read_poses as read_poses
@@ -9,7 +10,7 @@ from estimation.diagnosis import diagnose as diagnose
 from estimation.exports import export_c as export_c
 from estimation.exports import export_mjcf as export_mjcf
 from estimation.exports import export_urdf as export_urdf
-from estimation.gate import GateReport as GateReport
+from estimation.external_forces import estimate_forces as estimate_forces
 from estimation.gate import check_log as check_log
 from estimation.identifications.bootstrap import bootstrap as bootstrap
 from estimation.identifications.drive_gains import identify_drive_gains as identify_drive_gains
@@ -21,13 +22,12 @@ from estimation.logs import write_log as write_log
 from estimation.logs.clocks import on_one_clock as on_one_clock
 from estimation.models.model import Model as Model
 from estimation.models.model import load_model as load_model
+from estimation.monitoring import monitor_logs as monitor_logs
+from estimation.monitoring.fleets import monitor_fleet as monitor_fleet
 from estimation.payloads import identify_payload as identify_payload
 from estimation.payloads import load_payload as load_payload
 from estimation.predictions.method_table import compare_methods as compare_methods
 from estimation.predictions.prediction import Prediction as Prediction
 from estimation.predictions.prediction import predict as predict
-from estimation.thermal import ThermalEstimate as ThermalEstimate
-from estimation.thermal import choose_thermal as choose_thermal
-from estimation.thermal import fit_campaign as fit_campaign
-from estimation.thermal import fit_thermal as fit_thermal
+from estimation.thermal import identify_thermal as identify_thermal
 from robots.version import __version__ as __version__

@@ -1,12 +1,13 @@
 """Optimal experiment design for robots: what to measure next, and the command line."""
 
-from oed.campaigns import Campaign as Campaign
 from oed.campaigns import Programme as Programme
 from oed.campaigns import campaign as campaign
-from oed.campaigns.discriminations import Discrimination as Discrimination
 from oed.campaigns.discriminations import discriminate as discriminate
+from oed.campaigns.loops import run_loop as run_loop
 from oed.constraints import StateLimit as StateLimit
 from oed.constraints.geometric import GeometricLimit as GeometricLimit
+from oed.controllers import record as record
+from oed.controllers import stream as stream
 from oed.criteria import Criterion as Criterion
 from oed.experiments import Design as Design
 from oed.experiments import Effort as Effort
@@ -14,16 +15,15 @@ from oed.experiments import InteriorPoint as InteriorPoint
 from oed.experiments import Ipopt as Ipopt
 from oed.experiments import LimitOptions as LimitOptions
 from oed.experiments import ModelOptions as ModelOptions
-from oed.experiments import ParetoFront as ParetoFront
 from oed.experiments import SearchOptions as SearchOptions
 from oed.experiments import TrajectoryOptions as TrajectoryOptions
 from oed.experiments import WeightOptions as WeightOptions
 from oed.experiments import design as design
 from oed.experiments import pareto as pareto
 from oed.experiments import retime as retime
-from oed.experiments.pose_designs import PoseDesign as PoseDesign
 from oed.experiments.pose_designs import PoseOptions as PoseOptions
 from oed.experiments.pose_designs import design_poses as design_poses
+from oed.exports import export_trajectory as export_trajectory
 from oed.exports import read_trajectory as read_trajectory
 from oed.exports import write_trajectory as write_trajectory
 from oed.trajectories import BSpline as BSpline

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from oed.benchmarks.truth.cases import Case, Hidden, draw_case
 from oed.benchmarks.truth.effects import KNOWN, STRANGERS
 from oed.benchmarks.truth.effects.base import Effect
-from oed.benchmarks.truth.machines import KINDS
+from oed.benchmarks.truth.kinds import KINDS
 
 TUNING = 1000
 """Seeds below this one are the benchmark's: no threshold may be tuned on them."""

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from benchmarks import comparison, forces, monitoring, payloads, thermal
-from estimation import fit_thermal
+from estimation.thermal import fit_thermal
 
 # Of a model: the robot is an input, and covariances act on the standard errors.
 INPUTS = frozenset({"robot", "terms", "covariance"})

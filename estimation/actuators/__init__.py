@@ -2,18 +2,7 @@
 
 from __future__ import annotations
 
-from estimation.actuators.fitting import FitOptions
-from estimation.actuators.identification import ActuatorOptions, identify_actuators
-from estimation.actuators.result import Actuators, DriveValue, MotionError, load_actuators
-from estimation.actuators.search import LoopFinding
+from robots.common.lazy import lazy_exports
 
-__all__ = [
-    "ActuatorOptions",
-    "Actuators",
-    "DriveValue",
-    "FitOptions",
-    "LoopFinding",
-    "MotionError",
-    "identify_actuators",
-    "load_actuators",
-]
+# The stub beside this file says which module has which name.
+__getattr__, __dir__, __all__ = lazy_exports(__name__, __file__)

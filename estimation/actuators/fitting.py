@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from scipy.optimize import lsq_linear
 
 from estimation.actuators.freedom import Freedom
+from estimation.actuators.options import FitOptions
 from estimation.actuators.runs import Run
 from estimation.actuators.simulated_error import Errors, linearised_runs, rms, simulate_runs
 from robots.common.errors import SolverError
@@ -23,21 +24,6 @@ FIRST, GROWTH, SHRINKAGE, MOST = 1e-3, 6.0, 0.2, 1e6
 """Damping of the first step, its factors after a step that fails or succeeds, and the largest."""
 FLOOR = 1e-5
 """Least error of a joint [rad or m] in its weight: encoders are no better."""
-
-
-@dataclass(frozen=True, kw_only=True)
-class FitOptions:
-    """Settings of the fit.
-
-    Attributes:
-        iterations: the most Gauss-Newton steps of a round.
-        rounds: how often the joints' weights are taken from their errors.
-        settled: relative decrease of the cost below which the fit has settled.
-    """
-
-    iterations: int = 25
-    rounds: int = 2
-    settled: float = 1e-5
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

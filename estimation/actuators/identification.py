@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from estimation.actuators.equation_error import started
 from estimation.actuators.exports.expressible import expressible
-from estimation.actuators.fitting import Fit, FitOptions, fit_drives
+from estimation.actuators.fitting import Fit, fit_drives
 from estimation.actuators.freedom import (
     Fleet,
     Freedom,
@@ -19,6 +19,7 @@ from estimation.actuators.freedom import (
     free_parameters,
     shared_delay,
 )
+from estimation.actuators.options import ActuatorOptions
 from estimation.actuators.result import Actuators, DriveValue, MotionError, Trace
 from estimation.actuators.runs import Run, runs_of
 from estimation.actuators.search import LoopFinding, search_effects
@@ -55,25 +56,6 @@ NEUTRAL = {
 """Values of what simulators do not express, see `expressible`."""
 TRACED = 4000
 """Samples of a trace at most."""
-
-
-@dataclass(frozen=True, kw_only=True)
-class ActuatorOptions:
-    """Settings of `identify_actuators`.
-
-    Attributes:
-        share: parts of joint names, such as ``hip``, whose joints share their parameters; ``all`` for all joints.
-        free: further parameters that are identified, such as gains that nobody knows.
-        effects: whether effects beyond delay, rotor inertia, friction and offset are looked for.
-        fit: settings of the fits.
-        seed: of the bootstrap.
-    """
-
-    share: tuple[str, ...] = ()
-    free: tuple[str, ...] = ()
-    effects: bool = True
-    fit: FitOptions = field(default_factory=FitOptions)
-    seed: int = 0
 
 
 @one_blas_thread()

@@ -1,15 +1,8 @@
 """Calibration of a robot's geometry from measured poses."""
 
-from estimation.calibrations.calibrating import CalibrationOptions, calibrate
-from estimation.calibrations.pose_tables import TableOptions, read_poses
-from estimation.calibrations.result import CalibratedParameter, Calibration, load_calibration
+from __future__ import annotations
 
-__all__ = [
-    "CalibratedParameter",
-    "Calibration",
-    "CalibrationOptions",
-    "TableOptions",
-    "calibrate",
-    "load_calibration",
-    "read_poses",
-]
+from robots.common.lazy import lazy_exports
+
+# The stub beside this file says which module has which name.
+__getattr__, __dir__, __all__ = lazy_exports(__name__, __file__)

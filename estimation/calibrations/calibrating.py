@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from estimation.calibrations.fit import GeometryFit, fit_geometry
 from estimation.calibrations.folds import outside_range
+from estimation.calibrations.options import CalibrationOptions
 from estimation.calibrations.outliers import without_outliers
 from estimation.calibrations.repeatability import repeatability
 from estimation.calibrations.result import (
@@ -38,25 +39,6 @@ from robots.version import VERSION
 Array = NDArray[np.float64]
 
 COMMON = 0.1  # of the poses; more outliers are no single faults
-
-
-@dataclass(frozen=True, kw_only=True)
-class CalibrationOptions:
-    """How a calibration is done.
-
-    Attributes:
-        kinds: of errors that are fitted, by name; None for those that held-out poses support.
-        diagnose: whether causes of the errors are looked for.
-        seed: of the folds.
-    """
-
-    kinds: tuple[str, ...] | None = None
-    diagnose: bool = True
-    seed: int = 0
-
-    def __post_init__(self) -> None:
-        for kind in self.kinds or ():
-            error_term(kind)
 
 
 @one_blas_thread()

@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Sequence
 from os import PathLike
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
+from estimation.calibrations.options import ANGLES, LENGTHS, TableOptions
 from robots.common.errors import InputError
 from robots.common.files import sha256
 from robots.common.tables.table import Table
@@ -31,9 +31,6 @@ from robots.robot import Robot
 
 Array = NDArray[np.float64]
 
-LENGTHS = {"m": 1.0, "mm": 1e-3}
-ANGLES = {"rad": 1.0, "deg": np.pi / 180.0}
-ORDERS = ("xyzw", "wxyz")
 QUATERNION = ("qx", "qy", "qz", "qw")
 MATRIX = tuple(f"r{i}{j}" for i in (1, 2, 3) for j in (1, 2, 3))
 UNIT_LENGTH = 0.05  # a quaternion that is off by more is none
@@ -43,42 +40,6 @@ SHOWN = (
     "of distances [m]; plane or point with the number of what is touched; other1..otherm of a second arm [rad]; "
     "u1,v1,... of a board [px]; roll,pitch of an inclinometer [rad]"
 )
-
-
-@dataclass(frozen=True, kw_only=True)
-class TableOptions:
-    """How a table of poses is to be read.
-
-    Attributes:
-        lengths: unit of measured lengths: "m" or "mm". Units in the file's own header go before.
-        angles: unit of joint positions and measured angles: "rad" or "deg".
-        quaternion: order of the columns of a quaternion without letters: "xyzw" or "wxyz". Columns qx, qy, qz, qw are
-            taken by their names, unless the order is "wxyz": then the file has them swapped.
-        offset: of distances: whether the instrument's zero is estimated.
-        board: of a camera: corners across, corners along, spacing [m].
-        intrinsics: of a camera: fx, fy, cx, cy [px].
-        camera_on_flange: whether the camera is on the flange, and the board stands.
-        known: parts of the setup that are known, by name.
-        temperature: for poses without a column of their own [degC].
-
-    Raises:
-        InputError: another unit or order.
-    """
-
-    lengths: str = "m"
-    angles: str = "rad"
-    quaternion: str = "xyzw"
-    offset: bool = False
-    board: tuple[int, int, float] | None = None
-    intrinsics: tuple[float, float, float, float] | None = None
-    camera_on_flange: bool = True
-    known: Mapping[str, ArrayLike] = field(default_factory=dict)
-    temperature: float | None = None
-
-    def __post_init__(self) -> None:
-        for name, allowed in (("lengths", LENGTHS), ("angles", ANGLES), ("quaternion", ORDERS)):
-            if getattr(self, name) not in allowed:
-                raise InputError(f"{name} {getattr(self, name)!r}", allowed=" or ".join(allowed))
 
 
 def read_poses(

@@ -8,9 +8,10 @@ from dataclasses import replace
 import numpy as np
 
 from estimation.external_forces.contacts import find_contacts
+from estimation.external_forces.options import ForceOptions
 from estimation.external_forces.residuals.dynamics import dynamics_of, require_inertia
 from estimation.external_forces.residuals.filters import filtered
-from estimation.external_forces.residuals.signals import Signals, Velocity, signals_of
+from estimation.external_forces.residuals.signals import Signals, signals_of
 from estimation.external_forces.result import ForceEstimate
 from estimation.external_forces.thresholds.calibrations import Calibration
 from estimation.external_forces.thresholds.fit_checks import check_fit
@@ -25,9 +26,6 @@ from robots.common.errors import InputError
 from robots.common.progress import SILENT, Progress
 from robots.signals import Log
 from robots.terms.situations.flange_body import require_flange
-
-BANDWIDTH = 4.0
-"""Default bandwidth of the observer [Hz]: a push of 0.2 s is five of its time constants."""
 
 SHARPNESS = 5.0
 """Least cut-off of the positions' smoothing over the observer's bandwidth, so that it smears nothing that passes.
@@ -44,10 +42,7 @@ def estimate_forces(
     *,
     healthy: Sequence[Log] = (),
     calibration: Calibration | None = None,
-    false_alarms: float = 1.0,
-    bandwidth: float = BANDWIDTH,
-    tool: Sequence[float] | None = None,
-    velocity: Velocity = "smoothed",
+    options: ForceOptions | None = None,
     predictor: Predictor | None = None,
     progress: Progress | None = None,
 ) -> ForceEstimate:
@@ -59,10 +54,7 @@ def estimate_forces(
         healthy: logs without contacts, from which the threshold follows. Without any the log itself serves: what looks
             like a contact is left out of it.
         calibration: of an earlier call, instead of `healthy`.
-        false_alarms: an hour, on a healthy robot.
-        bandwidth: of the observer [Hz].
-        tool: position (3,) of the tool point in the flange's frame [m]; the flange by default.
-        velocity: ``smoothed``, from smoothed positions, or ``logged``, the log's columns dq1..
+        options: of the observer and its threshold; a calibration has its own bandwidth and velocities.
         predictor: predicts the torques of a log by the model that it is given, whose smoothing suits the observer;
             `predict` by default. One with heat is ``lambda model, log: predict(model, log, thermal=...)``.
         progress: receives the progress.
@@ -77,10 +69,8 @@ def estimate_forces(
     """
     require_inertia(model)
     require_flange(model.robot)
-    if velocity not in ("smoothed", "logged"):
-        raise InputError(f"velocity {velocity!r}", allowed="smoothed or logged")
-    if not 0.0 < bandwidth < np.inf:
-        raise InputError(f"a bandwidth of {bandwidth} Hz", allowed="a positive number")
+    how = options or ForceOptions()
+    bandwidth, velocity = how.bandwidth, how.velocity
     if calibration is not None:
         bandwidth, velocity = calibration.bandwidth, calibration.velocity
     model = smoothed_at_least(model, SHARPNESS * bandwidth)
@@ -93,7 +83,7 @@ def estimate_forces(
         prediction = run(model, own)
         if prediction.measured is None:
             raise InputError("the log has no torque", file=own.metadata.get("file"), remedy="record tau1.. or i1..")
-        dynamics = dynamics_of(model, gravity=own.gravity, payload=own.payload, tool=tool)
+        dynamics = dynamics_of(model, gravity=own.gravity, payload=own.payload, tool=how.tool)
         name = str(own.metadata.get("file") or own.name)
         signals = signals_of(model, dynamics, own, prediction, bandwidth, velocity)
         return signals, lambda levelled: check_fit(levelled, prediction.band, name)
@@ -117,7 +107,7 @@ def estimate_forces(
             normal or [signals],
             bandwidth=bandwidth,
             velocity=velocity,
-            false_alarms=false_alarms,
+            false_alarms=how.false_alarms,
             own=not healthy,
             in_fit=in_fit,
         )

@@ -1,21 +1,8 @@
 """Monitoring: changes of a robot beside its identified model, with what temperature explains taken out."""
 
-from estimation.monitoring.findings import Finding
-from estimation.monitoring.log_row import LogRow
-from estimation.monitoring.monitor import Monitor
-from estimation.monitoring.result import MonitorResult
-from estimation.monitoring.settings import MonitorSettings
-from estimation.monitoring.stored_logs.log_monitoring import monitor_logs
-from estimation.monitoring.windows.baseline import Baseline, baseline_of, read_baseline
+from __future__ import annotations
 
-__all__ = [
-    "Baseline",
-    "Finding",
-    "LogRow",
-    "Monitor",
-    "MonitorResult",
-    "MonitorSettings",
-    "baseline_of",
-    "monitor_logs",
-    "read_baseline",
-]
+from robots.common.lazy import lazy_exports
+
+# The stub beside this file says which module has which name.
+__getattr__, __dir__, __all__ = lazy_exports(__name__, __file__)

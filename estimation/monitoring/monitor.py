@@ -6,6 +6,7 @@ import copy
 import json
 from collections.abc import Iterable
 from os import PathLike
+from pathlib import Path
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -15,7 +16,7 @@ from estimation.monitoring.evaluation import Evaluation
 from estimation.monitoring.findings import Finding
 from estimation.monitoring.log_row import LogRow
 from estimation.monitoring.settings import MonitorSettings
-from estimation.monitoring.windows.baseline import Baseline, baseline_of
+from estimation.monitoring.windows.baseline import Baseline, baseline_of, read_baseline
 from estimation.monitoring.windows.projection import SLOWEST
 from estimation.monitoring.windows.stream_windows import StreamWindows
 from estimation.monitoring.windows.window_rows import settling
@@ -233,3 +234,29 @@ class Monitor(Record, format="robot-oed monitor", whole=True):
             problem = f"is not a state of a monitor, or is damaged ({reason})"
             raise InputError(problem, file=path, remedy=remedy) from e
         return found
+
+
+def open_monitor(
+    model: str | PathLike[str], *, state: Path | None = None, settings: MonitorSettings | None = None
+) -> Monitor:
+    """Makes a monitor, or goes on with one whose state was saved.
+
+    Args:
+        model: of the healthy robot, a `model.json` or its folder.
+        state: file of the state; a new monitor where it does not exist.
+        settings: of the monitor.
+
+    Raises:
+        InputError: a file that is no model or no state, or a state of another model or of other settings.
+    """
+    baseline, how = read_baseline(model), settings or MonitorSettings()
+    if state is None or not state.exists():
+        return Monitor(baseline, how)
+    found = Monitor.load(state)
+    if dict(baseline.source) != dict(found.baseline.source):
+        remedy = "give the model of this state, or another --state file"
+        raise InputError("the state is of another model", file=state, remedy=remedy)
+    if found.settings != how:
+        remedy = "give the same settings, or another --state file"
+        raise InputError(f"the state has other settings: {found.settings}", file=state, remedy=remedy)
+    return found

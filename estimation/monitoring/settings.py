@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import Literal
-
-import numpy as np
 
 from robots.common.errors import InputError
 
@@ -40,9 +39,9 @@ class MonitorSettings:
     confirm: int = 6
 
     def __post_init__(self) -> None:
-        if not (np.isfinite(self.window) and self.window >= 1.0):
+        if not (math.isfinite(self.window) and self.window >= 1.0):
             raise InputError(f"a window of {self.window} s", allowed="1 s or more")
-        if not (np.isfinite(self.false_alarm_hours) and self.false_alarm_hours >= 1.0):
+        if not (math.isfinite(self.false_alarm_hours) and self.false_alarm_hours >= 1.0):
             raise InputError(f"{self.false_alarm_hours} h between false alarms", allowed="1 h or more")
         if self.heat not in HEATS:
             raise InputError(f"heat {self.heat!r}", allowed=", ".join(HEATS))

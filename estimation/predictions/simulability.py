@@ -16,9 +16,9 @@ from estimation.closed_loops.closed_loop import inertia_matrices
 from estimation.models.model import Model
 from estimation.predictions.simulable_models import nearest_simulable
 from robots.base_parameters import BaseParameters, find_base_parameters
-from robots.common.errors import InputError
+from robots.common.errors import InfeasibleError, InputError, SolverError
 from robots.common.records import Record
-from robots.signals import Motion
+from robots.signals import Log, Motion
 
 Array = NDArray[np.float64]
 
@@ -175,3 +175,20 @@ def _along(base: BaseParameters, values: Array, pose: Motion, direction: Array) 
 def _inertia_of_each(base: BaseParameters, values: Array, pose: Motion, direction: Array) -> Array:
     """What each base parameter (b,) adds to the inertia of a direction."""
     return np.array([_along(base, row, pose, direction) if row.any() else 0.0 for row in np.diag(values)])
+
+
+def unfit_of(model: Model, logs: Sequence[Log]) -> UnfitDirection | None:
+    """Finds why a model cannot be simulated in the poses of logs.
+
+    Args:
+        model: the model.
+        logs: where it is simulated.
+
+    Returns:
+        None for a model that can be simulated, or without a description that gives a nearest one.
+    """
+    motions = [Motion(log.t, log.q, np.zeros_like(log.q), np.zeros_like(log.q)) for log in logs]
+    try:
+        return find_unfit_direction(model, motions)
+    except (InputError, InfeasibleError, SolverError):
+        return None

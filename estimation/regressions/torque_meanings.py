@@ -200,3 +200,29 @@ def _own_part(robot: Robot, log: Log, current: Array) -> tuple[Array, Array, Arr
         both = np.column_stack([rigid[:, joint], i[:, joint]])
         x[:, joint], y[:, joint] = (both - own @ np.linalg.lstsq(own, both, rcond=None)[0]).T
     return x, y, rigid.var(axis=0)
+
+
+def as_joint_torques(
+    robot: Robot, logs: Sequence[Log], meaning: str | None = None, *, without: Sequence[Log] | None = None
+) -> tuple[Robot, list[Log]]:
+    """Converts torque columns of another meaning to joint torques, by the robot's description.
+
+    Args:
+        robot: of the logs.
+        logs: with their payloads and gravity vectors; a log without torque stays as it is.
+        meaning: see `parse_meaning`; None for what the logs' metadata state.
+        without: those of the logs that have no unknown payload, by which torque constants are estimated; None for all.
+
+    Returns:
+        The robot, with estimated torque constants where it needs them, and the logs.
+
+    Raises:
+        InputError: an unknown meaning, or a description that lacks what is needed.
+    """
+    if meaning is not None:
+        parse_meaning(meaning, robot.n)
+    robot = with_torque_constants(robot, logs if without is None else without, meaning)
+    return robot, [
+        log if log.tau is None and log.current is None else as_joint_torque(robot, log, meaning, estimate=False)
+        for log in logs
+    ]

@@ -26,7 +26,7 @@ from oed.trajectories import (
     plan_warm_up,
     vertical_axis_pose,
 )
-from oed.trajectories.sweeps import LONGEST_PLATEAU
+from oed.trajectories.stage_defaults import LONGEST_PLATEAU
 from robots.common.errors import InfeasibleError
 from robots.limits import Limits
 from robots.robot import Robot

@@ -2,17 +2,34 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
+from typing import Annotated
 
-import numpy as np
-
-from oed.trajectories.sweeps import FRICTION_LEVELS, LONGEST_PLATEAU
-from oed.trajectories.warm_up import RANGE_FRACTION
+from oed.trajectories.stage_defaults import FRICTION_LEVELS, LONGEST_PLATEAU, RANGE_FRACTION
 from robots.common.errors import InputError
+from robots.common.options import Option
 from robots.common.records import Record
 
 LONGEST = 7 * 24 * 3600.0
 """A campaign beyond a week is taken for a slip of the pen [s]."""
+
+
+def read_duties(option: str, text: str) -> tuple[float, ...]:
+    """Reads duty cycles in percent.
+
+    Args:
+        option: for the message.
+        text: as typed.
+
+    Raises:
+        InputError: something else.
+    """
+    try:
+        return tuple(float(part) / 100.0 for part in text.split(","))
+    except ValueError:
+        allowed = "percentages separated by commas, such as 20,40,60,100"
+        raise InputError(f"{option} {text}", allowed=allowed) from None
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -22,14 +39,15 @@ class Programme(Record):
     A heating cycle is excitation, friction sweeps and warm-up (thesis section 2.4.1); in a cooling test the robot
     stands still but for one friction stage at the beginning of every cycle (section 4.3.1).
 
-    Args:
-        cycles: heating cycles of each run.
-        cycle_time: duration of every cycle [s].
+    Attributes:
+        cycles: heating cycles per run; each one is excitation, friction and warm-up.
+        cycle_time: duration of each cycle [s].
         warm_up: duration of the warm-up in a heating cycle [s].
-        warm_up_range: part of each joint's range that the warm-up drives, above 0 and up to 1.
-        duties: duty cycle of the warm-up in each run, above 0 and up to 1.
-        cooling: friction stages after each run, one every `cycle_time`; 0 for no cooling test.
-        power_on: how long the motors are on without motion before the first run [s]; 0 for no power-on test.
+        warm_up_range: fraction of each joint's range that the warm-up uses.
+        duties: duty cycle of the warm-up, from above 0 to 1; on the command line [%]. A list such as 20,40,60,100 plans
+            one run for each value.
+        cooling: number of friction stages with rest in between after each run, one per cycle time.
+        power_on: time with motors on and without motion before the first run [s].
         levels: speeds of the friction stage as fractions of the velocity limits.
         plateau: longest time at each of these speeds [s].
 
@@ -41,11 +59,11 @@ class Programme(Record):
     cycle_time: float = 300.0
     warm_up: float = 180.0
     warm_up_range: float = RANGE_FRACTION
-    duties: tuple[float, ...] = (1.0,)
+    duties: Annotated[tuple[float, ...], Option(name="duty", reads=read_duties, typed="100")] = (1.0,)
     cooling: int = 0
     power_on: float = 0.0
-    levels: tuple[float, ...] = FRICTION_LEVELS
-    plateau: float = LONGEST_PLATEAU
+    levels: Annotated[tuple[float, ...], Option(hidden=True)] = FRICTION_LEVELS
+    plateau: Annotated[float, Option(hidden=True)] = LONGEST_PLATEAU
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "duties", tuple(float(duty) for duty in self.duties))
@@ -56,9 +74,9 @@ class Programme(Record):
                 raise InputError(f"{name} is {value}", allowed=f"a whole number, {least} or more")
         for name in ("cycle_time", "warm_up", "plateau"):
             value = getattr(self, name)
-            if not (np.isfinite(value) and value > 0.0):
+            if not (math.isfinite(value) and value > 0.0):
                 raise InputError(f"{name} is {value} s", allowed="a positive time")
-        if not (np.isfinite(self.power_on) and self.power_on >= 0.0):
+        if not (math.isfinite(self.power_on) and self.power_on >= 0.0):
             raise InputError(f"power_on is {self.power_on} s", allowed="zero or a positive time")
         if not 0.0 < self.warm_up_range <= 1.0:
             raise InputError(f"warm_up_range is {self.warm_up_range}", allowed="a fraction above 0 and up to 1")

@@ -266,6 +266,16 @@ class Campaign(Planned, format="robot-oed campaign", tool=True):
         axes.legend(ncols=3)
         return axes
 
+    def choices(self) -> dict[str, Any]:
+        """Gives what the campaign was planned with, by the names of the choices."""
+        return {
+            **self.programme.to_dict(),
+            "ambient": self.ambient,
+            "cold_friction": self.cold_friction,
+            "torque_margin": self.torque_margin,
+            **self.settings,
+        }
+
     def save(self, folder: str | PathLike[str], *, force: bool = False) -> None:
         """Writes a CSV per stage and `campaign.json`.
 

@@ -9,7 +9,7 @@ import sys
 def main() -> None:
     """Runs ``oed``. Exit codes: 0 success, 1 no solution, 2 bad input, 130 interrupted."""
     from oed.cli.app import app
-    from oed.cli.help.usage_errors import CommandLineError, usage_message, with_nearest
+    from oed.cli.usage_errors import CommandLineError, usage_message, with_nearest
     from robots.common.errors import OedError
 
     try:

@@ -1,89 +1,37 @@
-"""All commands, one file each."""
+"""The commands of ``oed``."""
 
 from __future__ import annotations
 
-from typing import Annotated
+from typing import Annotated, ClassVar
 
 import typer
 
 from oed.cli.command import HELP
-from oed.cli.commands.actuators import actuators
-from oed.cli.commands.benchmark import benchmark
-from oed.cli.commands.calibrate import calibrate
-from oed.cli.commands.campaign import campaign
-from oed.cli.commands.check import check
-from oed.cli.commands.compare import compare
-from oed.cli.commands.controller import controller
-from oed.cli.commands.design import design
-from oed.cli.commands.diagnose import diagnose
-from oed.cli.commands.doctor import doctor
-from oed.cli.commands.effects import effects
-from oed.cli.commands.example import example
-from oed.cli.commands.explain import explain
-from oed.cli.commands.export import export
-from oed.cli.commands.fleet import fleet
-from oed.cli.commands.force import force
-from oed.cli.commands.identify import identify
-from oed.cli.commands.loop import loop
-from oed.cli.commands.monitor import monitor
-from oed.cli.commands.pareto import pareto
-from oed.cli.commands.payload import payload
-from oed.cli.commands.predict import predict
-from oed.cli.commands.record import record
-from oed.cli.commands.retime import retime
-from oed.cli.commands.robot import robot, robots
-from oed.cli.commands.show import show
-from oed.cli.commands.simulate import simulate
-from oed.cli.commands.stream import stream
-from oed.cli.commands.thermal import thermal
-from oed.cli.commands.view import view
 from oed.cli.configuration.defaults import HELP_TEXT
-from oed.cli.help.groups import Commands
+from oed.cli.program import Program, Verbs
 
-FUNCTIONS = (
-    design,
-    pareto,
-    retime,
-    export,
-    stream,
-    record,
-    controller,
-    campaign,
-    loop,
-    simulate,
-    show,
-    check,
-    identify,
-    actuators,
-    thermal,
-    diagnose,
-    predict,
-    compare,
-    monitor,
-    fleet,
-    payload,
-    calibrate,
-    force,
-    benchmark,
-    view,
-    example,
-    robot,
-    robots,
-    effects,
-    explain,
-    doctor,
-)
+COMMANDS = {
+    "First steps": ("first_steps", ("example", "robots", "robot", "effects", "explain", "doctor", "schema")),
+    "Experiments": ("experiments", ("design", "pareto", "retime", "campaign", "export", "show")),
+    "Robot and virtual robot": ("controllers", ("stream", "record", "loop", "controller", "simulate")),
+    "Models": ("models", ("check", "identify", "actuators", "thermal", "predict", "payload", "calibrate")),
+    "Diagnosis": ("diagnoses", ("diagnose", "compare", "monitor", "fleet", "force", "view", "benchmark")),
+}
+"""What commands are for, the folder that has a module for each of them, and their names."""
+
+VERBS = Verbs({name: f"oed.cli.commands.{folder}.{name}" for folder, names in COMMANDS.values() for name in names})
 
 
-class Program(Commands):
+class Oed(Program):
     """The commands of ``oed``."""
 
-    functions = FUNCTIONS
+    purposes: ClassVar = {title: names for title, (_, names) in COMMANDS.items()}
+    verbs = VERBS
 
 
 app = typer.Typer(
     name="oed",
-    cls=Program,
+    cls=Oed,
     context_settings=HELP,
     help="Designs excitation experiments for robots, identifies their dynamics, and diagnoses model errors.",
     no_args_is_help=True,

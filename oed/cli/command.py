@@ -10,11 +10,15 @@ from typing import Any
 
 from typer.core import TyperCommand
 
-from oed.cli.help.help_texts import EXAMPLES, OPTIONS, SETTINGS, group_of
+from oed.cli.declarations.declared import INPUT, SETTINGS, declared_options
+from oed.cli.verbs import Verb
 
 HELP = {"help_option_names": ["-h", "--help"]}
 """Settings of all commands: ``-h`` is ``--help``."""
 
+
+LAST = ("--force", "--json", "--quiet", "--help")
+"""Options of most commands, which stand at the end."""
 
 # How typer writes the type of an option that may be given again.
 _LISTS = re.compile(r"<list\[(\w+)\]>")
@@ -23,52 +27,51 @@ _LISTS = re.compile(r"<list\[(\w+)\]>")
 class Command(TyperCommand):
     """Reads ``--log a.csv b.csv`` as ``--log a.csv --log b.csv``, in commands without positional arguments."""
 
+    verb: type[Verb]
+
     def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
         """Parses the words of a command line."""
         again = {name for p in self.params if getattr(p, "multiple", False) for name in p.opts}
         if again and all(p.param_type_name == "option" for p in self.params):
             args = list(_repeated(args, again))
-        left = super().parse_args(ctx, list(args))
-        if ctx.default_map:
-            from oed.cli.configuration.defaults import LEFT_OUT
-            from oed.cli.configuration.exclusions import left_out
-
-            unused = left_out(ctx)
-            if unused:
-                ctx.meta[LEFT_OUT] = unused
-                ctx.params.clear()
-                left = super().parse_args(ctx, list(args))
-        return left
+        return super().parse_args(ctx, list(args))
 
     def invoke(self, ctx: Any) -> Any:
         """Runs the command, and says which options come from the configuration file."""
-        if not ctx.default_map:
-            return super().invoke(ctx)
-        from oed.cli.configuration.defaults import FILE, described, used_options
+        from oed.cli.configuration.defaults import described
+        from oed.cli.console import Console
+        from oed.cli.declarations.chosen import chosen
         from oed.reports.rendering.command_lines import completed_by
 
-        words = described(used_options(ctx))
-        if words and not ctx.params.get("quiet"):
-            print(f"note: from {ctx.meta[FILE].path}: {shlex.join(words)}", file=sys.stderr)
+        verb, filed = chosen(self.verb, ctx)
+        path, words = described(str(self.name), filed)
+        if words and not verb.quiet:
+            print(f"note: from {path}: {shlex.join(words)}", file=sys.stderr)
+        console = Console(json=verb.json, quiet=verb.quiet, introduces=verb.introduces)
         with completed_by(words):
-            return super().invoke(ctx)
+            with console.working(verb.kept) as progress:
+                printed = verb.run(progress)
+            if printed is not None:
+                console.result(printed)
 
     def format_options(self, ctx: Any, formatter: Any) -> None:
         """Writes the options by purpose: robot, input, settings, output."""
         sections: dict[str, list[tuple[str, str]]] = {
             title: [] for title in ("Arguments", "Robot", "Input", SETTINGS, "Output")
         }
+        sections_of = {name: option.section for name, option in declared_options(self.verb).items()} | {"config": INPUT}
         for parameter in self.get_params(ctx):
             record = parameter.get_help_record(ctx)
             if record is not None:
                 argument = parameter.param_type_name == "argument"
-                title = "Arguments" if argument else group_of(OPTIONS, str(parameter.name), SETTINGS)
-                sections[title].append((_LISTS.sub(r"<\1> ...", record[0]), record[1]))
+                title = "Arguments" if argument else sections_of.get(str(parameter.name), "Output")
+                sections[title].append((_LISTS.sub(lambda found: f"<{found[1].lower()}> ...", record[0]), record[1]))
+        sections["Output"].sort(key=lambda row: next((k for k, name in enumerate(LAST, 1) if name in row[0]), 0))
         write_sections(formatter, sections.items())
 
     def format_epilog(self, ctx: Any, formatter: Any) -> None:
         """Writes examples to copy."""
-        write_lines(formatter, "Examples", EXAMPLES.get(str(self.name), ()))
+        write_lines(formatter, "Examples", self.verb.examples)
 
 
 def write_sections(formatter: Any, sections: Iterable[tuple[str, list[tuple[str, str]]]]) -> None:

@@ -6,11 +6,11 @@ import json
 import logging
 import sys
 import warnings
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
-from typing import Any
 
+from oed.cli.verbs import Printed
 from robots.common.errors import DescriptionWarning
 from robots.common.progress import SILENT, Progress
 
@@ -34,11 +34,11 @@ class Console:
     introduces: bool = False
 
     @contextmanager
-    def working(self, kept: str = "nothing was written") -> Iterator[Progress]:
+    def working(self, kept: Callable[[], str] = lambda: "nothing was written") -> Iterator[Progress]:
         """Shows a progress bar on a terminal, and a line every ten seconds in a pipe. Each note is printed once.
 
         Args:
-            kept: what an interrupted command has written so far, for its message.
+            kept: says what an interrupted command has written so far.
 
         Raises:
             SystemExit: with code 130, on Ctrl-C.
@@ -60,15 +60,23 @@ class Console:
                         yield progress
             except KeyboardInterrupt:
                 # Without this, typer would end without a message.
-                print(f"oed: interrupted; {kept}", file=sys.stderr)
+                print(f"oed: interrupted; {kept()}", file=sys.stderr)
                 raise SystemExit(130) from None
 
-    def result(self, summary: str, data: Mapping[str, Any]) -> None:
-        """Prints the summary, or the data as JSON."""
+    def result(self, printed: Printed) -> None:
+        """Prints the summary, or the data as JSON.
+
+        Raises:
+            SystemExit: with the code of the result, if that is not 0.
+        """
         if self.json:
-            print(json.dumps(data, indent=2, allow_nan=False))
+            print(json.dumps(printed.data, indent=2, allow_nan=False))
         elif not self.quiet:
-            print(summary)
+            print(printed.summary)
+        if printed.note:
+            print(printed.note, file=sys.stderr)
+        if printed.code:
+            raise SystemExit(printed.code)
 
 
 class _Notes:

@@ -2,51 +2,74 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
-from concurrent.futures import Executor
 from dataclasses import asdict, dataclass, field
-from typing import Any
+from typing import TYPE_CHECKING, Annotated, Any
 
-import numpy as np
-from numpy.typing import ArrayLike
-
-from oed.constraints import StateLimit
-from oed.constraints.geometric import GeometricLimit
-from oed.criteria import Prior
-from oed.experiments.searches.search import EFFORTS, Effort
-from oed.experiments.solvers import InteriorPoint, Solver
-from oed.trajectories import Family, Fourier, check_family
-from oed.trajectories import family as choose_family
-from robots.collision import CollisionModel, Surroundings
 from robots.common.errors import InputError
+from robots.common.options import Option, Seed, numbers
 from robots.common.plain import finite
-from robots.plants import PlantEffect
-from robots.robot import Robot
-from robots.signal_checks import checked_body
-from robots.signals import Motion
-from robots.terms import FrictionTerm
+
+if TYPE_CHECKING:
+    from concurrent.futures import Executor
+
+    from numpy.typing import ArrayLike
+
+    from oed.constraints import StateLimit
+    from oed.constraints.geometric import GeometricLimit
+    from oed.criteria import Prior
+    from oed.experiments.searches.search import Effort
+    from oed.experiments.solvers import Solver
+    from oed.trajectories import Family
+    from robots.collision import CollisionModel, Surroundings
+    from robots.plants import PlantEffect
+    from robots.robot import Robot
+    from robots.signals import Motion
+    from robots.terms import FrictionTerm
+else:  # The options of the command line load without what only Python can give.
+    ArrayLike = Effort = Family = FrictionTerm = Any
+
+
+def _fourier() -> Family:
+    from oed.trajectories import Fourier
+
+    return Fourier()
+
+
+def _surroundings() -> Surroundings:
+    from robots.collision import Surroundings
+
+    return Surroundings()
+
+
+def _interior_point() -> Solver:
+    from oed.experiments.solvers import InteriorPoint
+
+    return InteriorPoint()
 
 
 @dataclass(frozen=True, kw_only=True)
 class ModelOptions:
-    """Which model will be fitted to the experiment.
+    """Which model will be fitted to the experiment. The friction may be a term of one's own.
 
     Attributes:
-        friction: ``polynomial``, ``coulomb-viscous``, the name of another friction term, or a term of one's own.
-        offset: with torque offset columns.
-        rotor: with rotor inertia columns.
-        essential: leaves out base parameters whose torque, by the robot's description, stays below this share of each
-            joint's on random motions; 0 keeps all.
+        friction: friction model: polynomial (four coefficients a joint), coulomb-viscous (two), or the name of another
+            friction term.
+        offset: include a constant torque offset per joint in the model.
+        rotor: include rotor inertias in the model.
+        essential: leave out parameters that contribute less than this fraction of each joint's torque, by the robot's
+            description on random motions; 0 keeps all.
         velocity_scale: of the Coulomb column tanh(dq / scale) [rad/s].
-        payload_only: the criterion judges the ten parameters of a body on the flange alone: the arm counts as known, as
-            in the difference of two logs of one path. The other options then matter for the torque limits only.
+        payload_only: design the motion that determines a payload: the arm counts as known, as in the difference of two
+            logs of one path. `oed design` then has the criterion d and no strokes by default.
     """
 
     friction: str | FrictionTerm = "polynomial"
     offset: bool = False
-    rotor: bool = True
+    rotor: Annotated[bool, Option(hidden=True)] = True
     essential: float = 0.0
-    velocity_scale: float = 0.02
+    velocity_scale: Annotated[float, Option(hidden=True)] = 0.02
     payload_only: bool = False
 
     def settings(self) -> dict[str, Any]:
@@ -68,20 +91,24 @@ class TrajectoryOptions:
 
     Attributes:
         family: of the optimised part: `Fourier`, `BSpline`, `FourierPolynomial`, one of one's own, or a name.
-        periods: how often the optimised part is repeated.
-        strokes: with one stroke per joint to its velocity bound, both ways.
-        home: pose (n,) at both ends [rad or m]; by default zero, or the nearest pose free of collisions.
+        periods: repetitions of the optimised part.
+        strokes: add one velocity stroke per joint: to the velocity limit, forwards and backwards.
+        home: pose (n,) at start and end [rad or m], comma-separated. Default: zero, or the nearest pose free of
+            collisions.
 
     Raises:
         InputError: an unknown or unusable family, or a number of periods out of range.
     """
 
-    family: str | Family = field(default_factory=Fourier)
+    family: Annotated[str | Family, Option(hidden=True)] = field(default_factory=_fourier)
     periods: int = 3
     strokes: bool = True
-    home: ArrayLike | None = None
+    home: Annotated[ArrayLike | None, Option(reads=numbers, section="Robot")] = None
 
     def __post_init__(self) -> None:
+        from oed.trajectories import check_family
+        from oed.trajectories import family as choose_family
+
         chosen = choose_family(self.family)
         check_family(chosen)
         object.__setattr__(self, "family", chosen)
@@ -90,8 +117,7 @@ class TrajectoryOptions:
     @property
     def excitation(self) -> Family:
         """The family of the optimised part."""
-        assert isinstance(self.family, Family)
-        return self.family
+        return self.family  # type: ignore[return-value]
 
     def settings(self) -> dict[str, Any]:
         """Writes them as plain data."""
@@ -102,7 +128,7 @@ class TrajectoryOptions:
             **fourier,
             "periods": self.periods,
             "strokes": self.strokes,
-            "home": None if self.home is None else np.asarray(self.home, dtype=float).tolist(),
+            "home": _numbers(self.home),
         }
 
 
@@ -111,13 +137,13 @@ class LimitOptions:
     """Which limits the whole experiment keeps, besides position, acceleration and jerk.
 
     Attributes:
-        velocity_fraction: share of the velocity limits to use. By default 1 for robots of the catalogue, and half for
+        velocity_fraction: fraction of the velocity limits to use. Default: 1 for robots of the catalogue, 0.5 for
             others, whose first motion should be slower.
-        torque: keep the torque limits by the robot's nominal dynamics, where both are described.
-        torque_margin: share of the torque limits kept for what the nominal dynamics are wrong by.
-        collision: keep the arm clear of itself, of the floor and of the obstacles in the robot's file; the whole
-            experiment is then proved free at all times. Without it the design is marked as not checked.
-        clearance: to keep [m].
+        torque: respect the torque limits, computed with the robot's nominal dynamics, if its description has both.
+        torque_margin: fraction of the torque limits to keep as reserve for what the nominal dynamics are wrong by.
+        collision: avoid collisions with the robot itself, the floor and the obstacles in the robot file; the whole
+            experiment is proved free. Without it, all files say that the motion was not checked.
+        clearance: minimum clearance of bodies and obstacles [m].
         surroundings: the floor, and boxes that the arm must not enter.
         space: limits in space, such as `ToolBox`, `PlaneLimit` and `SingularityLimit`, or one of one's own.
         motion: limits of position, velocity and acceleration of one's own, see `StateLimit`.
@@ -135,13 +161,17 @@ class LimitOptions:
     torque_margin: float = 0.1
     collision: bool = True
     clearance: float = 0.01
-    surroundings: Surroundings = field(default_factory=Surroundings)
+    surroundings: Surroundings = field(default_factory=_surroundings)
     space: Sequence[GeometricLimit] = ()
     motion: Sequence[StateLimit] = ()
     effects: Sequence[PlantEffect] = ()
-    payload: ArrayLike | None = None
+    payload: Annotated[ArrayLike | None, Option(hidden=True)] = None
 
     def __post_init__(self) -> None:
+        from oed.constraints import StateLimit
+        from oed.constraints.geometric import GeometricLimit
+        from robots.signal_checks import checked_body
+
         if self.velocity_fraction is not None and not 0 < self.velocity_fraction <= 1:
             raise InputError(f"the velocity fraction is {self.velocity_fraction}", allowed="above 0, up to 1")
         if self.payload is not None:
@@ -177,7 +207,7 @@ class LimitOptions:
             "space": [repr(limit) for limit in self.space],
             "motion": [repr(limit) for limit in self.motion],
             "effects": [asdict(effect) for effect in self.effects],
-            "payload": None if self.payload is None else np.asarray(self.payload, dtype=float).tolist(),
+            "payload": _numbers(self.payload),
         }
 
 
@@ -186,15 +216,16 @@ class WeightOptions:
     """How rows and columns of the regressor count, and what is known before.
 
     Attributes:
-        scaling: of the columns that the criterion judges: ``none``, ``nominal`` (each by the size its parameter has in
-            the robot's description) or ``unit`` (each to unit length).
-        noise: torque noise of each joint (n,) [N m or N]: rows count by one over it; all alike by default.
+        scaling: column scaling of the regressor in the criterion: none, nominal (each by the size its parameter has in
+            the robot's description) or unit (each to unit length).
+        noise: standard deviation of the torque noise of each joint (n,) [N m or N], comma-separated. Default: all
+            alike. Calibration: of the measurement [m], of poses also [rad].
         after: what an earlier identification knows: the design adds what that lacks.
         task: with criterion ``i``, the motion whose torques are to be predicted.
     """
 
     scaling: str = "none"
-    noise: ArrayLike | None = None
+    noise: Annotated[ArrayLike | None, Option(reads=numbers)] = None
     after: Prior | None = None
     task: Motion | None = None
 
@@ -202,20 +233,20 @@ class WeightOptions:
         """Writes them as plain data."""
         return {
             "scaling": self.scaling,
-            "noise": None if self.noise is None else np.asarray(self.noise, dtype=float).tolist(),
+            "noise": _numbers(self.noise),
             "after": self.after is not None,
         }
 
 
 @dataclass(frozen=True, kw_only=True)
 class SearchOptions:
-    """How long and where the search runs.
+    """How long and where the search runs. The effort may be counts of one's own.
 
     Attributes:
-        effort: ``quick``, ``standard``, ``thorough``, or counts of one's own.
-        seed: of everything random: the same seed gives the same design.
-        time_limit: for the search [s]; past it the best design so far is kept. Without it the same seed gives the same
-            design on a fast and on a slow machine.
+        effort: search effort: quick, standard or thorough. It counts local solutions: the same seed gives the same
+            design on a slow machine.
+        seed: seed of the random numbers.
+        time_limit: stop the search after this time [s] and keep the best design.
         keep_on_interrupt: on Ctrl-C during the search, end it and keep the best design so far; a second one ends all.
         solver: the local solver: `InteriorPoint` or `Ipopt`.
         workers: processes; as many as cores by default.
@@ -226,14 +257,16 @@ class SearchOptions:
     """
 
     effort: str | Effort = "standard"
-    seed: int = 0
-    time_limit: float = np.inf
-    keep_on_interrupt: bool = False
-    solver: Solver = field(default_factory=InteriorPoint)
-    workers: int | None = None
+    seed: Seed = 0
+    time_limit: float = math.inf
+    keep_on_interrupt: Annotated[bool, Option(hidden=True)] = False
+    solver: Solver = field(default_factory=_interior_point)
+    workers: Annotated[int | None, Option(hidden=True)] = None
     executor: Executor | None = None
 
     def __post_init__(self) -> None:
+        from oed.experiments.searches.search import EFFORTS, Effort
+
         if not isinstance(self.effort, Effort) and self.effort not in EFFORTS:
             raise InputError(f"effort {self.effort!r}", allowed=", ".join(EFFORTS))
         _whole("seed", self.seed, 0)
@@ -243,6 +276,8 @@ class SearchOptions:
     @property
     def counts(self) -> Effort:
         """The effort in counts."""
+        from oed.experiments.searches.search import EFFORTS, Effort
+
         return self.effort if isinstance(self.effort, Effort) else EFFORTS[self.effort]
 
     def settings(self) -> dict[str, Any]:
@@ -253,6 +288,12 @@ class SearchOptions:
             "time_limit": finite(self.time_limit),
             "solver": {"name": self.solver.name, **asdict(self.solver)},
         }
+
+
+def _numbers(values: ArrayLike | None) -> list[float] | None:
+    import numpy as np
+
+    return None if values is None else np.asarray(values, dtype=float).tolist()
 
 
 def _whole(name: str, value: int, least: int) -> None:

@@ -1,24 +1,8 @@
 """Trajectories as files."""
 
-from oed.exports.forms import FORMS as CONTROLLER_FORMS
-from oed.exports.forms import ExportOptions
-from oed.exports.trajectory_checks import check_trajectory, is_made_for
-from oed.exports.trajectory_csv import read_trajectory, write_trajectory
-from oed.exports.waypoints import read_waypoints, shorter_way
-from oed.exports.writing import export_trajectory
+from __future__ import annotations
 
-FORMS = ("csv", *CONTROLLER_FORMS)
-"""The forms in which a trajectory goes to a controller."""
+from robots.common.lazy import lazy_exports
 
-__all__ = [
-    "CONTROLLER_FORMS",
-    "FORMS",
-    "ExportOptions",
-    "check_trajectory",
-    "export_trajectory",
-    "is_made_for",
-    "read_trajectory",
-    "read_waypoints",
-    "shorter_way",
-    "write_trajectory",
-]
+# The stub beside this file says which module has which name.
+__getattr__, __dir__, __all__ = lazy_exports(__name__, __file__)

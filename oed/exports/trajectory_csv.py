@@ -6,6 +6,7 @@ import re
 import warnings
 from collections.abc import Mapping, Sequence
 from os import PathLike
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -252,3 +253,17 @@ def _check_derivatives(motion: Motion, table: Table) -> None:
                 row=table.line(row + 1),
                 allowed="the derivative, in rad or m, and s (degrees only if the comment block says so)",
             )
+
+
+def is_trajectory(path: Path) -> bool:
+    """Says whether a CSV has velocities and accelerations and nothing that was measured.
+
+    Args:
+        path: of the file.
+    """
+    if path.suffix.lower() != ".csv":
+        return False
+    with path.open(encoding="utf-8", errors="replace") as stream:
+        header = next((line for line in stream if not line.startswith("#")), "")
+    names = {word.strip().lower() for word in header.split(",")}
+    return {"t", "q1", "dq1", "ddq1"} <= names and not names & {"tau1", "i1", "temp1"}

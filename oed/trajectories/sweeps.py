@@ -20,14 +20,9 @@ from oed.trajectories.ramps import (
     stroke,
     whole_periods,
 )
+from oed.trajectories.stage_defaults import FRICTION_LEVELS, LONGEST_PLATEAU
 from robots.common.errors import InputError
 from robots.limits import Limits
-
-FRICTION_LEVELS = (0.05, 0.20, 0.40, 0.60, 0.80, 1.00)
-"""Speeds of the friction sweep as fractions of the velocity limit (thesis section 2.4)."""
-
-LONGEST_PLATEAU = 1.0
-"""Time at constant speed that is aimed at by default [s]."""
 
 SHORTEST_PLATEAU = 0.1
 """Time at constant speed that every level gets [s], 25 samples at 4 ms; in too short a range, speed gives way."""

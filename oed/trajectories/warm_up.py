@@ -10,11 +10,9 @@ from numpy.typing import ArrayLike
 from oed.trajectories.base import Array, Kinematics, Trajectory, count_periods, frozen
 from oed.trajectories.polynomial import PiecewisePolynomial
 from oed.trajectories.ramps import Profile, checked_pose, fill, joined, joint_bounds, stroke, used_range
+from oed.trajectories.stage_defaults import RANGE_FRACTION
 from robots.common.errors import InputError
 from robots.limits import Limits
-
-RANGE_FRACTION = 0.8
-"""Part of each joint's range that is driven (thesis section 2.4.1)."""
 
 BLOCK = 30.0
 """Default length of one move and the pause after it [s]: long against a stroke, short against the heating of a gear."""

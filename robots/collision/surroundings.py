@@ -52,6 +52,28 @@ class Surroundings:
         return {"floor": self.floor, "keep_out": boxes}
 
     @classmethod
+    def between(cls, floor: float | bool, corners: Sequence[Sequence[float]]) -> Surroundings:
+        """Makes surroundings of boxes that are stated by their corners.
+
+        Args:
+            floor: see `Surroundings`.
+            corners: of each box, from and to in x, y and z in the base frame [m].
+
+        Raises:
+            InputError: numbers that are not finite, or an empty box.
+        """
+        boxes = []
+        for number, sides in enumerate(corners, start=1):
+            low, high = np.array(sides[::2]), np.array(sides[1::2])
+            if not (np.isfinite(low) & np.isfinite(high) & (low < high)).all():
+                stated = ",".join(f"{side:g}" for side in sides)
+                raise InputError(f"--keep-out {stated}", allowed="finite numbers, each minimum below its maximum")
+            pose = np.eye(4)
+            pose[:3, 3] = (low + high) / 2.0
+            boxes.append(Box(name=f"keep-out {number}", size=high - low, pose=pose))
+        return cls(floor=floor, keep_out=tuple(boxes))
+
+    @classmethod
     def from_settings(cls, data: Mapping[str, Any]) -> Surroundings:
         """Reads what `settings` wrote; what older files do not state is the default."""
         boxes = [

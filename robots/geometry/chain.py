@@ -58,6 +58,20 @@ def homogeneous(rotation: ArrayLike, translation: ArrayLike) -> Array:
     return transform
 
 
+def pose_of(values: Sequence[float]) -> Array | None:
+    """Compose a pose from numbers.
+
+    Args:
+        values: position [m], or position and roll, pitch and yaw [m, rad].
+
+    Returns:
+        (4, 4); None for another number of values, or values that are not finite.
+    """
+    if len(values) not in (3, 6) or not np.isfinite(values).all():
+        return None
+    return homogeneous(rotation_from_rpy([*values[3:], 0.0, 0.0, 0.0][:3]), values[:3])
+
+
 def rotation_from_rpy(rpy: ArrayLike) -> Array:
     """Rotation of fixed-axis roll, pitch and yaw, ``R = Rz(yaw) Ry(pitch) Rx(roll)``, as URDF defines it.
 

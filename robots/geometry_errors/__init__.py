@@ -11,6 +11,7 @@ from robots.geometry_errors.measurements import (
     Planes,
     Points,
 )
+from robots.geometry_errors.measurements.named import measurement_of
 from robots.geometry_errors.model import GeometryModel, Prediction
 from robots.geometry_errors.poses import MeasuredPoses
 from robots.geometry_errors.reduction import Reduction, reduce_columns
@@ -35,6 +36,7 @@ __all__ = [
     "Prediction",
     "Reduction",
     "error_term",
+    "measurement_of",
     "random_positions",
     "reduce_columns",
     "simulate_poses",

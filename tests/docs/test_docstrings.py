@@ -22,7 +22,7 @@ PACKAGES = ("robots", "estimation", "oed")
 # Functions that rest on a published method.
 METHODS = (
     "robots.default_model", "robots.find_base_parameters", "estimation.bootstrap", "estimation.compare",
-    "estimation.diagnose", "estimation.fit_campaign", "estimation.fit_thermal", "estimation.identify",
+    "estimation.diagnose", "estimation.identify_thermal", "estimation.identify",
     "estimation.identify_drive_gains", "estimation.identify_payload", "oed.campaign", "oed.design", "oed.discriminate",
     "oed.retime",
 )  # fmt: skip

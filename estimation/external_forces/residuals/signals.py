@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from itertools import pairwise
-from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
+from estimation.external_forces.options import Velocity
 from estimation.external_forces.residuals.dynamics import Dynamics
 from estimation.external_forces.residuals.filters import external_torque, filtered, restarts, time_constant
 from estimation.external_forces.residuals.friction_levels import friction_excess
@@ -21,7 +21,6 @@ from robots.common.errors import InputError
 from robots.signals import Log
 
 Array = NDArray[np.float64]
-Velocity = Literal["smoothed", "logged"]
 
 # Time constants that a log must last.
 SHORTEST = 10.0

@@ -9,8 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from estimation.external_forces.localisation import Localiser
+from estimation.external_forces.options import Velocity
 from estimation.external_forces.residuals.filters import time_constant
-from estimation.external_forces.residuals.signals import SETTLING, Velocity
+from estimation.external_forces.residuals.signals import SETTLING
 from estimation.external_forces.thresholds.alarm_rates import AlarmThreshold
 from estimation.external_forces.thresholds.error_models import ErrorModel
 from estimation.external_forces.thresholds.rate_checks import RateCheck

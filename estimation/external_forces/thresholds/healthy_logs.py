@@ -9,10 +9,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from estimation.external_forces.localisation import fit_localiser
+from estimation.external_forces.options import Velocity
 from estimation.external_forces.residuals.filters import time_constant
 from estimation.external_forces.residuals.friction_levels import contact_weight
 from estimation.external_forces.residuals.repeats import first_visits
-from estimation.external_forces.residuals.signals import SETTLING, Signals, Velocity
+from estimation.external_forces.residuals.signals import SETTLING, Signals
 from estimation.external_forces.thresholds.alarm_rates import alarm_threshold
 from estimation.external_forces.thresholds.calibrations import Calibration
 from estimation.external_forces.thresholds.error_models import fit_error_model

@@ -1,5 +1,8 @@
 """How a benchmark is made: which cases it has, their logs, and the sealed truth."""
 
-from oed.benchmarks.making.making import MakeOptions, make_benchmark
+from __future__ import annotations
 
-__all__ = ["MakeOptions", "make_benchmark"]
+from robots.common.lazy import lazy_exports
+
+# The stub beside this file says which module has which name.
+__getattr__, __dir__, __all__ = lazy_exports(__name__, __file__)

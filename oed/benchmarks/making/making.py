@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 import secrets
 from collections.abc import Sequence
-from dataclasses import dataclass
 from functools import partial
 from os import PathLike
 from pathlib import Path
@@ -14,58 +13,16 @@ import numpy as np
 
 from oed.benchmarks.folders import FORMAT, MANIFEST, VERSION, Benchmark, default_sealed, read_benchmark
 from oed.benchmarks.making.drawing import DrawnCase, draw
+from oed.benchmarks.making.options import MakeOptions
 from oed.benchmarks.making.strata import tasks
 from oed.benchmarks.making.writing import write_case
 from oed.benchmarks.sealing import seal
 from oed.benchmarks.taxonomy import CLASSES, PARAMETERS, UNKNOWN
-from oed.benchmarks.truth.machines import KINDS
 from robots.common.errors import InputError
 from robots.common.files import ResultFolder, open_atomic, sha256
 from robots.common.parallel import parallel_map
 from robots.common.progress import Progress
 from robots.version import VERSION as TOOL
-
-SHORTEST = 10.0  # [s]: a shorter log determines no base model
-
-
-@dataclass(frozen=True, kw_only=True)
-class MakeOptions:
-    """What a benchmark holds.
-
-    Args:
-        cases: number of cases.
-        robots: kinds of robots, of ``ur10``, ``panda``, ``heavy`` and ``er3a``.
-        size: visible size of a single effect: RMS of what the base model cannot fit, over the joint's torque RMS. Two
-            effects have three times this size.
-        noise: RMS of the torque noise over each joint's torque RMS; half of its variance is coloured.
-        duration: of each log [s].
-        unseen: duration of each unseen motion [s].
-
-    Raises:
-        InputError: a number out of its range, or a robot that the plant does not have.
-    """
-
-    cases: int = 24
-    robots: Sequence[str] = KINDS
-    size: float = 0.01
-    noise: float = 0.025
-    duration: float = 60.0
-    unseen: float = 30.0
-
-    def __post_init__(self) -> None:
-        if self.cases < 1:
-            raise InputError(f"{self.cases} cases", allowed="1 or more")
-        for robot in self.robots or ("",):
-            if robot not in KINDS:
-                raise InputError(f"the plant has no robot {robot!r}", allowed=", ".join(KINDS))
-        for name, value, lower, upper in (
-            ("size", self.size, 1e-3, 0.2),
-            ("noise", self.noise, 1e-4, 0.5),
-            ("duration", self.duration, SHORTEST, 3600.0),
-            ("unseen", self.unseen, SHORTEST, 3600.0),
-        ):
-            if not lower <= value <= upper:
-                raise InputError(f"{name} {value:g}", allowed=f"{lower:g} to {upper:g}")
 
 
 def make_benchmark(

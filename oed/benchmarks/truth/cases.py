@@ -14,7 +14,8 @@ import numpy as np
 
 from oed.benchmarks.truth.dynamics import Projection, base_regressor
 from oed.benchmarks.truth.effects import KNOWN, STRANGERS, Effect
-from oed.benchmarks.truth.machines import KINDS, Machine, draw_machine
+from oed.benchmarks.truth.kinds import KINDS
+from oed.benchmarks.truth.machines import Machine, draw_machine
 from oed.benchmarks.truth.noise import Noise, draw_noise
 from oed.benchmarks.truth.plant import Record, open_loop, parts_links, play, projection_of
 from oed.benchmarks.truth.references import Reference, draw_aperiodic, draw_moves, draw_periodic

@@ -9,7 +9,6 @@ import numpy as np
 import pinocchio as pin
 
 CATALOG = Path(__file__).parents[3] / "robots" / "catalog"
-KINDS = ("ur10", "panda", "heavy", "er3a")
 CAD_ERROR = 0.08  # largest relative error of described masses, centres of mass and second moments
 DRIVE_ERROR = 0.15  # largest relative error of described rotor inertias
 PANDA_HAND = ("panda_finger_joint1", "panda_finger_joint2")

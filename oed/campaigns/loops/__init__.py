@@ -1,7 +1,8 @@
 """Design, play, identify, diagnose, and the next experiment, until nothing is ambiguous."""
 
-from oed.campaigns.loops.options import LoopOptions
-from oed.campaigns.loops.result import LoopResult
-from oed.campaigns.loops.running import run_loop
+from __future__ import annotations
 
-__all__ = ["LoopOptions", "LoopResult", "run_loop"]
+from robots.common.lazy import lazy_exports
+
+# The stub beside this file says which module has which name.
+__getattr__, __dir__, __all__ = lazy_exports(__name__, __file__)

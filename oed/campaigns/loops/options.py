@@ -3,11 +3,20 @@
 from __future__ import annotations
 
 from dataclasses import asdict, dataclass, field
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from robots.collision import CollisionModel, Surroundings
 from robots.common.errors import InputError
-from robots.robot import Robot
+from robots.common.options import Seed
+
+if TYPE_CHECKING:
+    from robots.collision import CollisionModel, Surroundings
+    from robots.robot import Robot
+
+
+def _usual_surroundings() -> Surroundings:
+    from robots.collision import Surroundings
+
+    return Surroundings()
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -15,15 +24,18 @@ class LoopOptions:
     """What the loop does.
 
     Attributes:
-        experiments: how many experiments are made at most, the first one included.
-        least_probability: a proposed experiment that separates the causes with a lower probability is not made.
-        longest: repetitions beyond this time of an experiment, rests included, are left to the next one [s].
-        friction: of the base model: ``auto``, ``polynomial`` or ``coulomb-viscous``.
-        velocity_fraction: share of the velocity limits to use; by default see `LimitOptions`.
-        effort: of the design's search.
-        collision: whether the design avoids collisions, and motions are checked for them.
+        experiments: number of experiments at most, the first one included.
+        least_probability: an experiment that separates the causes with less probability is not made.
+        longest: repetitions beyond this time of an experiment are left to the next one [s].
+        friction: friction model: auto (bends within the recorded speeds, grows linearly beyond), polynomial
+            (four coefficients a joint) or coulomb-viscous (two).
+        velocity_fraction: fraction of the velocity limits to use. Default: 1 for robots of the catalogue, 0.5 for
+            others, whose first motion should be slower.
+        effort: effort of the design: quick, standard or thorough.
+        collision: avoid collisions with the robot itself, the floor and the obstacles in the robot file. Without it,
+            all files say that the motion was not checked.
         surroundings: the floor, and boxes that the arm must not enter.
-        seed: of everything random.
+        seed: seed of the random numbers.
     """
 
     experiments: int = 4
@@ -33,8 +45,8 @@ class LoopOptions:
     velocity_fraction: float | None = None
     effort: str = "standard"
     collision: bool = True
-    surroundings: Surroundings = field(default_factory=Surroundings)
-    seed: int = 0
+    surroundings: Surroundings = field(default_factory=_usual_surroundings)
+    seed: Seed = 0
 
     def __post_init__(self) -> None:
         """Checks the numbers.

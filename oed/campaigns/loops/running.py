@@ -69,7 +69,7 @@ def run_loop(
         design: folder of an `oed design` result for the first experiment; by default one is designed.
         options: budget, model and seed.
         stream_options: how trajectories are sent.
-        speed: how many times faster than real time the controller plays, for controllers to test against.
+        speed: factor on real time, for a controller to test against.
         workers: processes of the design.
         executor: runs the design's searches instead.
         force: begin again, and remove what an earlier loop left in the folder.

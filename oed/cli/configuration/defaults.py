@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Collection, Mapping
+from contextvars import ContextVar
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -13,7 +14,7 @@ from robots.common.errors import InputError
 
 if TYPE_CHECKING:
     from oed.cli.configuration.file import Configuration
-    from oed.cli.configuration.options import Option
+    from oed.cli.verbs import Verb
 
 HELP_TEXT = (
     "Configuration file with defaults of options; none reads no file. Default: the file that OED_CONFIG names, or "
@@ -22,20 +23,22 @@ HELP_TEXT = (
 REPORTS_PROBLEMS = "doctor"
 """The command that runs in spite of a wrong file, to say what is wrong."""
 
-FILE, PROBLEM, LEFT_OUT = "oed.configuration", "oed.configuration.problem", "oed.configuration.left_out"
+
+_READ: ContextVar[tuple[Configuration | None, InputError | None]] = ContextVar("read", default=(None, None))
+"""The file of the running command, or what is wrong with it."""
 
 
-def config_parameter(functions: Mapping[str, Callable[..., None]]) -> Any:
+def config_parameter(verbs: Mapping[str, type[Verb]]) -> Any:
     """Makes the parser's ``--config``; reading it sets the command's defaults.
 
     Args:
-        functions: all commands by name.
+        verbs: the options classes of all commands by name.
     """
 
     def load(context: typer.Context, value: str | None) -> str | None:
         if not context.resilient_parsing:
             given = value if value is not None else context.find_root().params.get("config")
-            _load(context, given, functions)
+            _load(context, given, verbs)
         return value
 
     alone = typer.Typer(add_completion=False, rich_markup_mode=None)
@@ -57,71 +60,47 @@ def config_parameter(functions: Mapping[str, Callable[..., None]]) -> Any:
     return get_command(alone).params[0]
 
 
-def _load(context: Any, given: str | None, functions: Mapping[str, Callable[..., None]]) -> None:
+def _load(context: Any, given: str | None, verbs: Mapping[str, type[Verb]]) -> None:
     from oed.cli.configuration.file import find, read
 
     found, name = find(given), str(context.command.name)
-    if found is None or name not in functions:
+    _READ.set((None, None))
+    if found is None or name not in verbs:
         return
     try:
-        configuration = read(*found, functions)
+        configuration = read(*found, verbs)
         values = configuration.of(name)
     except InputError as error:
         if name != REPORTS_PROBLEMS:
             raise
-        context.meta[PROBLEM] = error
+        _READ.set((None, error))
         return
-    context.meta[FILE] = configuration
-    left_out = context.meta.get(LEFT_OUT, ())
-    context.default_map = {
-        option.parameter: value for option, value in values.items() if option.parameter not in left_out
-    }
+    _READ.set((configuration, None))
+    context.default_map = {option.field: value for option, value in values.items()}
 
 
-def is_from_file(context: Any, parameter: str) -> bool:
-    """Whether the file gives the value of a parameter.
+def described(command: str, fields: Collection[str]) -> tuple[Path | None, list[str]]:
+    """Writes the options that come from the file as the words of a command line.
 
     Args:
-        context: of the command, its words parsed.
-        parameter: the name in Python.
+        command: its name.
+        fields: of the options.
+
+    Returns:
+        The file and the words.
     """
-    source = context.get_parameter_source(parameter)
-    return source is not None and source.name == "DEFAULT_MAP"
+    configuration, _ = _READ.get()
+    if configuration is None or not fields:
+        return None, []
+    from oed.cli.configuration.values import words_of
+
+    values = {option: value for option, value in configuration.of(command).items() if option.field in fields}
+    return configuration.path, [word for option, value in values.items() for word in words_of(option, value)]
 
 
-def used_options(context: Any) -> dict[Option, Any]:
-    """Lists the options whose values come from the file.
-
-    Args:
-        context: of the command, its words parsed.
-    """
-    configuration: Configuration | None = context.meta.get(FILE)
-    if configuration is None or not context.default_map:
-        return {}
-    return {
-        option: value
-        for option, value in configuration.of(str(context.command.name)).items()
-        if is_from_file(context, option.parameter) and option.parameter in context.default_map
-    }
-
-
-def described(options: Mapping[Option, Any]) -> list[str]:
-    """Writes options as the words of a command line.
-
-    Args:
-        options: with their values.
-    """
-    return [word for option, value in options.items() for word in option.words(value)]
-
-
-def configuration_state(context: Any) -> dict[str, Any]:
-    """Says which file was found, what named it, what it sets, and what is wrong with it.
-
-    Args:
-        context: of a command.
-    """
-    configuration: Configuration | None = context.meta.get(FILE)
-    problem: InputError | None = context.meta.get(PROBLEM)
+def configuration_state() -> dict[str, Any]:
+    """Says which file was found, what named it, what it sets, and what is wrong with it."""
+    configuration, problem = _READ.get()
     if configuration is None:
         file = None if problem is None else problem.file
         return {"file": file, "origin": None, "keys": [], "problem": None if problem is None else str(problem)}

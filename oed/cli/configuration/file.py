@@ -4,14 +4,15 @@ from __future__ import annotations
 
 import os
 import tomllib
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
-from functools import cached_property
 from pathlib import Path
 from typing import Any
 
-from oed.cli.configuration.options import Option, WrongValueError, options_of
-from oed.cli.help.usage_errors import nearest_name
+from oed.cli.configuration.values import WrongValueError, typed_value
+from oed.cli.declarations.declared import Declared, declared_options
+from oed.cli.usage_errors import nearest_name
+from oed.cli.verbs import Verb
 from robots.common.errors import InputError
 from robots.common.files import existing_file
 
@@ -31,32 +32,26 @@ class Configuration:
     Attributes:
         path: the file.
         origin: what named it: ``--config``, ``OED_CONFIG`` or ``working directory``.
-        functions: all commands by name.
+        verbs: the options classes of all commands by name.
         shared: values of the top level by the options' names.
         tables: values of one command, by its name and the options' names.
     """
 
     path: Path
     origin: str
-    functions: Mapping[str, Callable[..., None]]
+    verbs: Mapping[str, type[Verb]]
     shared: Mapping[str, Any]
     tables: Mapping[str, Mapping[str, Any]]
 
-    @cached_property
-    def options(self) -> dict[str, dict[str, Option]]:
-        """Options of all commands, by the command's and the option's name."""
-        return {name: options_of(function) for name, function in self.functions.items()}
-
-    def of(self, command: str) -> dict[Option, Any]:
+    def of(self, command: str) -> dict[Declared, Any]:
         """Gives the values for one command.
 
         Raises:
             InputError: a key of the top level whose value this command does not take.
         """
-        options = self.options[command]
         own = self.tables.get(command, {})
         values = {}
-        for name, option in options.items():
+        for name, option in named_options(self.verbs[command]).items():
             if name in own:
                 values[option] = self._value(option, own[name], f"{command}.{name}")
             elif name in self.shared:
@@ -70,28 +65,34 @@ class Configuration:
         Raises:
             InputError: a key that is no option, or a value that no command takes.
         """
-        everywhere = {name for options in self.options.values() for name in options}
         for key, found in self.shared.items():
-            if key not in everywhere:
-                if isinstance(found, dict):
-                    raise self._unknown("there is no such command", key, key, self.options)
-                raise self._unknown("no command has this option", key, key, everywhere)
-            options = [own[key] for own in self.options.values() if key in own]
-            if not any(_takes(option, found) for option in options):
-                self._value(options[0], found, key)
+            if not self._is_taken(key, found):
+                self._refuse(key, found)
         for command, table in self.tables.items():
-            if command not in self.options:
-                raise self._unknown("there is no such command", f"{TABLES}.{command}", command, self.options)
+            if command not in self.verbs:
+                raise self._unknown("there is no such command", f"{TABLES}.{command}", command, self.verbs)
+            known = named_options(self.verbs[command])
             for key, found in table.items():
-                if key not in self.options[command]:
-                    raise self._unknown(
-                        f"oed {command} has no such option", f"{command}.{key}", key, self.options[command]
-                    )
-                self._value(self.options[command][key], found, f"{command}.{key}")
+                if key not in known:
+                    raise self._unknown(f"oed {command} has no such option", f"{command}.{key}", key, known)
+                self._value(known[key], found, f"{command}.{key}")
 
-    def _value(self, option: Option, found: Any, key: str, remedy: str | None = None) -> Any:
+    def _is_taken(self, key: str, found: Any) -> bool:
+        """Whether a command takes a value; they are looked at one after the other, for it takes time to load them."""
+        options = (named_options(self.verbs[name]).get(key) for name in self.verbs)
+        return any(option is not None and _takes(option, found) for option in options)
+
+    def _refuse(self, key: str, found: Any) -> None:
+        options = {name: option for verb in self.verbs.values() for name, option in named_options(verb).items()}
+        if key in options:
+            self._value(options[key], found, key)
+        if isinstance(found, dict):
+            raise self._unknown("there is no such command", key, key, self.verbs)
+        raise self._unknown("no command has this option", key, key, options)
+
+    def _value(self, option: Declared, found: Any, key: str, remedy: str | None = None) -> Any:
         try:
-            return option.value(found, self.path.parent)
+            return typed_value(option, found, self.path.parent)
         except WrongValueError as error:
             shown = "a table" if isinstance(found, dict) else repr(found)
             raise InputError(f"key {key}: found {shown}", file=self.path, allowed=str(error), remedy=remedy) from None
@@ -100,6 +101,15 @@ class Configuration:
         close = nearest_name(key, sorted(known))
         remedy = f"did you mean {close}?" if close else "`oed COMMAND --help` lists the options"
         return InputError(f"key {path}: {problem}", file=self.path, remedy=remedy)
+
+
+def named_options(verb: type[Verb]) -> dict[str, Declared]:
+    """Lists the options of a command as a file has them, by name.
+
+    Args:
+        verb: its options class.
+    """
+    return {option.name: option for option in declared_options(verb).values() if not option.how.argument}
 
 
 def find(given: str | None) -> tuple[Path, str] | None:
@@ -119,13 +129,13 @@ def find(given: str | None) -> tuple[Path, str] | None:
     return (Path(NAME), "working directory") if Path(NAME).exists() else None
 
 
-def read(path: Path, origin: str, functions: Mapping[str, Callable[..., None]]) -> Configuration:
+def read(path: Path, origin: str, verbs: Mapping[str, type[Verb]]) -> Configuration:
     """Reads and checks a configuration file.
 
     Args:
         path: the file.
         origin: what named it.
-        functions: all commands by name.
+        verbs: the options classes of all commands by name.
 
     Raises:
         InputError: a missing file, broken TOML, or a wrong key or value.
@@ -144,10 +154,10 @@ def read(path: Path, origin: str, functions: Mapping[str, Callable[..., None]]) 
     nested = data.pop(TABLES, {})
     if not isinstance(nested, dict) or not all(isinstance(table, dict) for table in nested.values()):
         raise InputError(f"key {TABLES}: found a value", file=path, allowed=f"tables such as [{TABLES}.identify]")
-    tables = {key: data.pop(key) for key in list(data) if key in functions and isinstance(data[key], dict)}
+    tables = {key: data.pop(key) for key in list(data) if key in verbs and isinstance(data[key], dict)}
     for key, table in nested.items():
         tables[key] = {**tables.get(key, {}), **table}
-    found = Configuration(path=path, origin=origin, functions=functions, shared=data, tables=tables)
+    found = Configuration(path=path, origin=origin, verbs=verbs, shared=data, tables=tables)
     found.check()
     return found
 
@@ -156,9 +166,9 @@ def _clashes(error: Exception) -> bool:
     return any(word in str(error) for word in ("overwrite", "twice", "immutable", "mutate"))
 
 
-def _takes(option: Option, found: Any) -> bool:
+def _takes(option: Declared, found: Any) -> bool:
     try:
-        option.value(found, Path())
+        typed_value(option, found, Path())
     except WrongValueError:
         return False
     return True

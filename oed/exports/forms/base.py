@@ -4,43 +4,17 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
-from dataclasses import dataclass
 from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
+from oed.exports.options import ExportOptions
 from robots.common.errors import InputError
 from robots.robot import Robot
 from robots.signals import Motion
 
 Array = NDArray[np.float64]
-
-
-@dataclass(frozen=True, kw_only=True)
-class ExportOptions:
-    """Choices that several forms share.
-
-    Attributes:
-        start_tolerance: of a guard on the start pose [rad or m].
-        name: of the program or module.
-        remark: a line for the people who open the file, where the form has comments.
-    """
-
-    start_tolerance: float = 0.01
-    name: str = "trajectory"
-    remark: str = ""
-
-    def __post_init__(self) -> None:
-        """Checks the choices.
-
-        Raises:
-            InputError: a tolerance that is not positive, or a name that is no identifier.
-        """
-        if not self.start_tolerance > 0:
-            raise InputError(f"a start tolerance of {self.start_tolerance}", allowed="above 0 [rad or m]")
-        if not (self.name.isascii() and self.name.isidentifier()):
-            raise InputError(f"the name {self.name!r}", allowed="ASCII letters, digits and _, not a digit first")
 
 
 class Form(ABC):

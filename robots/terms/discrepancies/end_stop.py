@@ -7,9 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from robots.common.columns import side_by_side
 from robots.robot import Robot
 from robots.terms.base import force_unit, length_unit
+from robots.terms.columns import side_by_side
 from robots.terms.discrepancies.local_fault import Placed
 from robots.terms.effects import Coefficient, Shape, Situation
 

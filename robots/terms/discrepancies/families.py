@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.signal import lfilter
 
-from robots.common.columns import side_by_side
 from robots.common.stretches import spans
+from robots.terms.columns import side_by_side
 from robots.terms.discrepancies.gain_drift import half_waves, log_time
 from robots.terms.discrepancies.resonance import resonance
 from robots.terms.effect_bases.states import bristle

@@ -7,9 +7,9 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from robots.common.columns import side_by_side
 from robots.common.plain import percent
 from robots.robot import Robot
+from robots.terms.columns import side_by_side
 from robots.terms.effect_bases.capabilities import Persistence
 from robots.terms.effects import Coefficient, Effect, Situation
 

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from robots.common.columns import side_by_side
 from robots.terms.base import force_unit, length_unit
+from robots.terms.columns import side_by_side
 from robots.terms.effect_bases.base import Coefficient, Place, Shape, Situation
 from robots.terms.effect_bases.heat import HeatEffect
 from robots.terms.effect_bases.states import relaxation

@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from estimation.external_forces import Calibration, estimate_forces
+from estimation.external_forces import Calibration, ForceOptions, estimate_forces
 from robots.common.errors import InputError, NotIdentifiableError
 from robots.terms.situations.flange_body import point_mass
 
@@ -139,10 +139,10 @@ def test_level_of_friction_is_followed(exact, healthy, pushed_log, limb):
 
 def test_logged_velocities_serve_as_well(exact, healthy, touched):
     """With the log's own velocities the pushes are the same; a log without any is refused with the columns' names."""
-    found = estimate_forces(exact, touched, healthy=[healthy], velocity="logged")
+    found = estimate_forces(exact, touched, healthy=[healthy], options=ForceOptions(velocity="logged"))
     assert [round(contact.start) for contact in found.contacts] == [8, 14]
     with pytest.raises(InputError, match=r"no velocities.*dq1"):
-        estimate_forces(exact, replace(touched, dq=None), healthy=[healthy], velocity="logged")
+        estimate_forces(exact, replace(touched, dq=None), healthy=[healthy], options=ForceOptions(velocity="logged"))
 
 
 def test_known_payload_is_no_contact(exact, healthy, pushed_log, twin_of, limb):
@@ -177,7 +177,7 @@ def test_training_log_is_named_where_it_serves_as_healthy(exact, healthy, touche
 def test_bad_options_are_named(exact, touched, options, words):
     """One message each."""
     with pytest.raises(InputError, match=words):
-        estimate_forces(exact, touched, **options)
+        estimate_forces(exact, touched, options=ForceOptions(**options))
 
 
 def test_bad_logs_are_named(exact, touched, arm_log, pushed_log):

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from estimation.external_forces import estimate_forces
+from estimation.external_forces import ForceOptions, estimate_forces
 from robots import load_robot
 from robots.signals import Log
 
@@ -85,7 +85,9 @@ def test_force_of_mujoco_is_found(arm, velocity):
     tip = np.asarray(robot.chain.tip)
     tool = tip[:3, :3].T @ (POINT - tip[:3, 3])
     healthy = play(1, 25.0, 0 * FORCE)
-    found = estimate_forces(model, play(2, 12.0, FORCE), healthy=[healthy], tool=tool, velocity=velocity)
+    found = estimate_forces(
+        model, play(2, 12.0, FORCE), healthy=[healthy], options=ForceOptions(tool=tool, velocity=velocity)
+    )
     assert len(found.contacts) == 1
     contact = found.contacts[0]
     assert contact.start == pytest.approx(AT, abs=0.02)

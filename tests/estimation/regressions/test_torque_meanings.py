@@ -8,7 +8,7 @@ import pytest
 
 from estimation import identify, predict
 from estimation.regressions.torque_meanings import as_joint_torque, with_torque_constants
-from oed.cli.set_up import with_torque_meaning
+from oed.cli.options.logs import TorqueMeaning
 from robots.common.errors import AssumedValueWarning, InputError
 from robots.loading import load_robot
 from robots.plants import nominal_plant, simulate
@@ -69,7 +69,7 @@ def test_a_payload_is_not_taken_for_a_constant(robot):
     loaded, free = currents(robot, 1, 0.5), currents(robot, 1)
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", AssumedValueWarning)
-        known, logs = with_torque_meaning(robot, [loaded, free], None, without=[free])
+        known, logs = TorqueMeaning().as_joint_torque(robot, [loaded, free], without=[free])
         alone = with_torque_constants(robot, [loaded])
     np.testing.assert_allclose(known.torque_constant, CONSTANTS, rtol=0.05)
     np.testing.assert_array_equal(logs[0].tau, loaded.tau * known.torque_constant)

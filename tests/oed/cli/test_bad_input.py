@@ -119,7 +119,7 @@ def test_usage(arguments: tuple, run, tmp_path: Path, monkeypatch: pytest.Monkey
     ("arguments", "answer"),
     [
         (("identfy", "--robot", "er3a"), "no command identfy; did you mean identify?; see `oed --help`"),
-        (("dance",), "no command dance; allowed: design, "),
+        (("dance",), "no command dance; allowed: example, robots, "),
         (("identify", "--robbot", "er3a"), "no option --robbot; did you mean --robot?; see `oed identify --help`"),
         (("identify", "--lgo", "x"), "no option --lgo; did you mean --log?"),
         (("predict", "--model", "x", "--xyz"), "no option --xyz; see `oed predict --help`"),

@@ -63,7 +63,7 @@ def test_not_beside_workers(run, robot, tmp_path: Path, monkeypatch) -> None:
     """Processes and a cluster exclude each other on a command line; what is typed takes the place of the file's."""
     done = run("design", "--robot", robot, "--workers", 2, "--cluster", "tcp://127.0.0.1:1", "--out", tmp_path / "out")
     assert done.code == 2
-    assert "--workers together with --cluster" in done.err
+    assert "--workers and --cluster together" in done.err
     asked = []
     monkeypatch.setattr(clusters, "cluster", lambda address: asked.append(address) or pytest.fail("asked"))
     settings = tmp_path / "oed.toml"

@@ -13,26 +13,22 @@ from oed.cli.command import Command
 
 
 def _parsed(words: list[str], argument: bool = False) -> list[Any]:
-    """What a command with a list, a value and a flag, and possibly an argument, is called with."""
-    got: list[Any] = []
+    """What a command with a list, a value and a flag, and possibly an argument, makes of its words."""
     app = typer.Typer()
-    app.callback()(lambda: None)
 
     def plain(
         log: Annotated[list[Path] | None, typer.Option("--log", "-l")] = None,
         out: Annotated[Path, typer.Option("--out")] = Path("x"),
         flag: Annotated[bool, typer.Option("--flag")] = False,
-    ) -> None:
-        got.extend([log, out, flag])
+    ) -> None: ...
 
     def named(
         where: Annotated[Path, typer.Argument()], log: Annotated[list[Path] | None, typer.Option()] = None
-    ) -> None:
-        got.extend([where, log])
+    ) -> None: ...
 
     app.command("do", cls=Command)(named if argument else plain)
-    app(["do", *words], standalone_mode=False)
-    return got
+    params = typer.main.get_command(app).make_context("do", words).params
+    return [params[name] for name in (("where", "log") if argument else ("log", "out", "flag"))]
 
 
 @pytest.mark.parametrize(

@@ -113,7 +113,7 @@ def test_interrupted(command: str, run, arguments, tmp_path: Path, monkeypatch: 
     places = {
         "design": "oed.reports.save_design_report",
         "retime": "oed.reports.save_retime_report",
-        "export": "oed.exports.write_trajectory",
+        "export": "oed.exports.writing.write_trajectory",
         "simulate": "estimation.logs.write_log",
         "identify": "oed.reports.save_estimate_report",
         "predict": "estimation.predictions.prediction.Prediction.save",

@@ -12,8 +12,10 @@ from typing import Any
 import pytest
 import typer
 
-from oed.cli.app import FUNCTIONS, app
-from oed.cli.configuration.options import options_of
+from oed.cli.app import VERBS, app
+from oed.cli.configuration.file import named_options
+from oed.cli.declarations.chosen import chosen
+from oed.cli.declarations.declared import declared_options
 
 PROGRAM = typer.main.get_command(app)
 
@@ -29,11 +31,16 @@ def cell(tmp_path: Path, robot: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return folder
 
 
-def _values(command: str, *words: str) -> dict[str, Any]:
-    """What a command would be called with."""
+def _context(command: str, *words: str) -> Any:
+    """A command's words, parsed."""
     root = PROGRAM.make_context("oed", [command, *words])
     with root:
-        return dict(PROGRAM.commands[command].make_context(command, list(words), parent=root).params)
+        return PROGRAM.commands[command].make_context(command, list(words), parent=root)
+
+
+def _values(command: str, *words: str) -> dict[str, Any]:
+    """What was typed of each option, or is in the file."""
+    return dict(_context(command, *words).params)
 
 
 def test_top_table_and_command_line(cell: Path) -> None:
@@ -188,22 +195,24 @@ def test_defaults_that_do_not_apply_are_left_out(cell: Path, words: str, unused:
         "trajectory = 't.csv'\nhealthy = 'h.csv'\n[design]\ncriterion = 'a'\nessential = 0.1\n"
     )
     command, *rest = shlex.split(words)
-    defaults = {parameter.name: parameter for parameter in PROGRAM.commands[command].params}
-    values = _values(command, *rest)
-    assert all((values[name] or None) == (defaults[name].default or None) for name in unused)
-    assert all((values[name] or None) != (defaults[name].default or None) for name in used)
+    context = _context(command, *rest)
+    verb, filed = chosen(VERBS[command], context)
+    assert unused <= set(context.default_map) - filed
+    assert used <= filed
+    options = declared_options(type(verb))
+    own = {name: getattr(verb, name) for name in unused if hasattr(verb, name)}
+    assert all(value == options[name].value(options[name].default) for name, value in own.items())
 
 
-def test_signatures_give_the_options_of_the_parsers() -> None:
+def test_declarations_give_the_options_of_the_parsers() -> None:
     """Each option of each command may stand in the file, under the name that is typed."""
-    for function in FUNCTIONS:
-        command = PROGRAM.commands[function.__name__.replace("_", "-")]
+    for name, verb in VERBS.items():
         parsed = {
             (p.opts[0].lstrip("-"), p.name, p.multiple, (p.secondary_opts or [""])[0].lstrip("-"))
-            for p in command.params
+            for p in PROGRAM.commands[name].params
             if p.param_type_name == "option" and p.name != "config"
         }
-        read = {(o.name, o.parameter, o.several, o.negative or "") for o in options_of(function).values()}
+        read = {(o.name, o.field, o.several, o.negative or "") for o in named_options(verb).values()}
         assert read == parsed
 
 

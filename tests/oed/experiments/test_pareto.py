@@ -11,7 +11,7 @@ import pytest
 
 import oed
 from oed.experiments import Design, Effort, ParetoFront
-from oed.experiments.pareto import lattice
+from oed.experiments.pareto_fronts import lattice
 from oed.reports import Page
 from oed.reports.pages.pareto_report import pareto_page
 from robots.common.errors import InputError

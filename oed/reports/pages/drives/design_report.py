@@ -15,9 +15,9 @@ SHOWN = 3000
 """Samples of a curve at most."""
 
 
-def save_drive_design_report(design: DriveDesign, folder: ResultFolder) -> None:
+def save_drive_design_report(design: DriveDesign, folder: ResultFolder, *, png: bool = False) -> None:
     """Writes the page of a designed motion for drives."""
-    save_page(drive_design_page(design), folder)
+    save_page(drive_design_page(design), folder, png=png)
 
 
 def drive_design_page(design: DriveDesign) -> Page:

@@ -10,7 +10,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from estimation.external_forces import ForceObserver, estimate_forces
+from estimation.external_forces import ForceObserver, ForceOptions, estimate_forces
 from estimation.external_forces.online.c_export import export_observer, observer_code
 from estimation.models.extension import Extension
 from robots.common.errors import InputError
@@ -35,7 +35,9 @@ def touched(pushed_log):
 
 @pytest.fixture(scope="module")
 def found(banded, pushed_log, touched):
-    return estimate_forces(banded, touched, healthy=[pushed_log(11, duration=60.0)], velocity="logged")
+    return estimate_forces(
+        banded, touched, healthy=[pushed_log(11, duration=60.0)], options=ForceOptions(velocity="logged")
+    )
 
 
 @pytest.fixture(scope="module")

@@ -20,7 +20,8 @@ from oed.benchmarks.truth.effects.strangers import CrossWave
 from oed.benchmarks.truth.effects.surroundings import Payload
 from oed.benchmarks.truth.effects.transmission import Backlash, Balancer, Elastic
 from oed.benchmarks.truth.experiments import KnownChange, Stage
-from oed.benchmarks.truth.machines import KINDS, draw_machine
+from oed.benchmarks.truth.kinds import KINDS
+from oed.benchmarks.truth.machines import draw_machine
 from oed.benchmarks.truth.oracle import ask_oracle
 from oed.benchmarks.truth.plant import measure, open_loop
 from oed.benchmarks.truth.references import draw_aperiodic, draw_moves, draw_periodic

@@ -15,7 +15,10 @@ import pytest
         (("make", "FOLDER", "others"), "others beside `oed benchmark make`"),
         (("make", "FOLDER", "--robots", "kuka"), "the plant has no robot 'kuka'"),
         (("answer", "FOLDER"), "no method; allowed: oed, residual-fit, threshold"),
-        (("answer", "FOLDER", "--by", "oed", "--answers", "x"), "blind cases are answered without them"),
+        (
+            ("answer", "FOLDER", "--by", "oed", "--answers", "x"),
+            "--answers beside `oed benchmark answer`; it belongs to make",
+        ),
         (("answer", "FOLDER", "--by", "oed"), "is no benchmark: it has no benchmark.json"),
         (("score", "FOLDER"), "no answers to score"),
         (("score", "FOLDER", "others", "--cases", "3"), "--cases beside `oed benchmark score`; it belongs to make"),

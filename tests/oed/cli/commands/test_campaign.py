@@ -124,7 +124,7 @@ def test_simulate_plays_one_thing(run: Callable[..., Any], robot: Path, planned:
     line = ("simulate", "--robot", robot, "--trajectory", planned / "friction.csv", "--campaign", planned)
     done = run(*line)
     assert done.code == 2
-    assert "either --trajectory or --campaign" in " ".join(done.err.split())
+    assert "--trajectory and --campaign together" in " ".join(done.err.split())
 
 
 @pytest.mark.slow

@@ -138,7 +138,7 @@ def test_a_model_takes_the_place_of_a_plant(run, done: Path, logs: Path, experim
     line = ("simulate", "--trajectory", experiment / "trajectory.csv", "--model", done / "model.json")
     both = run(*line, "--plant", logs / "plant.yaml", "--out", tmp_path / "log.csv")
     assert both.code == 2
-    assert "--model takes the place of --plant" in " ".join(both.err.split())
+    assert "--plant and --model together" in " ".join(both.err.split())
     assert not (tmp_path / "log.csv").exists()
 
 

@@ -10,8 +10,8 @@ from pathlib import Path
 
 import pytest
 
-from oed.cli.first_steps import installation
-from oed.cli.first_steps.example_files import FILES, next_commands, write_example
+from oed import installation
+from oed.examples.files import FILES, next_commands, write_example
 from robots.common.errors import InputError
 from robots.terms.effects import EFFECTS, EXPERIMENTS
 

@@ -1,0 +1,25 @@
+"""Thermal friction models fitted to logs."""
+
+from estimation.thermal.campaign_fit import fit_campaign as fit_campaign
+from estimation.thermal.history import start_temperatures as start_temperatures
+from estimation.thermal.identification import ThermalIdentification as ThermalIdentification
+from estimation.thermal.identification import identify_thermal as identify_thermal
+from estimation.thermal.model_choice import choose_thermal as choose_thermal
+from estimation.thermal.model_choice import predict_run as predict_run
+from estimation.thermal.options import ThermalOptions as ThermalOptions
+from estimation.thermal.results.campaign_estimate import CampaignEstimate as CampaignEstimate
+from estimation.thermal.results.choice import ThermalChoice as ThermalChoice
+from estimation.thermal.results.derived import Quantity as Quantity
+from estimation.thermal.results.estimate import RunFit as RunFit
+from estimation.thermal.results.estimate import ThermalEstimate as ThermalEstimate
+from estimation.thermal.results.estimate import load_thermal_model as load_thermal_model
+from estimation.thermal.runs.extraction import friction_signal as friction_signal
+from estimation.thermal.runs.extraction import thermal_runs as thermal_runs
+from estimation.thermal.runs.single_axis import SingleAxis as SingleAxis
+from estimation.thermal.runs.single_axis import Sweep as Sweep
+from estimation.thermal.runs.single_axis import fit_single_axis as fit_single_axis
+from estimation.thermal.runs.single_axis import sweep_friction as sweep_friction
+from estimation.thermal.runs.thermal_run import ThermalRun as ThermalRun
+from estimation.thermal.thermal_fit import fit_thermal as fit_thermal
+from estimation.thermal.torque import ThermalTorqueModel as ThermalTorqueModel
+from estimation.thermal.torque import thermal_from_dict as thermal_from_dict

@@ -1,0 +1,1 @@
+"""Commands that play experiments, on a controller or a virtual robot."""

@@ -1,0 +1,1 @@
+"""Commands that plan experiments, and show them."""

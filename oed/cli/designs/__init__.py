@@ -1,1 +1,0 @@
-"""What `oed design` does beside its usual design: payloads, two possible causes, poses for a calibration."""

@@ -1,0 +1,30 @@
+"""Motions in closed form: families of excitation, strokes, sweeps, warm-up, and sequences."""
+
+from oed.trajectories.axis_poses import vertical_axis_pose as vertical_axis_pose
+from oed.trajectories.base import Kinematics as Kinematics
+from oed.trajectories.base import Trajectory as Trajectory
+from oed.trajectories.base import count_periods as count_periods
+from oed.trajectories.base import round_up as round_up
+from oed.trajectories.families import FAMILIES as FAMILIES
+from oed.trajectories.families import BSpline as BSpline
+from oed.trajectories.families import Excitation as Excitation
+from oed.trajectories.families import Family as Family
+from oed.trajectories.families import Fourier as Fourier
+from oed.trajectories.families import FourierPolynomial as FourierPolynomial
+from oed.trajectories.families import check_family as check_family
+from oed.trajectories.families import family as family
+from oed.trajectories.fourier import FourierSeries as FourierSeries
+from oed.trajectories.fourier import fourier_basis as fourier_basis
+from oed.trajectories.fourier import rest_basis as rest_basis
+from oed.trajectories.polynomial import PiecewisePolynomial as PiecewisePolynomial
+from oed.trajectories.sequence import KINDS as KINDS
+from oed.trajectories.sequence import Segment as Segment
+from oed.trajectories.sequence import Sequence as Sequence
+from oed.trajectories.sinusoid import Sinusoid as Sinusoid
+from oed.trajectories.sinusoid import shortest_stroke_duration as shortest_stroke_duration
+from oed.trajectories.sinusoid import velocity_reaching_stroke as velocity_reaching_stroke
+from oed.trajectories.sweeps import Plateau as Plateau
+from oed.trajectories.sweeps import Sweep as Sweep
+from oed.trajectories.sweeps import friction_sweep as friction_sweep
+from oed.trajectories.warm_up import WarmUp as WarmUp
+from oed.trajectories.warm_up import plan_warm_up as plan_warm_up
