@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import re
 from collections.abc import Mapping
 from typing import ClassVar
@@ -31,14 +32,18 @@ RESERVED = reserved_words("krl_words.txt")
 """Words of the language, and names in the program."""
 
 _LISTED = re.compile(r"^POINT(?:_\d+)?\[\d+\]=\{(.*)\}$", re.MULTILINE)
-_SPLINE = re.compile(r"^  SPTP \{(.*)\}$", re.MULTILINE)
 _START = re.compile(r"^START=\{(.*)\}$", re.MULTILINE)
 _PERIOD = re.compile(r"^DECL REAL PERIOD=([\d.]+)$", re.MULTILINE)
-_TIME = re.compile(r"^  TIME_BLOCK END=([\d.]+)$", re.MULTILINE)
+_STEPS = re.compile(r"^  SPTP \{(.*)\}$|^WAIT SEC ([\d.]+)$|^  TIME_BLOCK END=([\d.]+)$", re.MULTILINE)
+
+STANDS = 1e-6
+"""Points that differ by less are a rest [deg]: a spline has no piece without length."""
 
 
 class Kuka(Form):
-    """A .src file: a start check, a slow PTP to the start, then a PTP spline whose points have their times.
+    """A .src file: a start check, a slow PTP to the start, then PTP splines whose points have their times.
+
+    Between two splines the robot rests.
 
     A .dat file is a list of all samples, an array of E6AXIS, for a program of one's own.
     """
@@ -59,16 +64,26 @@ class Kuka(Form):
         """See `Form.read`; of a program the points of its spline."""
         text = content.decode("utf-8", errors="replace")
         if suffix == ".src":
-            total, start, rows = _TIME.search(text), _START.search(text), _SPLINE.findall(text)
-            if total is None or start is None or not rows:
-                raise InputError("no timed spline", allowed="a program of this form")
-            q = _positions([start[1], *rows], robot)
-            return np.linspace(0.0, float(total[1]), len(q)), q
+            return _read_program(text, robot)
         period, rows = _PERIOD.search(text), _LISTED.findall(text)
         if period is None or not rows:
             raise InputError("no list of points", allowed="a data list of this form")
         q = _positions(rows, robot)
         return float(period[1]) * np.arange(len(q), dtype=np.float64), q
+
+
+def _read_program(text: str, robot: Robot) -> tuple[Array, Array]:
+    start, steps = _START.search(text), _STEPS.findall(text)
+    ends = [k for k, step in enumerate(steps) if step[2]]
+    first = sum(bool(step[0]) for step in steps[: ends[0]]) if ends else 0
+    period = float(steps[ends[0]][2]) / first if first else 0.0
+    if start is None or not period > 0:
+        raise InputError("no timed spline", allowed="a program of this form")
+    rows = [start[1]]
+    for point, pause, _ in steps:
+        rows += [point] if point else [rows[-1]] * round(float(pause or 0.0) / period)
+    q = _positions(rows, robot)
+    return period * np.arange(len(q), dtype=np.float64), q
 
 
 def _program(motion: Motion, robot: Robot, options: ExportOptions) -> list[str]:
@@ -78,9 +93,6 @@ def _program(motion: Motion, robot: Robot, options: ExportOptions) -> list[str]:
     check = [f"FAR={farthest[0]}"]
     for distance in farthest[1:]:
         check += [f"IF {distance}>FAR THEN", f"  FAR={distance}", "ENDIF"]
-    timed = []
-    for row in axes[1:]:
-        timed += [f"  SPTP {_aggregate(row)}", "  TIME_BLOCK PART=1"]
     return [
         f"DEF {options.name}( )",
         f"; {len(points)} points; a cubic spline through them is within {np.rad2deg(error):.2g} deg of the trajectory",
@@ -102,13 +114,26 @@ def _program(motion: Motion, robot: Robot, options: ExportOptions) -> list[str]:
         "PTP START",
         "BAS(#VEL_PTP,100)",
         "BAS(#ACC_PTP,100)",
-        "PTP_SPLINE",
-        "  TIME_BLOCK START",
-        *timed,
-        f"  TIME_BLOCK END={number(points.duration)}",
-        "ENDSPLINE",
+        *_moves(axes, points.period or 0.0),
         "END",
     ]
+
+
+def _moves(axes: Array, period: float) -> list[str]:
+    """Gives a spline for each stretch in which the robot moves, and a wait for each rest."""
+    stands = np.abs(np.diff(axes, axis=0)).max(axis=1) < STANDS
+    edges = [0, *(np.flatnonzero(np.diff(stands)) + 1).tolist(), len(stands)]
+    lines = []
+    for first, last in itertools.pairwise(edges):
+        time = number((last - first) * period)
+        if stands[first]:
+            lines.append(f"WAIT SEC {time}")
+            continue
+        lines += ["PTP_SPLINE", "  TIME_BLOCK START"]
+        for row in axes[first + 1 : last + 1]:
+            lines += [f"  SPTP {_aggregate(row)}", "  TIME_BLOCK PART=1"]
+        lines += [f"  TIME_BLOCK END={time}", "ENDSPLINE"]
+    return lines
 
 
 def _data_list(motion: Motion, robot: Robot, options: ExportOptions) -> list[str]:

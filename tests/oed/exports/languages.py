@@ -129,7 +129,8 @@ class Krl(Parser):
         arrays: elements of each declared array.
         points: aggregates of axes, in order: those of assignments, then those of the spline.
         parts: shares of the time block.
-        time: of the time block [s].
+        time: of all time blocks [s].
+        waits: times of all waits [s].
         order: kinds of statements in order.
     """
 
@@ -139,6 +140,7 @@ class Krl(Parser):
         self.points: list[list[float]] = []
         self.parts: list[float] = []
         self.time = 0.0
+        self.waits: list[float] = []
         self.order: list[str] = []
         self.skip_lines()
         if self.take("DEF", "DEFDAT") == "DEF":
@@ -220,7 +222,7 @@ class Krl(Parser):
         elif first == "WAIT":
             self.take()
             self.take("SEC")
-            self.expression()
+            self.waits.append(self.number())
             self.take("\n")
         elif first == "PTP":
             self.take()
@@ -254,7 +256,7 @@ class Krl(Parser):
         self.take("TIME_BLOCK")
         self.take("END")
         self.take("=")
-        self.time = self.number()
+        self.time += self.number()
         self.take("\n")
         self.take("ENDSPLINE")
         self.take("\n")

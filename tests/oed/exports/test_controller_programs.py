@@ -10,8 +10,9 @@ import numpy as np
 import pytest
 from scipy.interpolate import CubicSpline
 
-from oed.exports import ExportOptions, export_trajectory
+from oed.exports import CONTROLLER_FORMS, ExportOptions, export_trajectory
 from oed.exports.forms.controller_programs import ARRAY
+from oed.exports.forms.sampling import at_period
 from robots.common.errors import AssumedValueWarning, InputError
 from robots.joints.controller_axes import ControllerAxes
 from robots.loading import load_robot
@@ -73,6 +74,25 @@ def test_krl_program(er3a: Robot, tmp_path: Path) -> None:
     spline = CubicSpline(times, axes, bc_type="clamped")(motion.t)
     assert np.abs(spline - wanted).max() < np.rad2deg(2e-3)
     assert 0.04 <= times[1] <= 0.2
+
+
+def test_krl_rests(er3a: Robot, tmp_path: Path) -> None:
+    """A rest is a wait between two splines: no piece of a spline is without length, and no time is lost."""
+    one = motion_of(er3a, 4.0)
+    rest = np.zeros((500, er3a.n))
+    q = np.concatenate([one.q, np.tile(one.q[-1], (500, 1)), one.q[1:]])
+    dq, ddq = (np.concatenate([part, rest, part[1:]]) for part in (one.dq, one.ddq))
+    motion = Motion(0.004 * np.arange(len(q)), q, dq, ddq)
+    export_trajectory(tmp_path / "excite.src", motion, er3a, "kuka", options=NAME)
+    content = (tmp_path / "excite.src").read_bytes()
+    program = Krl(content.decode())
+    assert program.order[-3:] == ["PTP_SPLINE", "WAIT", "PTP_SPLINE"]
+    assert 1.6 < program.waits[-1] <= 2.0
+    t, read = CONTROLLER_FORMS["kuka"].read(content, er3a, ".src")
+    assert program.time + program.waits[-1] == pytest.approx(t[-1])
+    assert t[-1] == pytest.approx(motion.duration, abs=t[1])
+    assert (np.abs(np.diff(program.points, axis=0)).max(axis=1) > 0).all()
+    np.testing.assert_allclose(read, at_period(motion, t[1]).q, atol=1e-7)
 
 
 def test_krl_list_is_cut(er3a: Robot, tmp_path: Path) -> None:
