@@ -29,8 +29,6 @@ class Finding(Record):
         row: at which it begins, counted from 1, if it has a place.
     """
 
-    ENTRIES = ("*", "code")
-
     name: str
     severity: Severity
     text: str
