@@ -39,7 +39,7 @@ from oed.controllers.clients.watching import RADIANS
 from oed.controllers.drivers import DRIVERS
 from oed.controllers.links import open_link
 from oed.controllers.recording.recorder import Recorder
-from oed.controllers.virtual.path_faults import KINDS
+from oed.controllers.virtual.faults.paths import KINDS
 from oed.exports.forms.sampling import at_period
 from oed.exports.simple_message import (
     DEFAULT,

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from oed.controllers.virtual.path_faults import PathFault
+from oed.controllers.virtual.faults.paths import PathFault
 from oed.controllers.virtual.robot import VirtualRobot
 
 Array = NDArray[np.float64]

@@ -9,7 +9,7 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
-from oed.controllers.virtual.faults import Network
+from oed.controllers.virtual.faults.network import Network
 from oed.controllers.virtual.fixed_packets import FixedPackets
 from oed.controllers.virtual.messages import feedback_frame, reply_frame, status_frame
 from oed.controllers.virtual.motoman import MotomanProgram

@@ -8,8 +8,8 @@ from typing import Any, Literal, get_args
 from oed.controllers.drivers import Driver
 from oed.controllers.drivers.base import Replies
 from oed.controllers.links.base import HANDSHAKE
-from oed.controllers.virtual.path_faults import KINDS
-from oed.controllers.virtual.path_faults import Kind as PathKind
+from oed.controllers.virtual.faults.paths import KINDS
+from oed.controllers.virtual.faults.paths import Kind as PathKind
 from oed.exports.simple_message import DEFAULT, WireFormat
 from oed.exports.simple_message.kinds import MOTION_PORT, STATE_PORT
 from robots.common.errors import InputError

@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from oed.controllers.virtual.buffer import Outcome, PointBuffer
+from oed.controllers.virtual.faults.paths import PathFault
 from oed.controllers.virtual.options import ControllerOptions
-from oed.controllers.virtual.path_faults import PathFault
 from oed.controllers.virtual.robot import VirtualRobot
 from oed.exports.simple_message import FullPoint, Point, Special
 

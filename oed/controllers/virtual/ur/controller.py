@@ -28,8 +28,8 @@ from oed.controllers.rtde.packages import (
 )
 from oed.controllers.rtde.state import PLAYING, RUNNING, STOPPED, Safety
 from oed.controllers.virtual.arm import Arm, ArmSample
+from oed.controllers.virtual.faults.paths import PathFault
 from oed.controllers.virtual.options import ControllerOptions
-from oed.controllers.virtual.path_faults import PathFault
 from oed.controllers.virtual.ports import Client, TcpPort
 from oed.controllers.virtual.robot import VirtualRobot
 from oed.controllers.virtual.service import Service
