@@ -66,7 +66,7 @@ class NextExperiment(Record):
         kinds: all kinds that it combines, `kind` first.
     """
 
-    ENTRIES = ("kind", "kinds=all_kinds", "joint", "why", "resolves", "times", "logged", "runs", "alternatives")
+    ENTRIES = ("kind", "kinds", "joint", "why", "resolves", "times", "logged", "runs", "alternatives")
 
     kind: str
     joint: int | None
@@ -78,15 +78,13 @@ class NextExperiment(Record):
     logged: str = ""
     kinds: tuple[str, ...] = ()
 
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "kinds", self.kinds or (self.kind,))
+
     @property
     def words(self) -> str:
         """What the robot does, and how often."""
         return experiment_words(self.kind, self.times)
-
-    @property
-    def all_kinds(self) -> tuple[str, ...]:
-        """All kinds that it combines."""
-        return self.kinds or (self.kind,)
 
     @property
     def alternatives(self) -> tuple[Proposal, ...]:

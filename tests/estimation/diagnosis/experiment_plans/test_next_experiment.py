@@ -20,7 +20,7 @@ from estimation.diagnosis.experiment_plans.choices import (
 )
 from estimation.diagnosis.experiment_plans.experiment_grams import Grams
 from estimation.diagnosis.experiment_plans.experiment_motions import MADE, MAKERS, Stage, motion_range
-from estimation.diagnosis.experiment_plans.next_experiment import plan_next
+from estimation.diagnosis.experiment_plans.next_experiment import NextExperiment, plan_next
 from estimation.diagnosis.experiment_plans.planned_limits import planned_problem
 from estimation.diagnosis.hypothesis_tests.hypotheses import Hypothesis
 from robots.loading import load_robot
@@ -329,3 +329,10 @@ def test_a_base_that_stands_otherwise_stays_there(problem):
     (tilted,) = MAKERS["second_base_pose"](motion_range(problem.situation.robot.under(wall), stands.recording), 3, 0)
     assert plan is not None
     assert tilted.gravity @ wall / 9.81**2 == pytest.approx(np.cos(np.radians(15.0)))
+
+
+def test_a_combined_experiment_survives_its_file() -> None:
+    """All kinds that an experiment combines are read back."""
+    planned = NextExperiment(kind="payload", joint=None, why="", resolves=0.9, kinds=("payload", "repeat"))
+    assert NextExperiment.from_dict(planned.to_dict()).kinds == planned.kinds
+    assert NextExperiment(kind="repeat", joint=1, why="", resolves=0.1).kinds == ("repeat",)
