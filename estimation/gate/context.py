@@ -16,7 +16,15 @@ from robots.robot import Robot
 from robots.signals import Log
 
 # Causes for which a log is refused: what other checks would find behind them follows from them.
-CAUSES = ("other_robot", "static_poses", "motor_side_position", "unit_of_position", "unit_of_time", "wrapped_angle")
+CAUSES = (
+    "motor_side_position",
+    "other_robot",
+    "row_counter",
+    "static_poses",
+    "unit_of_position",
+    "unit_of_time",
+    "wrapped_angle",
+)
 
 
 class Stage(IntEnum):

@@ -211,10 +211,10 @@ class Prediction(Result):
         if self.extrapolates is None or not (self.extrapolates.any() or self.beyond):
             return []
         share = percent(float(self.extrapolates.mean()))
-        return [
-            f"  {share} of the torques extrapolate: the parameters' errors matter more than in any recorded row",
-            *(f"    {text}" for text in self.beyond),
-        ]
+        first = f"{share} of the torques extrapolate: the parameters' errors matter more than in any recorded row"
+        if not self.extrapolates.any():
+            first = "the motion leaves the recorded one, where the parameters' errors matter no more than within it"
+        return [f"  {first}", *(f"    {text}" for text in self.beyond)]
 
     def to_frame(self) -> pd.DataFrame:
         """Gives t, tau1.. as a table, and of a model with a band its limits and where it extrapolates."""
