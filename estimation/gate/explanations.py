@@ -235,7 +235,7 @@ EXPLANATIONS: tuple[Explanation, ...] = (
         name="row_counter",
         meaning="The time column counts rows.",
         example="t is 0, 1, 2, 3.",
-        remedy="Replace it by the row number times the sample period (--rate), or log the time.",
+        remedy="State the rate of the logger with --rate, or log the time.",
     ),
     Explanation(
         number=34,

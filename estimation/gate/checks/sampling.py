@@ -81,14 +81,14 @@ def _rate(timing: Timing, controller_period: float, known: float) -> list[Findin
 
 
 def _row_counter(known: float, controller_period: float) -> Finding:
-    by_velocity = f"the velocity columns show a sample period of {known:.4g} s" if np.isfinite(known) else ""
-    by_robot = f"the robot's description states {controller_period:.4g} s"
+    by_velocity = f"the velocity columns show {1 / known:.4g} Hz" if np.isfinite(known) else ""
+    by_robot = f"the robot's description states {1 / controller_period:.4g} Hz for its controller"
     return Finding(
         name="row_counter",
         severity="refuse",
         text="the column counts rows: it increases by 1 each time, and is no time",
-        action=f"replace it by the row number times the sample period ({by_velocity or by_robot}), or log the time; if "
-        "it is a time in milliseconds, set its unit in a mapping (--mapping)",
+        action=f"state the rate of the logger with --rate ({by_velocity or by_robot}), or log the time; if it is in "
+        "milliseconds, set its unit in a mapping (--mapping)",
         value=1.0,
         unit="rows",
         column="t",
