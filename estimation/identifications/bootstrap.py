@@ -110,6 +110,8 @@ def bootstrap(estimate: Estimate, *, resamples: int = 500, seed: int = 0) -> Boo
 
     Source: Kuensch, "The jackknife and the bootstrap for general stationary observations", Ann. Stat. 17 (1989).
     """
+    if not isinstance(estimate, Estimate):
+        raise InputError(f"a {type(estimate).__name__}", allowed="an estimate, which has the logs of its model")
     model, choice = estimate.model, estimate.choice
     method = str(model.provenance.get("method"))
     if method not in METHODS:

@@ -217,7 +217,7 @@ def _result(
         ),
         rows=found.rows,
         link=mount.link,
-        warnings=tuple(_warnings(body, ratio, match)),
+        warnings=(*_warnings(body, ratio, match), *(_elsewhere(mount, model, rms, residual) if nothing else ())),
         provenance={
             "logs": describe_logs(loaded),
             "without": describe_logs(free),
@@ -237,8 +237,25 @@ def _body(found: PayloadFit) -> PhysicalBody:
     return PhysicalBody(parameters=values, nearest=values, distance=0.0)
 
 
+def _elsewhere(mount: Mount, model: Model, rms: Array, residual: Array) -> list[str]:
+    """Says that logs differ without a payload on the mount, as by a body on another link."""
+    ratios = _error_ratios(model, rms, residual)
+    joint = int(np.argmax(ratios))
+    if ratios[joint] <= DOUBTFUL:
+        return []
+    return [
+        f"The logs differ by something else: the torque error of joint {joint + 1} is {ratios[joint]:.2g} times that "
+        f"without payload. A body on another link than the {mount.name} is found with --link."
+    ]
+
+
 def _error_ratio(model: Model, rms: Array, residual: Array) -> float:
-    """How many times the torque errors without payload the errors with it are, for the median joint.
+    """How many times the torque errors without payload the errors with it are, for the median joint."""
+    return float(np.median(_error_ratios(model, rms, residual)))
+
+
+def _error_ratios(model: Model, rms: Array, residual: Array) -> Array:
+    """How many times the torque errors without payload the errors with it are (n,).
 
     Noise may grow with the torque: absolute and relative errors are compared, and the smaller ratio counts.
 
@@ -250,7 +267,7 @@ def _error_ratio(model: Model, rms: Array, residual: Array) -> float:
     tiny = np.finfo(float).tiny
     free = np.maximum(np.asarray(model.provenance["residual_rms"], dtype=float), tiny)
     torque = np.maximum(np.asarray(model.provenance["torque_rms"], dtype=float), tiny)
-    return float(np.median(np.minimum(residual / free, residual / np.maximum(rms, tiny) / (free / torque))))
+    return np.minimum(residual / free, residual / np.maximum(rms, tiny) / (free / torque))
 
 
 def _warnings(body: PhysicalBody, ratio: float, match: PathMatch | None) -> list[str]:

@@ -22,13 +22,14 @@ from estimation.thermal.runs.extraction import thermal_runs
 from robots.common.errors import InputError
 from robots.common.files import write_atomic
 from robots.common.progress import Progress
+from robots.common.records import Record
 from robots.robot import Robot
 from robots.signals import Log
 from robots.thermal import thermal_model_class
 
 
 @dataclass(frozen=True, kw_only=True)
-class ThermalIdentification:
+class ThermalIdentification(Record):
     """What logs say of a robot and of its heat.
 
     Attributes:
@@ -38,6 +39,8 @@ class ThermalIdentification:
         gates: what was found in the logs before.
         logs: as they were used.
     """
+
+    ENTRIES = ("**estimate", "joint", "choice")
 
     estimate: CampaignEstimate
     joint: int
@@ -50,11 +53,6 @@ class ThermalIdentification:
         found = [gate.summary() for gate in self.gates if gate.findings]
         table = [f"joint {self.joint}: {self.choice.summary()}"] if self.choice else []
         return "\n".join([*found, *table, self.estimate.summary()])
-
-    def to_dict(self) -> dict[str, Any]:
-        """Writes plain data."""
-        choice = self.choice.to_dict() if self.choice else None
-        return {**self.estimate.to_dict(), "joint": self.joint, "choice": choice}
 
     def save(self, folder: str | PathLike[str]) -> None:
         """Writes model.json into a folder.

@@ -101,8 +101,8 @@ def _sign(robot: Robot, prefix: str, cause: Cause, severity: Severity, smaller: 
         severity=severity,
         text=f"{robot.joint_names[joint]} seems to turn opposite to the robot's description: errors are "
         f"{smaller:.3g} % smaller with the opposite sign of its {what if turned else 'torque'}",
-        action=f"state {opposite(robot.n, joint)} for the {what if turned else 'torque'} in a mapping (--mapping), or "
-        "correct the description",
+        action=f"state {opposite(robot.n, joint)} for the {what if turned else 'torque'} in a mapping (--mapping), "
+        "times the signs that it has, or correct the description",
         value=smaller,
         unit="%",
         column=f"{'q' if turned else prefix}{joint + 1}",

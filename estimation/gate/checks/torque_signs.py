@@ -145,7 +145,7 @@ def _torque_sign(found: JointPhysics, prefix: str, joint: int, certain: bool, jo
         text=f"implausible: with this torque the joint's inertia is {found.inertia:.3g} (standard error "
         f"{found.inertia_error:.2g}) and its friction power is {found.loss:.3g} W ({found.loss_error:.2g}): "
         + ("its sign is inverted" if certain else "it accelerates instead of braking"),
-        action=f"state {opposite(joints, joint)} for the torque, or for the position, in a mapping (--mapping)",
+        action=f"state {opposite(joints, joint)} for the torque in a mapping (--mapping)",
         value=found.loss,
         unit="W",
         column=f"{prefix}{joint + 1}",

@@ -7,7 +7,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from os import PathLike
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -16,6 +15,7 @@ from estimation.diagnosis.experiment_plans.detection_limits import Limit
 from estimation.diagnosis.experiment_plans.planned_limits import planned_limits
 from robots.common.files import write_atomic
 from robots.common.progress import SILENT, Progress
+from robots.common.records import Record
 from robots.plants import Sensors
 from robots.regressor import default_model
 from robots.robot import Robot
@@ -28,7 +28,7 @@ NAMED = 0.02
 
 
 @dataclass(frozen=True, kw_only=True)
-class DetectionLimits:
+class DetectionLimits(Record):
     """Effects that planned motions could show.
 
     Attributes:
@@ -37,6 +37,8 @@ class DetectionLimits:
         beyond: extensions of the model, without which the limits are computed.
         notes: what makes the limits unsure, in sentences.
     """
+
+    ENTRIES = ("robot", "limits", "extensions_not_counted=beyond", "notes")
 
     robot: str
     limits: tuple[Limit, ...]
@@ -63,15 +65,6 @@ class DetectionLimits:
         if self.beyond:
             lines.append(f"  these limits refer to the base model without its extensions: {', '.join(self.beyond)}")
         return "\n".join(lines)
-
-    def to_dict(self) -> dict[str, Any]:
-        """Writes plain data."""
-        return {
-            "robot": self.robot,
-            "limits": [limit.to_dict() for limit in self.limits],
-            "extensions_not_counted": list(self.beyond),
-            "notes": list(self.notes),
-        }
 
     def save(self, folder: str | PathLike[str]) -> None:
         """Writes limits.json into a folder.

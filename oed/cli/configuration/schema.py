@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -58,6 +59,8 @@ def _schema(option: Declared) -> dict[str, Any]:
     if option.several:
         allowed.append({"type": "array", "items": {"anyOf": list(allowed)} if len(allowed) > 1 else single})
     schema = {"description": option.help, **(single if len(allowed) == 1 else {"anyOf": allowed})}
-    if option.has_default:
+    # JSON has no infinity, which the description then states.
+    infinite = isinstance(option.default, float) and not math.isfinite(option.default)
+    if option.has_default and not infinite:
         schema["default"] = str(option.default) if isinstance(option.default, Path) else option.default
     return schema

@@ -19,9 +19,9 @@ class StateLink:
 
     Attributes:
         driver: program on the controller: efort, fanuc, motoman, abb, egm, ur or generic. Sets what is not stated.
-        transport: ``udp`` or ``tcp``. Default: udp.
-        state_port: port that gives feedback. Default: 11002.
-        byte_order: byte order of the controller: little or big. Default: little.
+        transport: ``udp`` or ``tcp``. Default: the driver's, else udp.
+        state_port: port that gives feedback. Default: the driver's, else 11002.
+        byte_order: byte order of the controller: little or big. Default: the driver's, else little.
         real_bytes: bytes of a real number: 4 or 8. Default: 4.
         handshake: byte that opens a link by UDP; 0xFF for old controllers. Default: 0x8E.
     """
@@ -84,7 +84,7 @@ class Link(StateLink):
     """How a controller is spoken to.
 
     Attributes:
-        motion_port: port that takes points. Default: 11000.
+        motion_port: port that takes points. Default: the driver's, else 11000.
     """
 
     motion_port: int | None = None

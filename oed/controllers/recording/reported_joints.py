@@ -60,8 +60,8 @@ def doubts_about_robot(robot: Robot, lowest: Array, highest: Array, planned: Arr
     if real < n:
         joints = ", ".join(str(joint) for joint in range(real + 1, n + 1))
         found.append(
-            f"joint {joints} of {robot.name} reads exactly 0 all the time: the controller may have {real} joints. "
-            "Check --robot"
+            f"joint {joints} of {robot.name} reads exactly 0 all the time: it stands at zero, or the controller has "
+            f"{real} joints (check --robot)"
         )
     for joint in range(n):
         lower, upper = float(robot.limits.lower[joint]), float(robot.limits.upper[joint])

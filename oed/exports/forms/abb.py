@@ -112,6 +112,7 @@ class AbbEgm(Form):
     suffixes: ClassVar[tuple[str, ...]] = (".mod",)
     comment: ClassVar[Mapping[str, str]] = {".mod": "!"}
     named: ClassVar[bool] = True
+    program: ClassVar[str] = "trajectory_egm"
     has_samples: ClassVar[bool] = False
 
     def write(self, motion: Motion, robot: Robot, options: ExportOptions, suffix: str) -> bytes:

@@ -26,6 +26,7 @@ class Form(ABC):
         period: sample period that the controller needs [s]; None for that of the trajectory.
         has_samples: whether the file holds the trajectory, and not only limits of its robot.
         named: whether the file must have the name of its program or module.
+        program: that name, where none is stated.
         comment: what begins a comment in files of each suffix that has comments.
     """
 
@@ -34,6 +35,7 @@ class Form(ABC):
     period: ClassVar[float | None] = None
     has_samples: ClassVar[bool] = True
     named: ClassVar[bool] = False
+    program: ClassVar[str] = "trajectory"
     comment: ClassVar[Mapping[str, str]] = {}
 
     def content(self, motion: Motion, robot: Robot, options: ExportOptions, suffix: str) -> bytes:

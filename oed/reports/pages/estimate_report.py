@@ -61,6 +61,7 @@ def estimate_page(estimate: Estimate, methods: MethodTable | None = None) -> Pag
                     band=[joint.band for joint in joints],
                     joint_names=names,
                     kinds=kinds,
+                    errors=[(joint.residual_rms, joint.torque_rms) for joint in joints],
                 ),
             ),
             tables=(_joints(estimate),),

@@ -30,6 +30,7 @@ def torque_picture(
     band: ArrayLike | None = None,
     joint_names: Sequence[str] | None = None,
     kinds: Sequence[str] | None = None,
+    errors: Sequence[tuple[float, float]] | None = None,
     why_gaps: str = "",
     name: str = "torque",
 ) -> Picture:
@@ -43,6 +44,8 @@ def torque_picture(
             none is known.
         joint_names: names, (n,).
         kinds: "revolute" or "prismatic" of each joint, (n,); None where all are revolute.
+        errors: RMS of error and torque of each joint as the result states them (n,), on rows that it judges; None for
+            those of the rows that are drawn.
         why_gaps: where and why rows have no prediction, to complete "The predicted line has gaps".
         name: the stem of the file name.
 
@@ -63,7 +66,8 @@ def torque_picture(
     for joint in range(count):
         width = None if widths is None or not np.isfinite(widths[:, joint]).any() else widths[:, joint]
         residual = truth[:, joint] - model[:, joint]
-        level, size = _rms(residual), _rms(truth[:, joint][np.isfinite(residual)])
+        drawn = _rms(residual), _rms(truth[:, joint][np.isfinite(residual)])
+        level, size = drawn if errors is None else errors[joint]
         unit = units[joint].torque
         share = f" ({rounded_percent(level / size)} of the torque)" if size > 0.0 else ""
         panels += [

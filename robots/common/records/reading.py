@@ -77,7 +77,15 @@ class Reader:
                 setattr(made, name, value)
             return made
         optional = {i.name for i in fields(kind) if i.default is not MISSING or i.default_factory is not MISSING}
-        return kind(**dict(self.values(kind, data, path, frozenset(given), frozenset(optional))), **given)
+        found = dict(self.values(kind, data, path, frozenset(given), frozenset(optional))) | dict(given)
+        lacking = [i.name for i in fields(kind) if i.init and i.name not in optional and i.name not in found]
+        if lacking:
+            raise InputError(
+                f"{kind.__name__}: its JSON does not hold all of it ({', '.join(lacking)})",
+                file=self.file,
+                remedy="read its folder by the load function, or keep the object",
+            )
+        return kind(**found)
 
     def values(
         self, kind: Any, data: Mapping[str, Any], path: str, given: frozenset[str], optional: frozenset[str]

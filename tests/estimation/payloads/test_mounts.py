@@ -4,12 +4,15 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pinocchio as pin
 import pytest
 
 from estimation.payloads import identify_payload, load_payload, read_body
+from estimation.payloads.identification import _elsewhere
 from estimation.payloads.mounts import Mount
 from oed.benchmarks.truth.machines import draw_machine
 from oed.benchmarks.truth.noise import draw_noise
@@ -69,3 +72,14 @@ def test_a_link_that_is_not_there_is_refused() -> None:
         Mount(ur10, 7)
     assert Mount(ur10, 6).joints == 6
     np.testing.assert_array_equal(Mount(ur10, 2).pose, np.eye(4))
+
+
+def test_logs_that_differ_without_a_payload_on_the_flange_say_so() -> None:
+    """Six times the error on one joint is no body on the flange; errors as before are nothing."""
+    ur10 = load_robot("ur10")
+    known: Any = SimpleNamespace(provenance={"residual_rms": [1.0] * 6, "torque_rms": [50.0] * 6})
+    rms, errors = np.full(6, 50.0), np.array([1.0, 6.0, 1.0, 1.0, 1.0, 1.0])
+    (text,) = _elsewhere(Mount(ur10), known, rms, errors)
+    assert "joint 2 is 6 times" in text
+    assert "--link" in text
+    assert _elsewhere(Mount(ur10), known, rms, np.ones(6)) == []

@@ -1,4 +1,4 @@
-"""Plays a trajectory on a robot controller by simple_message or RTDE.
+"""Plays a trajectory on a robot controller by simple_message, RTDE or EGM.
 
 Records the feedback into a log.
 """

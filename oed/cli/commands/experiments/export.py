@@ -80,7 +80,9 @@ class Export(Verb):
         suffix = ".csv" if output.to == "csv" else CONTROLLER_FORMS[output.to].suffixes[0]
         # Controllers look for a program in the file of its name.
         named = output.to != "csv" and CONTROLLER_FORMS[output.to].named
-        stem = (self.options.name or "trajectory") if named else f"{file.stem}-{output.to}"
+        stem = f"{file.stem}-{output.to}"
+        if named:
+            stem = self.options.name or CONTROLLER_FORMS[output.to].program
         target = output.out or file.with_name(f"{stem}{suffix}")
         motion, metadata = read_trajectory(file)
         collisions, proved = stated_collisions(metadata)

@@ -21,4 +21,4 @@ class Schema(Verb):
         from oed.cli.configuration.schema import configuration_schema
 
         schema = configuration_schema(VERBS)
-        return Printed(json.dumps(schema, indent=2), schema)
+        return Printed(json.dumps(schema, indent=2, allow_nan=False), schema)
