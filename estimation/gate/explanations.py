@@ -193,7 +193,7 @@ EXPLANATIONS: tuple[Explanation, ...] = (
         name="position_sign",
         meaning="A joint seems to turn opposite to the robot's description.",
         example="q2 is logged as -q2.",
-        remedy="Set `sign: -1` for its position in a mapping (--mapping), or correct the description.",
+        remedy="State `sign: [1, -1, ...]` for the position, a sign for each joint, in a mapping (--mapping), or correct the description.",
     ),
     Explanation(
         number=28,
@@ -326,7 +326,7 @@ EXPLANATIONS: tuple[Explanation, ...] = (
         name="torque_sign",
         meaning="A torque has the wrong sign: inertia and friction of the joint would be negative.",
         example="tau1 is logged as -tau1.",
-        remedy="Set `sign: -1` for the torque in a mapping (--mapping).",
+        remedy="State `sign: [1, -1, ...]` for the torque, a sign for each joint, in a mapping (--mapping).",
     ),
     Explanation(
         number=47,
@@ -354,14 +354,14 @@ EXPLANATIONS: tuple[Explanation, ...] = (
         name="unit_of_position",
         meaning="Positions seem to be in another unit, such as degrees.",
         example="q is in degrees.",
-        remedy="Set the unit of q in the file's head or in a mapping (--mapping).",
+        remedy="State `position: {unit: deg}`, or the right unit, in a mapping (--mapping).",
     ),
     Explanation(
         number=51,
         name="unit_of_time",
         meaning="The time seems to be in another unit, such as milliseconds.",
         example="t is in ms.",
-        remedy="Set the unit of t in the file's head or in a mapping (--mapping).",
+        remedy="State `time: {unit: ms}`, or the right unit, in a mapping (--mapping).",
     ),
     Explanation(
         number=52,

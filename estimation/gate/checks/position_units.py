@@ -90,19 +90,29 @@ COUNTS = _Unit(
 def _units(robot: Robot, columns: Columns) -> list[_Unit]:
     """Lists the units in which positions may be logged: all joints have the same one."""
     revolute = np.array([joint.kind == "revolute" for joint in robot.chain.joints])
-    head = "in the file's head or in a mapping (--mapping)"
+    names = ["deg" if turns else "mm" for turns in revolute]
+    stated = "deg" if revolute.all() else f"[{', '.join(names)}]"
     units = [
         _Unit(
             "unit_of_position",
             "in degrees" if revolute.all() else "in degrees (or millimetres)",
-            f"set the unit {head}",
+            f"state `position: {{unit: {stated}}}` in a mapping (--mapping)",
             np.where(revolute, np.pi / 180.0, 1e-3),
         )
     ]
     gears = np.abs(np.asarray(robot.gear_ratio, dtype=float))
     if not np.allclose(gears, 1.0):
         words = "of the motors, not the links"
-        units.append(_Unit("motor_side_position", words, f"set the gear ratios {head}", 1.0 / gears))
+        ratios = ", ".join(f"{ratio:g}" for ratio in np.asarray(robot.gear_ratio, dtype=float))
+        motors = f"state `position: {{side: motor}}` and `gear_ratio: [{ratios}]` in a mapping (--mapping)"
+        units.append(
+            _Unit(
+                "motor_side_position",
+                words,
+                motors,
+                1.0 / gears,
+            )
+        )
     lower, upper = (np.asarray(bound, dtype=float) for bound in (robot.limits.lower, robot.limits.upper))
     shares = np.concatenate([columns.lowest, columns.highest])
     if np.isfinite(upper - lower).all() and np.abs(shares).max() < FULL:

@@ -47,6 +47,10 @@ class Sampling(Check):
         ]
 
 
+# Units of time as a mapping states them.
+SHORT = {"milliseconds": "ms", "microseconds": "us", "nanoseconds": "ns"}
+
+
 def _rate(timing: Timing, controller_period: float, known: float) -> list[Finding]:
     period = timing.period
     if period < SLOWEST:
@@ -70,7 +74,7 @@ def _rate(timing: Timing, controller_period: float, known: float) -> list[Findin
                 if likely
                 else ", which is too slow to compute accelerations"
             ),
-            action=f"set the unit of t ({units[factor]}) in the file's head or in a mapping (--mapping)"
+            action=f"state `time: {{unit: {SHORT[units[factor]]}}}` in a mapping (--mapping)"
             if likely
             else "record at 50 Hz or more",
             value=period,

@@ -165,6 +165,8 @@ class LogMapping(Config):
             for key, value in data.items()
             if key in USUAL and isinstance(value, dict)
         }
+        if isinstance(data.get("time"), dict):
+            usual["time"] = {"column": "t", **data["time"]}
         return data | usual
 
 
