@@ -193,7 +193,8 @@ EXPLANATIONS: tuple[Explanation, ...] = (
         name="position_sign",
         meaning="A joint seems to turn opposite to the robot's description.",
         example="q2 is logged as -q2.",
-        remedy="State `sign: [1, -1, ...]` for the position, a sign for each joint, in a mapping (--mapping), or correct the description.",
+        remedy="State `sign: [1, -1, ...]` for the position, a sign for each joint, in a mapping (--mapping), or "
+        "correct the description.",
     ),
     Explanation(
         number=28,
