@@ -271,7 +271,7 @@ def model_from_dict(data: Mapping[str, Any]) -> Model:
     """Reads what `Model.to_dict` gives.
 
     Raises:
-        InputError: parameters that do not belong to the terms, or are not finite.
+        InputError: parameters that do not belong to the terms, are not finite, or have a negative variance.
     """
     terms = tuple(build_term(term) for term in data["terms"])
     torque_model = TorqueModel(build_robot(data["robot"]), terms)
@@ -289,6 +289,9 @@ def model_from_dict(data: Mapping[str, Any]) -> Model:
         raise InputError("parameters are missing or repeated", allowed="one or more, each once")
     if not all(np.isfinite(numbers).all() for numbers in (values, covariance, felt)):
         raise InputError("values or covariances that are not finite", remedy="identify the robot again")
+    if (np.diag(covariance) < 0).any():
+        wrong = parameters[int(np.argmin(np.diag(covariance)))]["name"]
+        raise InputError(f"the variance of {wrong} is negative", remedy="identify the robot again")
     if data.get("extensions"):
         require_described(data["robot"])
     cutoff = data["provenance"].get("cutoff_hz", 1.0)

@@ -152,6 +152,7 @@ DAMAGES = {
     "a value that is null": _set(["parameters", 0, "value"], None),
     "a value that is NaN": _set(["parameters", 0, "value"], float("nan")),
     "a value that is infinite": _set(["parameters", 0, "value"], float("inf")),
+    "a variance below zero": _set(["covariance", 0, 0], -1.0),
     "a covariance too small": _set(["covariance"], [[1.0]]),
     "a covariance with NaN": _set(["covariance", 0, 0], float("nan")),
     "no covariance": _drop("covariance"),

@@ -24,7 +24,7 @@ class Written(Overwriting):
     Attributes:
         to: format: csv, ros, ros-goal, rosbag, mcap, moveit-limits, simple-message, urscript, kuka, abb,
             abb-egm, franka or franka-player.
-        out: file to write. Default: beside the trajectory, with the format in its name.
+        out: file to write. Default: beside the trajectory, with the format in its name; programs have their own name.
         degrees: ``csv``: angles in degrees; linear axes stay in metres.
         positions_only: ``csv``: only t and q1..qn.
         bare: ``csv``: the column names without the comment block above them.
