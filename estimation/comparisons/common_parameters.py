@@ -148,6 +148,9 @@ def _robot_difference(one: Model, other: Model) -> tuple[str | None, str]:
 
 def _column_difference(first: Run, run: Run) -> tuple[str | None, str]:
     remedy = "identify both with the same --friction, --position, --rotor and --offset"
+    if len({run.model.provenance.get("method") == "diagnosis" for run in (first, run)}) > 1:
+        # A diagnosis has finer friction than an identification.
+        remedy = "compare models of one command: identify both logs, or diagnose both"
     for one, other in ((first, run), (run, first)):
         missing = [name for name in one.model.names if name not in set(other.model.names)]
         if missing:
