@@ -187,15 +187,18 @@ def find_base_parameters(
     singular_values = np.asarray(np.linalg.svd(scaled, compute_uv=False), dtype=np.float64)
     _confirm(singular_values, len(independent))
     combination = np.linalg.lstsq(scaled[:, independent], scaled, rcond=None)[0]  # (b, p)
-    neglected = float(np.linalg.norm(scaled - scaled[:, independent] @ combination, axis=0).max())
-    if neglected > _ROUNDING:
+    left = np.linalg.norm(scaled - scaled[:, independent] @ combination, axis=0)
+    neglected = float(left.max())
+    # Columns of friction may be nearly alike, too: that is not the geometry's.
+    of_links = np.array([column.term == "rigid_body" for column in model.columns])
+    if left[of_links].max(initial=0.0) > _ROUNDING:
         log.warning(
             (
                 "%s: axes that are nearly parallel, perpendicular or intersecting are treated as exactly so (%.1e of "
                 "the regressor is neglected). Usual cause: rounded angles in the description, such as 1.5708 for pi / 2"
             ),
             model.robot.name,
-            neglected,
+            left[of_links].max(),
         )
     grouping = combination * scale[None, :] / scale[independent][:, None]
     # Values as small as the neglected part are its noise.
