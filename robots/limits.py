@@ -201,7 +201,7 @@ class Limits:
 
         Args:
             q: positions (N, n), or (n,) of one state [rad or m].
-            dq: velocities (N, n), or (n,), of which the signs count [rad/s or m/s].
+            dq: velocities (N, n), or (n,), whose signs count [rad/s or m/s].
         """
         return self.velocity if self.ramp is None else self.ramp.allowed(q, dq, self.velocity)
 

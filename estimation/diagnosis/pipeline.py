@@ -110,13 +110,7 @@ def _of(estimate: Estimate, logs: Log | Sequence[Log]) -> Recording:
     """The logs of an estimate, as they were made ready for it."""
     if logs:
         raise InputError("logs beside an estimate", allowed="the estimate, which has its logs; or a robot and logs")
-    if estimate.recording is None:
-        raise InputError(
-            "an estimate of a log that was read in pieces",
-            allowed="one whose logs are in memory",
-            remedy="diagnose the robot and a part of the log",
-        )
-    return estimate.recording
+    return estimate.require_recording()
 
 
 def _friction_of(what: Robot | Estimate) -> str | FrictionTerm:

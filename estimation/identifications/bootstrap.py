@@ -118,10 +118,8 @@ def bootstrap(estimate: Estimate, *, resamples: int = 500, seed: int = 0) -> Boo
         raise InputError(f"an estimate by {method}", allowed=" or ".join(METHODS))
     if resamples < 2:
         raise InputError(f"{resamples} resamples", allowed="2 or more")
-    if estimate.recording is None:
-        raise InputError("an estimate of a log that was read in pieces", allowed="one whose logs are in memory")
     base = find_base_parameters(model.torque_model, gravities=model.gravities)
-    prepared = estimate.recording.prepared
+    prepared = estimate.require_recording().prepared
     rows = [log.rows(choice.smoother) for log in prepared]
     kind, pieces, moving = _pieces(prepared, rows, estimate)
     regressor = JointRegressor(base)

@@ -14,6 +14,7 @@ from estimation.gate import GateReport
 from estimation.identifications.choices import Choice
 from estimation.models.model import Model
 from estimation.recordings import Recording
+from robots.common.errors import InputError
 from robots.common.plain import percent, place_of
 from robots.common.records import Finding, Result, axes_for
 
@@ -111,6 +112,20 @@ class Estimate(Result):
     gates: tuple[GateReport, ...] = ()
     recording: Recording | None = field(default=None, repr=False)
     fitted_rows: int | None = None
+
+    def require_recording(self) -> Recording:
+        """Gives the logs as they were made ready for the fit.
+
+        Raises:
+            InputError: the log was read in pieces.
+        """
+        if self.recording is None:
+            raise InputError(
+                "an estimate of a log that was read in pieces",
+                allowed="one whose logs are in memory",
+                remedy="identify a part of the log",
+            )
+        return self.recording
 
     @property
     def samples(self) -> int:

@@ -33,7 +33,7 @@ class Recording:
 
     @property
     def used(self) -> list[Log]:
-        """The logs of which some rows are used."""
+        """The logs with rows that are used."""
         return [log for log, own in zip(self.logs, self.parts, strict=True) if own]
 
     def repaired(self, shortest: float) -> list[tuple[Log, ...]]:

@@ -48,7 +48,7 @@ class Verb:
     introduces: ClassVar[bool] = False
     """Whether work on a robot begins with the command: it then shows the notes on its description in full."""
     alternatives: ClassVar[tuple[tuple[str, str], ...]] = ()
-    """Pairs of fields of which one counts. A group of options may have them, too."""
+    """Pairs of fields that exclude each other. A group of options may have them, too."""
 
     uses: ClassVar[Mapping[str, str]] = {}
     """How the help calls uses of the verb, such as "Of make", before what options of theirs mean."""

@@ -19,7 +19,7 @@ class ControllerAxes:
     Args:
         sign: 1 or -1 (n,).
         zero: reading of each axis where all joints are at zero (n,) [rad or m].
-        coupling: (n, n); row i tells what of the other joints axis i contains, such as -1 for a parallelogram.
+        coupling: (n, n); row i is the share of each other joint that axis i contains, such as -1 for a parallelogram.
 
     Raises:
         InputError: arrays of other shapes, another sign, or axes that do not determine the joints.

@@ -47,7 +47,7 @@ def read_monitored(
 
     Args:
         paths: of logs and of folders of logs.
-        folder: of logs of which some may be corrupt.
+        folder: of logs; some may be corrupt.
         robot: of the model.
         mapping: of the logs' columns.
 

@@ -90,7 +90,7 @@ class Reader:
     def values(
         self, kind: Any, data: Mapping[str, Any], path: str, given: frozenset[str], optional: frozenset[str]
     ) -> Iterator[tuple[str, Any]]:
-        """Reads the entries that are attributes of their own, of which the class states the types."""
+        """Reads the entries that are attributes with a type that the class states."""
         hints = _hints(kind)
         nulls = {item.name: item.metadata.get("null", ()) for item in fields(kind)} if has_fields(kind) else {}
         parts: dict[str, list[Any]] = {}

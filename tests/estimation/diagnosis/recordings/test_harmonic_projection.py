@@ -7,26 +7,12 @@ import pytest
 
 from estimation.diagnosis.recordings.harmonic_projection import project_on_harmonics
 from estimation.preprocessing import find_cycle
-
-STEP = 0.004
-
-
-def _motion(period: float, duration: float, seed: int = 0) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    rng = np.random.default_rng(seed)
-    t = STEP * np.arange(round(duration / STEP))
-    w = 2 * np.pi / period * np.arange(1, 6)
-    a, b = rng.normal(size=(2, 5, 2))
-    s, c = np.sin(np.outer(t, w)), np.cos(np.outer(t, w))
-    return (
-        s @ a + c @ b,
-        c @ (a * w[:, None]) - s @ (b * w[:, None]),
-        -(s @ (a * w[:, None] ** 2)) - c @ (b * w[:, None] ** 2),
-    )
+from tests.estimation.periodic_motion import STEP, periodic_motion
 
 
 def test_the_projection_is_free_of_encoder_noise() -> None:
     """Acceleration errors of the projection are below a hundredth of those of finite differences."""
-    q, dq, ddq = _motion(10.0, 60.0)
+    q, dq, ddq = periodic_motion(10.0, 60.0)
     count = 2 * np.pi / 2**17
     counted = np.round(q / count) * count
     cycle = find_cycle(counted, STEP)
@@ -45,7 +31,7 @@ def test_the_projection_is_free_of_encoder_noise() -> None:
 @pytest.mark.parametrize("rounded", [True, False])
 def test_the_noise_of_the_mean_over_repetitions_is_reported(period: float, rounded: bool) -> None:
     """The noise density of the mean is estimated to a third, also if rounding is the same in all repetitions."""
-    q, _, _ = _motion(period, 8 * period)
+    q, _, _ = periodic_motion(period, 8 * period)
     count = 2 * np.pi / 2**17
     noise = count * np.random.default_rng(1).standard_normal(q.shape)
     counted = np.round(q / count) * count if rounded else q + noise
