@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -16,9 +16,9 @@ from estimation.comparisons.drift import Drift
 from estimation.comparisons.friction_changes import FrictionChange, interval_of, percent_of
 from estimation.comparisons.friction_curves import FrictionCurves
 from estimation.comparisons.merging import MergedModel
-from estimation.comparisons.part_names import grouped, listed
 from estimation.comparisons.payload_differences import PayloadDifference
 from estimation.comparisons.runs import Run
+from robots.common.plain import joints_in_words
 from robots.common.records import Finding, Result, axes_for, findings_of, plain
 
 if TYPE_CHECKING:
@@ -312,3 +312,18 @@ class ModelComparison(Result, format="robot-oed comparison", shares=("labels", "
     def _save_beside(self, folder: Path, *, force: bool) -> None:
         """Writes the merged `model.json`."""
         self.merged.model.save(folder / MODEL, force=force)
+
+
+def grouped(parts: Iterable[str]) -> list[str]:
+    """Puts the parts of one kind together: friction of joints 1, 2 and 4."""
+    kinds: dict[str, list[str]] = {}
+    for part in parts:
+        kind, _, joint = part.partition(" of joint ")
+        kinds.setdefault(kind, []).append(joint)
+    return [kind if not joints[0] else f"{kind} of {joints_in_words(joints)}" for kind, joints in kinds.items()]
+
+
+def listed(names: list[str], most: int = 6) -> str:
+    """Lists some names, and says how many more there are."""
+    shown = ", ".join(names[:most])
+    return shown if len(names) <= most else f"{shown} and {len(names) - most} more"

@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from estimation.monitoring.control_charts.bursts import BurstChart
+from estimation.monitoring.control_charts.charts import BurstChart
 from estimation.monitoring.control_charts.quantities import Quantity, Sample, start_limit
-from estimation.monitoring.events import Event, contact_finding
 from estimation.monitoring.findings import Finding
 from estimation.monitoring.history import History
 from estimation.monitoring.initial_quantities import initial_quantities
@@ -298,3 +297,45 @@ class Evaluation(Record):
         # A state of an older version has one number for all joints.
         found.colour_count = np.ones(found.n) * found.colour_count
         return found
+
+
+@dataclass
+class Event(Record, as_list=True):
+    """An alarm that is being confirmed.
+
+    Attributes:
+        time: end of the window with the alarm [s].
+        log: number of the log, from 0.
+        sources: indices of the quantities with an alarm.
+        windows: seen since.
+    """
+
+    time: float
+    log: int
+    sources: list[int]
+    windows: int = 0
+
+
+def contact_finding(force: tuple[float, float, int, int, float], logs: Sequence[str]) -> Finding:
+    """The finding of a short force.
+
+    Args:
+        force: start of its window [s], its time [s], number of the log from 0, highest joint that felt it (0 for
+            none), and its chi-square.
+        logs: names of the logs.
+    """
+    _, at, log, link, _ = force
+    return Finding(
+        kind="contact",
+        joint=None,
+        size=0.0,
+        low=0.0,
+        high=0.0,
+        unit="",
+        earliest=at - 0.5,
+        latest=at + 0.5,
+        detected=at,
+        sigmas=0.0,
+        log=logs[log],
+        text=f" (felt in the torque of joint {link} and below)" if link else "",
+    )

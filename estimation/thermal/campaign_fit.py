@@ -14,8 +14,6 @@ from estimation.identifications.identification import identify
 from estimation.linear_algebra.scaled import solve_ridge
 from estimation.logs.known_setup import HEAT, require_plain
 from estimation.models.model import Model
-from estimation.thermal.band import error_band
-from estimation.thermal.expected_rounds import expected_rounds
 from estimation.thermal.information import FAINT, inverse_of
 from estimation.thermal.results.campaign_estimate import CampaignEstimate
 from estimation.thermal.results.estimate import ThermalEstimate, searched_parameters, with_errors
@@ -23,7 +21,7 @@ from estimation.thermal.runs.condensed import Condensed, JointSums, condense
 from estimation.thermal.runs.extraction import join_pieces, piece_on_bins, ratio_of
 from estimation.thermal.runs.thermal_run import ThermalRun
 from estimation.thermal.thermal_fit import fit_thermal
-from estimation.thermal.torque import ThermalTorqueModel
+from estimation.thermal.torque import ThermalTorqueModel, error_band
 from robots.common.errors import InputError, NotIdentifiableError
 from robots.common.forks import forked
 from robots.common.parallel import one_blas_thread
@@ -296,3 +294,25 @@ class _AlternatingFit:
 
 def _advance(bar: Progress, rounds: int, whole: float, share: float) -> None:
     bar.update(2.0 + MOST_ROUNDS * (rounds - 1 + share) / whole, f"round {rounds}")
+
+
+def expected_rounds(changes: Sequence[float], settled: float, most: int) -> float:
+    """Estimates how many rounds an iteration takes that converges linearly.
+
+    The logarithm of the change falls by the same amount each round, so two rounds show how many are left.
+
+    Args:
+        changes: relative change of each round so far; at least one.
+        settled: the change at which it ends.
+        most: rounds after which it ends in any case.
+
+    Returns:
+        The rounds in all, at least those done; `most` where the changes do not fall.
+    """
+    done = len(changes)
+    if changes[-1] < settled:
+        return float(done)
+    if done < 2 or not 0.0 < changes[-1] < changes[-2]:
+        return float(most)
+    left = np.log(changes[-1] / settled) / np.log(changes[-2] / changes[-1])
+    return float(min(most, done + max(1.0, np.ceil(left))))

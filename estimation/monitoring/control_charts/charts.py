@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
+from scipy.integrate import quad
+from scipy.optimize import brentq
+from scipy.special import ndtr
 
 from estimation.monitoring.control_charts.level_filter import CORRELATION_TIME
-from estimation.monitoring.control_charts.run_lengths import cusum_threshold, ewma_threshold
 from robots.common.records import Record
 
 # Allowance of the CUSUM: half of a change by two standard deviations of the innovations.
@@ -102,3 +105,118 @@ class Chart(Record):
         """Starts both charts again; the serial correlation is kept."""
         self.up = self.down = self.level = self.unlogged = 0.0
         self.count = 0
+
+
+# Prior of a window's largest chi-square, of white noise in six joints and fifty blocks, and its weight in windows.
+PRIOR_MEAN, PRIOR_DEVIATION, PRIOR_WINDOWS = 17.0, 6.0, 10.0
+MOST_WINDOWS = 2000.0
+EULER = 0.5772156649
+
+
+@dataclass
+class BurstChart(Record):
+    """The extreme-value distribution (Gumbel) of a window's largest chi-square, learnt from healthy windows.
+
+    Attributes:
+        run_length: windows between false alarms.
+        count: windows so far, the prior included.
+        mean: of the largest chi-squares.
+        square: sum of their squared deviations.
+    """
+
+    run_length: float
+    count: float = PRIOR_WINDOWS
+    mean: float = PRIOR_MEAN
+    square: float = PRIOR_WINDOWS * PRIOR_DEVIATION**2
+
+    @property
+    def threshold(self) -> float:
+        """The chi-square that a healthy window exceeds once in `run_length` windows."""
+        deviation = float(np.sqrt(self.square / self.count))
+        # Few windows say little of the spread.
+        scale = deviation * (1 + 2 / self.count) * np.sqrt(6) / np.pi
+        place = self.mean - EULER * scale
+        return float(place - scale * np.log(-np.log1p(-1.0 / self.run_length)))
+
+    def update(self, chi: float) -> bool:
+        """Takes a window's largest chi-square into account, and says whether it is an alarm."""
+        if chi > self.threshold:
+            return True
+        self.count = min(self.count + 1, MOST_WINDOWS)
+        step = chi - self.mean
+        self.mean += step / self.count
+        if self.count >= MOST_WINDOWS:
+            self.square *= 1 - 1 / MOST_WINDOWS
+        self.square += step * (chi - self.mean)
+        return False
+
+
+# Mean overshoot of a normal random walk beyond a boundary, on both sides together (Siegmund 1985, eq. 10.17).
+OVERSHOOT = 1.166
+HIGHEST = 1e4
+
+
+def cusum_run_length(threshold: float, allowance: float, correlation: float = 0.0) -> float:
+    """Mean steps until a two-sided CUSUM of a standard normal AR(1) sequence gives a false alarm.
+
+    Siegmund's approximation, with the variance of the steps replaced by the long-run variance
+    (1 + rho) / (1 - rho):  ARL = v / (2 k^2) (exp(2 k b / v) - 1 - 2 k b / v) / 2,  b = h + 1.166.
+
+    Args:
+        threshold: h, in standard deviations.
+        allowance: k, in standard deviations.
+        correlation: rho between consecutive values.
+    """
+    variance = (1 + correlation) / (1 - correlation)
+    exponent = 2 * allowance * (threshold + OVERSHOOT) / variance
+    return float(variance / (2 * allowance**2) * (np.expm1(min(exponent, 600.0)) - exponent) / 2)
+
+
+@lru_cache(maxsize=256)
+def cusum_threshold(allowance: float, run_length: float, correlation: float = 0.0) -> float:
+    """The threshold of a two-sided CUSUM with this mean time between false alarms.
+
+    Args:
+        allowance: k, in standard deviations.
+        run_length: mean steps between false alarms.
+        correlation: rho between consecutive values.
+    """
+    return float(
+        brentq(lambda h: np.log(cusum_run_length(h, allowance, correlation) / run_length), -OVERSHOOT + 1e-6, HIGHEST)
+    )
+
+
+def ewma_run_length(threshold: float, weight: float, correlation: float = 0.0) -> float:
+    """Mean steps between crossings of a two-sided threshold by an EWMA of a standard normal AR(1) sequence.
+
+    The EWMA is an AR(2) process. The rate of crossings follows from its correlation between consecutive values,
+    (a + rho) / (1 + a rho) with a = 1 - w. Crossings come in clusters, so alarms are rarer than crossings.
+
+    Args:
+        threshold: in standard deviations of the EWMA.
+        weight: w of the newest value.
+        correlation: rho between consecutive values.
+    """
+    keep = 1 - weight
+    r = (keep + correlation) / (1 + keep * correlation)
+    spread = np.sqrt(1 - r * r)
+    rate, _ = quad(
+        lambda y: np.exp(-y * y / 2) * ndtr((threshold - r * y) / spread),
+        threshold,
+        threshold + 12.0,
+        epsabs=0,
+        limit=200,
+    )
+    return float(1 / max(2 * rate / np.sqrt(2 * np.pi), np.finfo(float).tiny))
+
+
+@lru_cache(maxsize=256)
+def ewma_threshold(weight: float, run_length: float, correlation: float = 0.0) -> float:
+    """The threshold of a two-sided EWMA chart, in its standard deviations, with this mean time between crossings.
+
+    Args:
+        weight: w of the newest value.
+        run_length: mean steps between false alarms.
+        correlation: rho between consecutive values.
+    """
+    return float(brentq(lambda L: np.log(ewma_run_length(L, weight, correlation) / run_length), 0.0, 30.0))

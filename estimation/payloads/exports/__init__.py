@@ -1,11 +1,6 @@
-"""Payloads as controllers and descriptions take them, one form a file."""
+"""Payloads as controllers and descriptions take them."""
 
-from estimation.payloads.exports.base import PayloadExport
-from estimation.payloads.exports.franka import Franka
-from estimation.payloads.exports.kuka import Kuka
-from estimation.payloads.exports.ros import RosParameters
-from estimation.payloads.exports.urdf import UrdfLink
-from estimation.payloads.exports.urscript import UrScript
+from estimation.payloads.exports.forms import Franka, Kuka, PayloadExport, RosParameters, UrdfLink, UrScript
 from robots.common.errors import InputError
 
 EXPORTS: dict[str, PayloadExport] = {

@@ -2,22 +2,30 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 import pinocchio as pin
+import yaml
 from numpy.typing import NDArray
-from scipy.linalg import lstsq, qr
+from scipy.linalg import lstsq, qr, solve_toeplitz
 from scipy.signal import lfilter
 from scipy.stats import f as f_distribution
 
 from oed.benchmarks.answers.answer import CaseAnswer, NamedEffect
 from oed.benchmarks.folders import BlindCase
-from oed.benchmarks.rivals.base_model import BaseFit, away_from_reversals, base_columns, filtered, fit, motion_of
-from oed.benchmarks.rivals.dictionary import groups
-from oed.benchmarks.rivals.gears import gear_ratios
+from oed.benchmarks.rivals.base_model import (
+    BaseFit,
+    Motion,
+    away_from_reversals,
+    base_columns,
+    filtered,
+    fit,
+    motion_of,
+)
 from oed.benchmarks.rivals.logs import read_motion
-from oed.benchmarks.rivals.whitening import whitening_filter
 
 Array = NDArray[np.float64]
 
@@ -191,3 +199,77 @@ def _span(columns: Array) -> Array:
 
 def _projected(basis: Array, values: Array) -> Array:
     return np.asarray(basis @ (basis.T @ values))
+
+
+Gears = tuple[float | None, ...]
+
+
+def gear_ratios(file: Path, joints: int) -> Gears:
+    """Reads the gear ratio of each joint; None where the description states none.
+
+    Args:
+        file: the robot's YAML file.
+        joints: number of joints.
+    """
+    described = yaml.safe_load(file.read_text(encoding="utf-8"))
+    drives = (described.get("dynamics") or {}).get("drives") or {}
+    values = (drives.get("gear_ratio") or {}).get("values")
+    return tuple(map(float, values)) if values else (None,) * joints
+
+
+SLOW = (0.02, 0.06)
+"""Velocities of exponentials that fade with speed, as fractions of the largest speed."""
+
+HARMONICS = (1.0, 2.0)
+"""Periods of a ripple per turn of the motor."""
+
+
+def groups(motion: Motion, torque: Array, j: int, gear: float | None) -> Iterator[tuple[str, Array]]:
+    """Lists groups of columns (N, k) for one joint's residual, each with the name of the effect that it stands for.
+
+    Args:
+        motion: the motion.
+        torque: the base model's torque (N, n) [N m].
+        j: the joint, from 0.
+        gear: gear ratio of the joint, or None if unknown.
+    """
+    t, q, v = motion.t, motion.q[:, j], motion.v[:, j]
+    tau, sign = torque[:, j], np.sign(v)
+    period = float(np.median(np.diff(motion.t)))
+    rate = np.gradient(tau, period)
+    top = max(float(np.abs(v).max()), 1e-9)
+    size = max(float(np.sqrt((tau**2).mean())), 1e-9)
+    yield "stribeck", np.column_stack([np.exp(-np.abs(v) / (share * top)) * sign for share in SLOW])
+    yield "asymmetric_friction", np.column_stack([np.abs(v), v**2])
+    yield "load_dependent_friction", np.column_stack([np.abs(tau) * sign, np.abs(tau) * v])
+    yield "position_dependent_friction", np.column_stack([np.sin(q) * sign, np.cos(q) * sign])
+    yield "friction_change", np.column_stack([t * sign, t * v])
+    yield "spring", np.column_stack([q, q**2, q**3, np.sin(2 * q), np.cos(2 * q)])
+    yield "torque_scale", np.column_stack([tau * np.abs(tau), tau**3 / size])
+    yield "offset", np.column_stack([t, t**2])
+    yield "delay", rate[:, None]
+    yield "elasticity", np.gradient(rate, period)[:, None]
+    if gear is not None:
+        angles = [k * gear * q for k in HARMONICS]
+        yield "torque_ripple", np.column_stack([f(angle) for angle in angles for f in (np.sin, np.cos)])
+    near = [k for k in (j - 1, j + 1) if 0 <= k < motion.q.shape[1]]
+    coupled = [(motion.q[:, k], np.sign(motion.v[:, k]), motion.v[:, k], motion.a[:, k]) for k in near]
+    yield "coupling", np.column_stack([column for columns in coupled for column in columns])
+
+
+ORDER = 12  # of the autoregressive model
+
+
+def autocorrelation(x: Array, lags: int) -> Array:
+    """Estimates the autocorrelation at the lags 0 to ``lags``, which is 1 at lag 0."""
+    centred = x - x.mean()
+    size = 1 << (2 * len(x) - 1).bit_length()
+    spectrum = np.fft.rfft(centred, size)
+    found = np.fft.irfft(spectrum * spectrum.conj(), size)[: lags + 1]
+    return np.asarray(found / found[0])
+
+
+def whitening_filter(x: Array) -> Array:
+    """Fits an autoregressive model by the Yule-Walker equations; returns the filter's coefficients (ORDER + 1,)."""
+    rho = autocorrelation(x, ORDER)
+    return np.concatenate([[1.0], -solve_toeplitz(rho[:-1], rho[1:])])

@@ -6,6 +6,7 @@ Of each kind of experiment, T-optimality asks how much of either cause base mode
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 
 import numpy as np
@@ -19,12 +20,12 @@ from estimation.diagnosis.hypothesis_tests.problem import Problem
 from oed.campaigns.discriminations.discrimination import Discrimination, DiscriminationScore
 from oed.campaigns.discriminations.motions import ExperimentBuilder, Run
 from oed.campaigns.discriminations.probabilities import STEP, Discriminator, require_separable
-from oed.campaigns.discriminations.rivals import parse_rivals
 from oed.experiments.checks import velocity_share
 from robots.base_parameters import find_base_parameters
 from robots.collision import Surroundings
 from robots.common.errors import InfeasibleError, InputError, NotIdentifiableError
 from robots.common.progress import SILENT, Progress
+from robots.geometry.urdf_selection import nearest
 from robots.plants import Sensors
 from robots.regressor import default_model
 from robots.robot import Robot
@@ -208,3 +209,49 @@ def _choose(problem: Problem, places: list[tuple[str, int | None]], reference: R
         assert failed is not None
         raise failed
     return best[1]
+
+
+def parse_rivals(rivals: str | Sequence[str], robot: Robot) -> list[tuple[str, int | None]]:
+    """Reads two effects, each with a joint or without: ``stribeck:2,load_dependent_friction``.
+
+    Raises:
+        InputError: not two, an effect that the catalogue lacks, a joint where it cannot act, or one effect twice.
+    """
+    texts = [part.strip() for part in (rivals.split(",") if isinstance(rivals, str) else rivals)]
+    if len(texts) != 2 or not all(texts):
+        raise InputError(
+            f"--discriminate needs two effects, found {len([t for t in texts if t])}",
+            allowed="such as stribeck:2,backlash:2",
+        )
+    places = [_place(text, robot) for text in texts]
+    if places[0][1] is None or places[1][1] is None:
+        known = next((joint for _, joint in places if joint is not None), None)
+        places = [
+            (name, known if joint is None and known in EFFECTS[name].joints(robot) else joint) for name, joint in places
+        ]
+    if places[0] == places[1]:
+        raise InputError(
+            f"{texts[0]} and {texts[1]} are the same effect on the same joint",
+            allowed="two different effects, or two different joints",
+        )
+    return places
+
+
+def _place(text: str, robot: Robot) -> tuple[str, int | None]:
+    name, colon, place = (part.strip() for part in text.partition(":"))
+    effect = EFFECTS.get(name)
+    if effect is None:
+        close = nearest(name, EFFECTS)
+        raise InputError(f"there is no effect {name!r}", allowed=", ".join(EFFECTS), remedy=close)
+    if not colon:
+        return name, None
+    joints = effect.joints(robot)
+    if effect.whole_robot:
+        raise InputError(f"{name} acts on the whole robot, not on joint {place} alone", remedy=f"write {name}")
+    if not re.fullmatch(r"[0-9]+", place) or int(place) not in joints:
+        raise InputError(
+            f"{name} cannot act on this joint of {robot.name}",
+            joint=place or "(none)",
+            allowed=", ".join(str(joint) for joint in joints) or "no joint of this robot",
+        )
+    return name, int(place)

@@ -13,14 +13,16 @@ from pathlib import Path
 import numpy as np
 
 from estimation.diagnosis.experiment_plans.next_experiment import NextExperiment
-from estimation.diagnosis.results.diagnosis import Diagnosis
+from estimation.diagnosis.pipeline import diagnose
+from estimation.diagnosis.results.diagnosis import DIAGNOSIS, MODEL, Diagnosis
+from estimation.identifications.identification import identify
+from estimation.logs import read_log
 from oed.campaigns.checking import TorqueCheck, checked
 from oed.campaigns.excitation import excitation_stage
-from oed.campaigns.loops.diagnosing import diagnose_logs
 from oed.campaigns.loops.options import LoopOptions
 from oed.campaigns.loops.proposals import PlannedExperiment, PlannedRun, more_data, plan_experiment
 from oed.campaigns.loops.result import LoopResult
-from oed.campaigns.loops.state import Experiment, LoopRun, LoopState, Recorded, identity, remove_loop
+from oed.campaigns.loops.state import Experiment, LoopRun, LoopState, Recorded, Verdict, identity, remove_loop
 from oed.campaigns.runs.player import Player
 from oed.campaigns.runs.stage_progress import TitledProgress, rest
 from oed.campaigns.runs.state import run_lock
@@ -30,7 +32,7 @@ from oed.experiments import design as design_experiment
 from oed.experiments.checks import velocity_share
 from oed.exports import read_trajectory, write_trajectory
 from robots.common.errors import InputError, OedError
-from robots.common.files import ResultFolder
+from robots.common.files import ResultFolder, write_atomic
 from robots.common.plain import several
 from robots.common.progress import SILENT, Progress
 from robots.robot import Robot
@@ -299,3 +301,61 @@ class _Loop:
     def _motions(self) -> Sequence[Motion]:
         files = dict.fromkeys(run.trajectory for run in self.state.runs)
         return [read_trajectory(self.folder / file, n=self.robot.n)[0] for file in files]
+
+
+def diagnose_logs(
+    robot: Robot,
+    files: Sequence[Path],
+    folder: Path,
+    name: str,
+    *,
+    friction: str,
+    seed: int,
+    report: Callable[[Diagnosis, ResultFolder], None] | None,
+    progress: Progress,
+) -> tuple[Verdict, NextExperiment | None]:
+    """Identifies and diagnoses a robot.
+
+    The results go to the sub-folders ``identified`` and ``diagnosed`` of the experiment. Diagnosis and extended model
+    are copied to the folder itself, where the last ones are found.
+
+    Args:
+        robot: the robot.
+        files: logs of all experiments, on one clock.
+        folder: of the loop.
+        name: sub-folder of the experiment.
+        friction: of the base model.
+        seed: of the resampling.
+        report: writes a page into the folder of the diagnosis.
+        progress: listener.
+
+    Returns:
+        What the logs show, and the experiment that is proposed.
+
+    Raises:
+        InputError: a log that the gate refuses.
+        NotIdentifiableError: no joint moves.
+    """
+    logs = [read_log(file, robot.n, kinds=robot.chain.kinds) for file in files]
+    estimate = identify(robot, logs, friction=friction, seed=seed)
+    found = diagnose(robot, logs, friction=friction, seed=seed, progress=progress)
+    summary = found.summary()
+    with ResultFolder(folder / name / "identified", True) as out:
+        estimate.save(out.path(MODEL).parent)
+    with ResultFolder(folder / name / "diagnosed", True) as out:
+        found.save(out.path(MODEL).parent)
+        write_atomic(out.path("summary.txt"), summary + "\n")
+        if report is not None:
+            report(found, out)
+    for file in (DIAGNOSIS, MODEL):
+        write_atomic(folder / file, (folder / name / "diagnosed" / file).read_bytes(), force=True)
+    data = found.to_dict()
+    verdict = Verdict(
+        folder=f"{name}/diagnosed",
+        verdict=found.verdict,
+        findings=data["findings"],
+        before=data["baseline"]["nrmse"],
+        after=data["extended"]["nrmse"],
+        summary=summary,
+    )
+    return verdict, found.next_experiment

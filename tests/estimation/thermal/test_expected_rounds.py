@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from estimation.thermal.expected_rounds import expected_rounds
+from estimation.thermal.campaign_fit import expected_rounds
 
 
 def test_rounds_left_follow_from_the_rate() -> None:

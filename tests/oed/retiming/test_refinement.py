@@ -6,9 +6,8 @@ from numpy.polynomial import Polynomial
 from scipy.optimize import approx_fprime
 
 from oed.retiming.barrier import _quadratic, inside, shorten
-from oed.retiming.hermite import hermite_curve
 from oed.retiming.limits import limit_usage
-from oed.retiming.refinement import refine
+from oed.retiming.refinement import hermite_curve, refine
 from oed.retiming.speed_law import SpeedGrid, SpeedLaw
 from oed.retiming.timing_problem import TimingProblem
 from robots.limits import Limits

@@ -1,7 +1,7 @@
 import numpy as np
 from numpy.polynomial import Polynomial
 
-from oed.retiming.stretches import split_at_rests
+from oed.retiming.toppra_ import split_at_rests
 from robots.signals import Motion
 
 PERIOD = 0.004

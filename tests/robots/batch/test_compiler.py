@@ -15,7 +15,7 @@ import pytest
 from robots.batch import batch_function, compiled
 from robots.batch.c_source import c_source
 from robots.batch.compiled import CompiledFunction
-from robots.batch.vectorised import VectorisedFunction
+from robots.batch.factory import VectorisedFunction
 from robots.common.errors import InputError
 
 ROOT = Path(__file__).parents[3]

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from robots.collision import Surroundings, collision_model
-from robots.collision.base_plane import base_plane
 from robots.collision.boxes import Box, Scene, floor
+from robots.collision.loading import base_plane
 from robots.common.errors import InputError
 from robots.geometry.chain import Chain, Joint, rotation_from_rpy
 from robots.loading import load_robot

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from estimation.external_forces.residuals.repeats import first_visits
+from estimation.external_forces.thresholds.healthy_logs import first_visits
 
 
 def periodic(seconds, period, n=3, seed=0):

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from estimation.monitoring.control_charts.run_lengths import (
+from estimation.monitoring.control_charts.charts import (
     cusum_run_length,
     cusum_threshold,
     ewma_run_length,

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from estimation.monitoring.windows.common_change import common_change
+from estimation.monitoring.observations import common_change
 
 
 def test_joint_that_deviates_is_ignored():

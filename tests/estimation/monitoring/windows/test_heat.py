@@ -5,7 +5,7 @@ import dataclasses
 import numpy as np
 import pytest
 
-from estimation.monitoring.windows.common_change import common_change
+from estimation.monitoring.observations import common_change
 from estimation.monitoring.windows.heat import HeatState
 from estimation.thermal import ThermalTorqueModel
 from robots.common.errors import InputError

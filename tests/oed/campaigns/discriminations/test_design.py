@@ -12,11 +12,10 @@ import pytest
 
 from estimation.diagnosis.experiment_plans.experiment_motions import MAKERS
 from estimation.diagnosis.hypothesis_tests.hypotheses import Hypothesis
-from oed.campaigns.discriminations.design import discriminate
+from oed.campaigns.discriminations.design import discriminate, parse_rivals
 from oed.campaigns.discriminations.discrimination import Discrimination, DiscriminationScore
 from oed.campaigns.discriminations.motions import ExperimentBuilder
 from oed.campaigns.discriminations.probabilities import require_separable
-from oed.campaigns.discriminations.rivals import parse_rivals
 from oed.exports import read_trajectory
 from oed.reports import Page
 from oed.reports.pages.discrimination_report import discrimination_page
