@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from robots.common.errors import InputError
 from robots.common.plain import all_finite, number
 from robots.geometry.chain import Chain, Joint
+from robots.joints.velocity_ramps import NO_RAMP, VelocityRamp
 from robots.limits import BOUNDS, Limits
 from robots.robot import Robot
 from robots.terms.situations.flange_body import FLANGE
@@ -44,8 +45,14 @@ def describe_robot(robot: Robot) -> dict[str, Any]:
         "joints": joints,
         "tip": robot.chain.tip.tolist(),
         **{name: all_finite(getattr(robot, name)) for name in _BY_JOINT},
-        "limits": {name: all_finite(getattr(robot.limits, name)) for name in BOUNDS},
+        "limits": {name: all_finite(getattr(robot.limits, name)) for name in BOUNDS} | _ramp_of(robot.limits),
     }
+
+
+def _ramp_of(limits: Limits) -> dict[str, Any]:
+    if limits.ramp is None:
+        return {}
+    return {"ramp": {name: getattr(limits.ramp, name).tolist() for name in NO_RAMP} | {"share": limits.ramp.share}}
 
 
 def build_robot(data: Mapping[str, Any]) -> Robot:
@@ -60,7 +67,11 @@ def build_robot(data: Mapping[str, Any]) -> Robot:
     return Robot(
         name=data["name"],
         chain=Chain(joints, np.array(data["gravity"]), np.array(data.get("tip", np.eye(4)))),
-        limits=Limits(lower=_array(limits.get("lower"), n, -np.inf), **bounds),
+        limits=Limits(
+            lower=_array(limits.get("lower"), n, -np.inf),
+            ramp=VelocityRamp(**limits["ramp"]) if "ramp" in limits else None,
+            **bounds,
+        ),
         rotor_inertia=_array(data.get("rotor_inertia"), n, 0.0),
         gear_ratio=_array(data.get("gear_ratio"), n, 1.0),
         torque_constant=_array(data.get("torque_constant"), n, np.nan),

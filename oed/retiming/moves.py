@@ -13,9 +13,10 @@ import numpy as np
 import ruckig
 from numpy.typing import ArrayLike, NDArray
 
-from oed.retiming.limits import finite_limits, require_inside
-from robots.common.errors import InputError, SolverError
+from oed.retiming.limits import finite_limits, limit_usage, require_inside
+from robots.common.errors import InfeasibleError, InputError, SolverError
 from robots.limits import Limits
+from robots.signals import Motion
 
 Array = NDArray[np.float64]
 
@@ -24,6 +25,9 @@ STANDSTILL = 1e-10
 
 FOLLOWER = 1e-6
 """Fraction of the longest stretch below which a joint gets that joint's profile instead of one of its own."""
+
+SLOWED = 8
+"""How often the top speed is lowered for a velocity limit that falls towards the end of a joint."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -91,7 +95,7 @@ def plan_move(
 
     Raises:
         InputError: poses of another size or that are not finite, or a period that is not positive.
-        InfeasibleError: a limit of zero, or a pose outside the position limits.
+        InfeasibleError: a limit of zero, or a pose outside the position limits, or where the joint may hardly move.
         SolverError: ruckig found no profile.
     """
     first, last = (np.asarray(pose, dtype=np.float64) for pose in (start, end))
@@ -111,6 +115,29 @@ def plan_move(
         return PlannedMove(breakpoints=np.array([0.0, _rounded(minimum_duration, period)]), coefficients=coefficients)
     usable = finite_limits(limits)
     bounds = np.stack([usable.velocity, usable.acceleration, usable.jerk])  # (3, n)
+    for _ in range(SLOWED):
+        move = _between(first, stretch, bounds, period, minimum_duration, straight)
+        _check_between(move, first, last)
+        t = period * np.arange(round(move.duration / period) + 1, dtype=np.float64)
+        motion = Motion(t, *move.sample(t))
+        used = limit_usage(motion, limits)["velocity"]
+        if limits.ramp is None or used.max() <= 1.0 + 1e-9:
+            return move
+        # Where the limit falls towards an end, a lower top speed shortens the way on which the joint brakes.
+        slower = 0.98 * np.abs(motion.dq).max(axis=0) / np.minimum(used, 2.0)
+        bounds[0] = np.where(used > 1.0, np.minimum(bounds[0], slower), bounds[0])
+    joint = int(np.argmax(used))
+    raise InfeasibleError(
+        "an end of the move is where the joint may hardly move",
+        joint=joint + 1,
+        remedy="choose a pose farther from the end of the joint",
+    )
+
+
+def _between(
+    first: Array, stretch: Array, bounds: Array, period: float, minimum_duration: float, straight: bool
+) -> PlannedMove:
+    """The move from a pose (n,) by a stretch (n,) under bounds of velocity, acceleration and jerk (3, n)."""
     if straight:
         moving = np.abs(stretch) > STANDSTILL
         shared = (bounds[:, moving] / np.abs(stretch[moving])).min(axis=1)
@@ -119,9 +146,7 @@ def plan_move(
     else:
         breakpoints, coefficients = _profile(bounds, stretch, period, minimum_duration)
     coefficients[:, :, 0] += first
-    move = PlannedMove(breakpoints=breakpoints, coefficients=coefficients)
-    _check_between(move, first, last)
-    return move
+    return PlannedMove(breakpoints=breakpoints, coefficients=coefficients)
 
 
 def _profile(bounds: Array, stretch: Array, period: float, minimum_duration: float) -> tuple[Array, Array]:

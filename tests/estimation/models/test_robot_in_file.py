@@ -11,6 +11,7 @@ import pytest
 from estimation import load_model
 from estimation.models.extension import Extension
 from estimation.models.model import Model
+from estimation.models.robot_in_file import build_robot, describe_robot
 from robots import load_robot
 from robots.common.errors import InputError
 from robots.limits import BOUNDS
@@ -144,3 +145,12 @@ def test_the_flange_is_in_the_file_and_a_payload_acts_there(tmp_path):
     np.testing.assert_allclose(older.torque(*state), made.torque(*state), rtol=1e-12)
     with pytest.raises(InputError, match="does not state the pose of the flange"):
         older.torque(*state, payload=body)
+
+
+def test_speed_limits_that_depend_on_the_position_are_kept():
+    """They come back from JSON as they were."""
+    robot = load_robot("fr3")
+    again = build_robot(json.loads(json.dumps(describe_robot(robot)))).limits.ramp
+    for name in ("lower", "upper", "offset", "deceleration", "reserve"):
+        np.testing.assert_array_equal(getattr(again, name), getattr(robot.limits.ramp, name))
+    assert again.share == robot.limits.ramp.share

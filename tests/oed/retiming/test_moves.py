@@ -180,3 +180,26 @@ def test_an_overshooting_plan_is_refused():
     move = moves.PlannedMove(breakpoints=np.array([0.0, 1.5]), coefficients=coefficients)
     with pytest.raises(SolverError, match="joint 1: the planned move overshoots its ends by 2 rad"):
         moves._check_between(move, np.zeros(1), np.zeros(1))
+
+
+@pytest.mark.parametrize("straight", [False, True])
+def test_a_move_slows_down_where_the_speed_limit_falls_towards_an_end(straight):
+    """Moves between the ends of the joints of a Franka FR3 keep its speed limits, which depend on the position."""
+    limits = robots.load_robot("fr3").limits
+    start, end = 0.98 * limits.lower + 0.02 * limits.upper, 0.02 * limits.lower + 0.98 * limits.upper
+    move = plan_move(limits, start, end, period=0.001, straight=straight)
+    q, dq, _ = move.sample(np.linspace(0.0, move.duration, 5001))
+    ramp = limits.ramp
+    # Its formula, written out (Franka Control Interface, limits of the joints).
+    way = np.where(dq > 0, ramp.upper - q, q - ramp.lower)
+    allowed = np.sqrt(2 * ramp.deceleration * way) - ramp.offset - ramp.reserve
+    assert (np.abs(dq) <= np.minimum(limits.velocity, allowed) * (1 + 1e-3)).all()
+    np.testing.assert_allclose(q[[0, -1]], [start, end], atol=1e-12)
+
+
+def test_a_move_to_where_a_joint_may_not_move_is_refused():
+    """The end of the range of a ramp allows no speed at all."""
+    limits = robots.load_robot("fr3").limits
+    edge = dataclasses.replace(limits, upper=limits.ramp.upper, lower=limits.ramp.lower)
+    with pytest.raises(InfeasibleError, match="hardly move"):
+        plan_move(edge, np.zeros(7) + edge.middle, edge.upper, period=0.001)
