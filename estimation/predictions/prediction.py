@@ -57,6 +57,8 @@ class Prediction(Result):
         gate: the check of the log; None without one.
         rest: rows (N, n) in which the joint stands: friction may hold it with any torque, and the band is that wide.
             They do not count in the errors. None for none.
+        ends: rows (N,) at the ends of the log or of a gap, where the smoothing has positions on one side only.
+            As in a fit, they do not count in the errors.
     """
 
     ENTRIES = (
@@ -83,6 +85,7 @@ class Prediction(Result):
     cutoff: float = np.inf
     gate: GateReport | None = None
     rest: NDArray[np.bool_] | None = None
+    ends: NDArray[np.bool_] | None = None
 
     @property
     def error_rms(self) -> Array:
@@ -125,7 +128,8 @@ class Prediction(Result):
         """Share of the measured torque within the band (n,); NaN without measurement or band."""
         if self.measured is None or self.band is None:
             return np.full(self.predicted.shape[1], np.nan)
-        return np.asarray((np.abs(self.measured - self.predicted) <= self.band).mean(axis=0))
+        within = np.abs(self.measured - self.predicted) <= self.band
+        return np.asarray((within if self.ends is None else within[~self.ends]).mean(axis=0))
 
     @property
     def extrapolated(self) -> Array | None:
@@ -139,7 +143,12 @@ class Prediction(Result):
 
     @property
     def _judged(self) -> Array:
-        return np.ones(self.predicted.shape) if self.rest is None else (~self.rest).astype(float)
+        judged = np.ones(self.predicted.shape)
+        if self.rest is not None:
+            judged[self.rest] = 0.0
+        if self.ends is not None:
+            judged[self.ends] = 0.0
+        return judged
 
     def _rms(self, signal: Array) -> Array:
         return np.asarray(np.sqrt(np.average(signal**2, axis=0, weights=self._judged)))
@@ -287,15 +296,16 @@ def predict(
     log = as_joint_torque(robot, log) if log.tau is not None or log.current is not None else log
     note_meaning(model, log)
     gate, parts = checked_motion(robot, log) if check else (None, [log])
-    log = joined(parts)
-    motion = Motion.concatenate([smooth(resample(part.t, part.q), smoother_of(model, cutoff)) for part in parts])
+    log, smoother = joined(parts), smoother_of(model, cutoff)
+    smoothed = [smooth(resample(part.t, part.q), smoother) for part in parts]
+    motion = Motion.concatenate(smoothed)
     has_torque = log.tau is not None or log.current is not None
     if thermal is None:
         states = (motion.q, motion.dq, motion.ddq)
         if later is None:
             later = clock_shift(model, log)[0]
             before = warmed(model, before, log, later)[0]
-        smoother, clock = smoother_of(model, cutoff), motion.t + later
+        clock = motion.t + later
         earlier = [smooth(resample(own.t, own.q), smoother) for own in before]
         predicted = model.torque(*states, clock, gravity=log.gravity, payload=log.payload, before=earlier)
     else:
@@ -303,7 +313,8 @@ def predict(
 
         require_plain([log], HEAT)
         predicted, _ = thermal.simulate(motion, ambient=surroundings(log, motion.t, ambient), start=start)
-    rest = np.concatenate([rows_at_rest(part.t, part.q) for part in parts])
+    inside = [smoother.inside(part.t) for part in smoothed]
+    rest = np.concatenate([_at_rest(*each) for each in zip(parts, smoothed, inside, strict=True)])
     band = band_of_motion(model, motion, log.gravity, rest)
     return Prediction(
         motion=motion,
@@ -316,4 +327,13 @@ def predict(
         cutoff=cutoff,
         gate=gate,
         rest=rest if rest.any() else None,
+        ends=~np.concatenate(inside),
     )
+
+
+def _at_rest(part: Log, motion: Motion, inside: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """Rows (N, n) at rest, found as a fit finds them; the ends are as the rows next to them."""
+    rows = np.flatnonzero(inside)
+    speed = np.sqrt(np.mean(motion.dq[rows] ** 2, axis=0))
+    found = rows_at_rest(part.t[rows], part.q[rows], speed)
+    return found[np.clip(np.arange(len(part.t)) - rows[0], 0, len(rows) - 1)]

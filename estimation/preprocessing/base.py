@@ -40,3 +40,16 @@ class Smoother(Record, ABC):
     def text(self) -> str:
         """Says what it does in a few words."""
         return f"{self.name} at {self.cutoff:g} Hz"
+
+    def inside(self, t: Array) -> NDArray[np.bool_]:
+        """Rows (N,) of a log, or of a part between gaps, at which the smoothing has data on both sides.
+
+        Args:
+            t: its times (N,) [s].
+
+        Returns:
+            The rows; all of them where none is.
+        """
+        edge = self.edge(float(t[-1] - t[0]))
+        found = np.asarray((t >= t[0] + edge) & (t <= t[-1] - edge))
+        return found if found.any() else np.ones(len(t), dtype=bool)

@@ -110,9 +110,7 @@ class Prepared:
             (rows,) = self._masked([self._inside(motion, smoother)])
             return rows
         (rows,) = self._masked([(motion, self.tau)])
-        edge = smoother.edge(motion.duration)
-        inside = (motion.t >= motion.t[0] + edge) & (motion.t <= motion.t[-1] - edge)
-        return replace(rows, mask=rows.mask * inside[:, None])
+        return replace(rows, mask=rows.mask * smoother.inside(motion.t)[:, None])
 
     def pieces(self, by: float | Smoother) -> list[Rows]:
         """Smooths the log as `rows` does, a long one in pieces that follow each other."""

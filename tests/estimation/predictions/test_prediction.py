@@ -40,11 +40,12 @@ def test_a_prediction_smooths_as_the_fit_did(arm, arm_log):
 
 
 def test_the_errors_are_those_of_the_arrays(model, arm_log):
-    """Error RMS, NRMSE and relative spread follow from measured and predicted torque, but for rows at rest."""
+    """Error RMS, NRMSE and relative spread follow from measured and predicted torque, but for rows at rest or ends."""
     log = arm_log(seed=1, motion_seed=1)
     prediction = predict(model, log)
     assert prediction.rest is not None
-    moving = np.where(prediction.rest, np.nan, 1.0)
+    assert prediction.ends is not None
+    moving = np.where(prediction.rest | prediction.ends[:, None], np.nan, 1.0)
     error, torque = (log.tau - prediction.predicted) * moving, log.tau * moving
     np.testing.assert_allclose(prediction.error_rms, np.sqrt(np.nanmean(error**2, axis=0)))
     np.testing.assert_allclose(prediction.nrmse, prediction.error_rms / np.sqrt(np.nanmean(torque**2, axis=0)))
@@ -52,6 +53,14 @@ def test_the_errors_are_those_of_the_arrays(model, arm_log):
     assert prediction.to_dict()["at_rest"] == pytest.approx(prediction.rest.mean(axis=0))
     assert prediction.to_dict()["nrmse"] == prediction.nrmse.tolist()
     assert "rel. RMS" in prediction.summary()
+
+
+def test_a_fitted_log_has_the_error_that_the_fit_states(arm, arm_log):
+    """The log that a model was fitted to is predicted with the error of the fit: one definition, the same rows."""
+    log = arm_log()
+    estimate = identify(arm, log)
+    fitted = [joint.residual_rms / joint.torque_rms for joint in estimate.joints]
+    np.testing.assert_allclose(predict(estimate.model, log).nrmse, fitted, rtol=1e-9)
 
 
 def test_a_model_of_another_robot_is_said_not_to_fit(model, arm_log):
