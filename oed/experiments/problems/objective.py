@@ -85,7 +85,7 @@ class Gradient(casadi.Callback):
 class Watch(casadi.Callback):
     """Asks after each iteration whether to go on; returning 1 stops IPOPT, which keeps its last iterate."""
 
-    def __init__(self, size: int, rows: int, go_on: Callable[[], bool], trap: Trap) -> None:
+    def __init__(self, size: int, rows: int, go_on: Callable[[float], bool], trap: Trap) -> None:
         casadi.Callback.__init__(self)
         self._shapes = {"x": size, "f": 1, "g": rows, "lam_x": size, "lam_g": rows, "lam_p": 0}
         self._go_on, self._trap = go_on, trap
@@ -101,4 +101,4 @@ class Watch(casadi.Callback):
         return casadi.Sparsity.dense(self._shapes[casadi.nlpsol_out(index)], 1)
 
     def eval(self, arguments: Sequence[casadi.DM]) -> list[casadi.DM]:
-        return [casadi.DM(0.0 if self._trap.call(self._go_on, False) else 1.0)]
+        return [casadi.DM(0.0 if self._trap.call(lambda: self._go_on(float(arguments[1])), False) else 1.0)]

@@ -83,20 +83,22 @@ def row_gradients(problem: FourierProblem, states: States, samples: Indices, row
         samples: which limit sample each of them is at (m,).
         rows: which row of all pointwise limits it is (m,).
     """
-    if not len(samples):
-        return np.zeros((0, problem.size))
-    used, where = np.unique(samples, return_inverse=True)
-    at = [state[used] for state in states]
-    by_state = np.concatenate([limit.jacobian(*at) for limit in problem.pointwise], axis=1)
-    slopes = by_state[where, rows].reshape(-1, 3, problem.joints)  # per row: by q, dq, ddq of each joint
-    bases = np.stack(problem.limit_bases[:3], axis=1)[samples]  # (m, 3, K)
-    gradient = np.einsum("rdj,rdk->rjk", slopes, bases) * problem.scale
-    return np.asarray(gradient.reshape(len(samples), -1), dtype=np.float64)
+    gradients, first = np.zeros((len(samples), problem.joints, problem.family.size)), 0
+    for limit in problem.pointwise:
+        # Each limit is differentiated only at the samples of its own rows.
+        own = np.flatnonzero((rows >= first) & (rows < first + len(limit.labels)))
+        if len(own):
+            used, where = np.unique(samples[own], return_inverse=True)
+            by_state = limit.jacobian(*(state[used] for state in states))
+            slopes = by_state[where, rows[own] - first].reshape(-1, 3, problem.joints)  # by q, dq, ddq of each joint
+            gradients[own] = np.swapaxes(slopes, 1, 2) @ problem.state_basis[samples[own]]
+        first += len(limit.labels)
+    return np.asarray((gradients * problem.scale).reshape(-1, problem.size), dtype=np.float64)
 
 
 def mean_gradients(problem: FourierProblem, states: States) -> Array:
     """Evaluates the derivatives (A, n K) of all averaged limits by z."""
-    bases = np.stack(problem.limit_bases[:3], axis=1)  # (M, 3, K)
+    bases = problem.state_basis
     whole = [np.zeros((0, problem.size))]
     for limit in problem.averaged:
         each = limit.jacobian(*states).reshape(len(limit.labels), len(bases), 3, problem.joints)

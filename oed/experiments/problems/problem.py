@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, field, fields, replace
 from functools import cached_property
 
@@ -158,10 +159,15 @@ class FourierProblem:
 
     def surrogate(self, z: Array, sharpness: float) -> tuple[float, Array]:
         """Evaluates the criterion's smooth stand-in and its exact gradient (n K,)."""
+        value, gradient = self.value_first(z, sharpness)
+        return value, gradient()
+
+    def value_first(self, z: Array, sharpness: float) -> tuple[float, Callable[[], Array]]:
+        """Evaluates the stand-in; its gradient (n K,) can be asked for until another point is evaluated."""
         gram = self.gram(z)
         eigenvalues, vectors = np.linalg.eigh(self.weighting.apply(gram))
         value, slope = self.criterion.surrogate(eigenvalues, sharpness)
-        return value, self.pullback(self.weighting.pullback((vectors * slope) @ vectors.T, gram))
+        return value, lambda: self.pullback(self.weighting.pullback((vectors * slope) @ vectors.T, gram))
 
     def cost(self, z: Array) -> float:
         """Evaluates the criterion itself on the samples, smaller being better."""
@@ -172,6 +178,11 @@ class FourierProblem:
     def limit_bases(self) -> Kinematics:
         """The basis matrices (M, K) at the limit samples."""
         return self.family.basis(self.family.limit_times(self.limit_samples))
+
+    @cached_property
+    def state_basis(self) -> Array:
+        """Basis of position, velocity and acceleration at the limit samples (M, 3, K)."""
+        return np.stack(self.limit_bases[:3], axis=1)
 
     def pointwise_excess(self, z: Array) -> Array:
         """How far the pointwise limits are passed at the limit samples (M, R), negative within."""

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from oed.criteria import triangle
 from oed.experiments.problems.problem import FourierProblem
 from oed.experiments.solvers import Solved, Solver, Stage
+from oed.experiments.solvers.base import Tell
 from oed.trajectories import count_periods
 from robots.common.errors import InputError
 
@@ -26,6 +27,12 @@ FINE_SAMPLES = 1000
 # Screening checks only every fifth limit sample. The start that it chooses is then pulled within the limits at all.
 SCREENING_STRIDE = 5
 INTERRUPTED = "interrupted"
+
+# A hop may be behind the best design by this much of the stand-in, a logarithm, when its first stage ends; before, by
+# twice as much for each so many iterations that are left; and by less in later stages.
+LAG, HALVED_IN, LAG_LATER = 0.04, 15, 0.01
+# Iterations of a stage before which a hop is not judged.
+LOOK = 10
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -153,7 +160,7 @@ class Island:
         for hop in range(self._effort.hops):
             pool = sorted(pool, key=_by_cost)[:4]
             if self._in_time():
-                pool.append(self._solve(self._thrown(pool, hop), again))
+                pool.append(self._solve(self._thrown(pool, hop), again, self._race(pool[0][1], again)))
         best = min(pool, key=_by_cost)[1]
         best = self._finish(best)
         cost, value = dense(self._problem, best)
@@ -171,6 +178,9 @@ class Island:
 
     def _in_time(self) -> bool:
         return time.time() < self._deadline and not self._halted()
+
+    def _still(self, sharpness: float, value: float) -> bool:
+        return self._in_time()
 
     def _status(self) -> str:
         if self._halted():
@@ -195,10 +205,23 @@ class Island:
         z[moved] += THROWS[int(rng.integers(3))] * rng.normal(size=(len(moved), z.shape[1]))
         return self._problem.shrunk(z.reshape(-1), 0.99)
 
-    def _solve(self, start: Array, stages: list[Stage]) -> tuple[float, Array]:
+    def _race(self, best: Array, stages: list[Stage]) -> Tell:
+        """Ends a hop that will not come to the best design: half of them are known by their first twenty iterations."""
+        rivals = {stage.sharpness: self._problem.surrogate(best, stage.sharpness)[0] for stage in stages}
+        first, most, seen = stages[0].sharpness, stages[0].max_iter, dict.fromkeys(rivals, 0)
+
+        def tell(sharpness: float, value: float) -> bool:
+            seen[sharpness] += 1
+            left, behind = most - seen[sharpness], value - rivals[sharpness]
+            allowed = LAG * 2 ** (left / HALVED_IN) if sharpness == first else LAG_LATER
+            return (seen[sharpness] < LOOK or behind <= allowed) and self._in_time()
+
+        return tell
+
+    def _solve(self, start: Array, stages: list[Stage], tell: Tell | None = None) -> tuple[float, Array]:
         if not self._in_time():
             return np.inf, start
-        solved = self._settings.minimise(self._problem, start, stages, tell=self._in_time)
+        solved = self._settings.minimise(self._problem, start, stages, tell=tell or self._still)
         return self._count(solved, self._cost(solved.z)), solved.z
 
     def _cost(self, z: Array) -> float:
@@ -221,7 +244,7 @@ class Island:
             if not self._in_time():
                 break
             stage = Stage(sharpness=sharpness, max_iter=self._settings.finish_iter, barrier=barrier)
-            solved = self._settings.minimise(problem, best, [stage], tell=self._in_time)
+            solved = self._settings.minimise(problem, best, [stage], tell=self._still)
             self._iterations += solved.iterations
             self._evaluations += solved.evaluations
             cost = dense(problem, solved.z)[0]

@@ -18,6 +18,15 @@ Array = NDArray[np.float64]
 PASSED = 1e-3
 
 
+Tell = Callable[[float, float], bool]
+"""Hears the sharpness of a stage and the value of its stand-in; says whether to go on."""
+
+
+def go_on(sharpness: float, value: float) -> bool:
+    """Lets a solver finish."""
+    return True
+
+
 @dataclass(frozen=True, kw_only=True)
 class Stage:
     """One smooth stand-in of the criterion to be minimised.
@@ -75,7 +84,7 @@ class Solver(ABC):
         start: Array,
         stages: Sequence[Stage],
         *,
-        tell: Callable[[], bool] = lambda: True,
+        tell: Tell = go_on,
     ) -> Solved:
         """Solves stages one after the other from a feasible start.
 
@@ -83,7 +92,8 @@ class Solver(ABC):
             problem: the design problem.
             start: z (n K,), within the limits.
             stages: of the criterion, the smoothest first.
-            tell: called after each iteration; returning False stops the solver, which keeps its last iterate.
+            tell: called after each iteration with the stage's sharpness and the value of its stand-in; returning False
+                stops the solver, which keeps its last iterate.
 
         Returns:
             The last stage's solution, within all limits.

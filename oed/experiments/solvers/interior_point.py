@@ -13,7 +13,7 @@ Source: Nocedal and Wright, Numerical Optimization, 2nd ed., sections 18.3 (damp
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import ClassVar
 
@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 from scipy.linalg.lapack import dposv
 
 from oed.experiments.problems.problem import FourierProblem
-from oed.experiments.solvers.base import Solved, Solver, Stage
+from oed.experiments.solvers.base import Solved, Solver, Stage, Tell, go_on
 from oed.experiments.solvers.curved_slacks import CurvedSlacks
 from oed.experiments.solvers.slacks import LinearSlacks, Slacks
 
@@ -49,7 +49,7 @@ class InteriorPoint(Solver):
         start: Array,
         stages: Sequence[Stage],
         *,
-        tell: Callable[[], bool] = lambda: True,
+        tell: Tell = go_on,
     ) -> Solved:
         """See `Solver.minimise`."""
         descent = _Descent(problem, start, self.tolerance, tell)
@@ -68,7 +68,7 @@ class InteriorPoint(Solver):
 class _Descent:
     """An iterate, its quasi-Newton Hessian, and the iterations that improve both."""
 
-    def __init__(self, problem: FourierProblem, start: Array, tolerance: float, tell: Callable[[], bool]) -> None:
+    def __init__(self, problem: FourierProblem, start: Array, tolerance: float, tell: Tell) -> None:
         self._problem, self._tolerance, self._tell = problem, tolerance, tell
         self._linear = LinearSlacks(problem)
         self.z = start
@@ -81,7 +81,8 @@ class _Descent:
 
     def run(self, sharpness: float, max_iter: int, mu: float) -> None:
         """Minimises the stand-in of one sharpness."""
-        z, (f, g) = self.z, self._evaluated(self.z, sharpness)
+        z, (f, g) = self.z, self._problem.surrogate(self.z, sharpness)
+        self.evaluations += 1
         slacks = Slacks(self._linear, CurvedSlacks(self._problem, z))
         s, _ = slacks.values(z)
         slacks.linearise(z)
@@ -118,7 +119,7 @@ class _Descent:
             z, g = new, slope
             self.z = z
             self.iterations += 1
-            if not self._tell():
+            if not self._tell(sharpness, f):
                 self.stopped, self.status = True, "stopped"
                 break
 
@@ -162,10 +163,11 @@ class _Descent:
             if not others or there.min() <= 0:  # a curved limit bends away
                 step /= 2
                 continue
-            value, gradient = self._evaluated(new, sharpness)
+            self.evaluations += 1
+            value, gradient = self._problem.value_first(new, sharpness)
             rise = value - mu * np.log(there).sum() - before
             if rise <= ARMIJO * step * slope:
-                return new, value, gradient, there
+                return new, value, gradient(), there
             curvature = (rise - step * slope) / step**2
             step = float(np.clip(-slope / (2 * curvature) if curvature > 0 else 0.0, 0.1 * step, 0.5 * step))
         return None
@@ -182,10 +184,6 @@ class _Descent:
             y = share * y + (1 - share) * image
             sy = float(moved @ y)
         self._hessian = self._hessian + np.outer(y, y) / sy - np.outer(image, image) / quadratic
-
-    def _evaluated(self, z: Array, sharpness: float) -> tuple[float, Array]:
-        self.evaluations += 1
-        return self._problem.surrogate(z, sharpness)
 
 
 def _to_the_boundary(values: Array, change: Array, mu: float) -> float:

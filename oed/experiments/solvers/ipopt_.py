@@ -16,7 +16,7 @@ from oed.experiments.problems.pointwise_rows import PointwiseRows
 from oed.experiments.problems.problem import FourierProblem
 from oed.experiments.problems.trap import Trap
 from oed.experiments.problems.working_set import WorkingSet
-from oed.experiments.solvers.base import PASSED, Solved, Solver, Stage
+from oed.experiments.solvers.base import PASSED, Solved, Solver, Stage, Tell, go_on
 
 Array = NDArray[np.float64]
 
@@ -45,7 +45,7 @@ class Ipopt(Solver):
         start: Array,
         stages: Sequence[Stage],
         *,
-        tell: Callable[[], bool] = lambda: True,
+        tell: Tell = go_on,
     ) -> Solved:
         """See `Solver.minimise`."""
         trap = Trap()
@@ -53,9 +53,9 @@ class Ipopt(Solver):
         pointwise.add_peaks(start, PASSED)
         z, iterations, status, going = start, 0, "no iteration", True
 
-        def watch() -> bool:
+        def watch(value: float) -> bool:
             nonlocal going
-            going = going and tell()
+            going = going and tell(stage.sharpness, value)
             return going
 
         for stage in stages:
@@ -89,7 +89,7 @@ class _Run:
         settings: Ipopt,
         max_iter: int,
         barrier: float,
-        watch: Callable[[], bool],
+        watch: Callable[[float], bool],
         trap: Trap,
     ) -> None:
         matrix, offset = working.matrix()

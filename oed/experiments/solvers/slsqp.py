@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
@@ -13,7 +13,7 @@ from scipy.optimize import OptimizeResult, minimize
 from oed.experiments.problems.pointwise_rows import PointwiseRows
 from oed.experiments.problems.problem import FourierProblem
 from oed.experiments.problems.working_set import WorkingSet
-from oed.experiments.solvers.base import PASSED, Solved, Solver, Stage
+from oed.experiments.solvers.base import PASSED, Solved, Solver, Stage, Tell, go_on
 
 Array = NDArray[np.float64]
 
@@ -37,7 +37,7 @@ class Slsqp(Solver):
         start: Array,
         stages: Sequence[Stage],
         *,
-        tell: Callable[[], bool] = lambda: True,
+        tell: Tell = go_on,
     ) -> Solved:
         """See `Solver.minimise`."""
         working, pointwise = WorkingSet(problem), PointwiseRows(problem)
@@ -46,7 +46,7 @@ class Slsqp(Solver):
 
         def watch(intermediate_result: OptimizeResult) -> None:
             nonlocal going
-            going = going and tell()
+            going = going and tell(stage.sharpness, float(intermediate_result.fun))
             if not going:
                 raise StopIteration
 

@@ -16,6 +16,7 @@ import pytest
 
 from oed.criteria import Cond, criterion
 from oed.experiments import Design, Effort
+from oed.experiments.searches import search
 from robots.common.errors import InputError
 from robots.loading import load_robot
 from tests.oed import flat
@@ -74,6 +75,24 @@ def test_no_time_at_all(make_robot) -> None:
     design = flat.design(make_robot("RR", "two"), effort="quick", time_limit=1e-6, periods=1, workers=1)
     assert design.success
     assert design.islands[0].iterations == 0
+
+
+def test_hops_that_fall_behind_are_ended(make_robot, monkeypatch) -> None:
+    """Hops that cannot come to the best design are ended early: the same search takes far fewer iterations.
+
+    With so few hops, a lucky one is worth some percent.
+    """
+    robot, effort = make_robot("RR", "two"), Effort(islands=1, starts=2, screened=20, hops=12, finish_samples=100)
+
+    def run() -> Design:
+        return flat.design(robot, friction="coulomb-viscous", effort=effort, periods=1, workers=1, seed=3)
+
+    raced = run().islands[0]
+    monkeypatch.setattr(search, "LAG", np.inf)
+    monkeypatch.setattr(search, "LOOK", 10_000)
+    whole = run().islands[0]
+    assert raced.iterations < 0.8 * whole.iterations
+    assert raced.final < 1.1 * whole.final
 
 
 @pytest.mark.parametrize("name", ["cond", "d", "a", "e", "cond-d"])

@@ -54,7 +54,7 @@ def test_stopped_within_the_limits(solver: Solver, problem: FourierProblem, star
         problem,
         start,
         [Stage(sharpness=16, max_iter=60, barrier=solver.barriers[0])],
-        tell=lambda: next(left, None) is not None,
+        tell=lambda sharpness, value: next(left, None) is not None,
     )
     assert solved.iterations <= 6
     assert problem.rows.excess(problem.free(solved.z)).max() < 1e-9
