@@ -160,15 +160,20 @@ def test_more_iterations_are_no_worse(limited: FourierProblem, begin: np.ndarray
 
 @pytest.mark.slow
 def test_no_worse_than_slsqp_under_curved_limits(limited: FourierProblem, begin: np.ndarray) -> None:
-    """From near an optimum on which curved limits decide, SLSQP ends at nothing that is better by 2 %."""
+    """From near an optimum on which curved limits decide, SLSQP finds nothing nearby that is better by 2 %.
+
+    Where it leaves that valley, it says nothing about this optimum.
+    """
     stage = Stage(sharpness=16, max_iter=150, barrier=1e-4)
     own = InteriorPoint().minimise(limited, begin, [stage]).z
     assert limited.pointwise_excess(own).max() > -0.02
-    near = limited.shrunk(own, 0.99)
-    ends = [solver.minimise(limited, near, [stage]).z for solver in (InteriorPoint(), Slsqp())]
-    mine, rival = (limited.surrogate(z, 16)[0] for z in ends)
+    starts = [limited.shrunk(own, share) for share in (0.999, 0.995, 0.99, 0.98)]
+    ends = [Slsqp().minimise(limited, near, [stage]).z for near in starts]
+    nearby = [z for z in ends if np.linalg.norm(z - own) < 0.1 * np.linalg.norm(own)]
+    assert nearby
     # The value is log cond: 0.02 is 2 %.
-    assert mine <= rival + 0.02
+    rival = min(limited.surrogate(z, 16)[0] for z in nearby)
+    assert limited.surrogate(own, 16)[0] <= rival + 0.02
 
 
 def test_curved_slacks_and_their_slopes(limited: FourierProblem, begin: np.ndarray) -> None:
