@@ -51,7 +51,7 @@ class Effort:
     """
 
     islands: int = 2
-    starts: int = 6
+    starts: int = 10
     screened: int = 100
     hops: int = 60
     finish_samples: int = 400
