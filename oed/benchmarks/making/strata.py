@@ -16,7 +16,7 @@ Member = TypeVar("Member")
 SHARES = {"nothing": 0.3, "one": 0.3, "two": 0.2, "outside": 0.2}
 """Shares of the cases, by stratum."""
 
-PAIRED = 3.0
+PAIRED_SIZE = 3.0
 """Size of each of two effects over the size of a single one: two are harder to separate."""
 
 
