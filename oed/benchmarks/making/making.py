@@ -35,7 +35,7 @@ from robots.common.errors import InputError
 from robots.common.files import ResultFolder, open_atomic, sha256
 from robots.common.parallel import parallel_map
 from robots.common.progress import Progress
-from robots.version import BENCHMARK_VERSION as TOOL
+from robots.version import VERSION as TOOL
 
 
 def make_benchmark(

@@ -43,7 +43,7 @@ NOT_FOUND = "NOT_FOUND"
 class Command(IntEnum):
     """Type of a package."""
 
-    RTDE_VERSION = ord("V")
+    VERSION = ord("V")
     CONTROLLER_VERSION = ord("v")
     TEXT = ord("M")
     DATA = ord("U")
