@@ -19,7 +19,7 @@ SCAN = np.deg2rad([-90.0, -45.0, 0.0, 45.0, 90.0])
 """Angles from home at which each joint is tried: axes of industrial arms meet at right angles."""
 
 SIDE_WEIGHT = 1e-5
-"""The same from where the polish starts: joints that do not matter stay there, and alignment costs its square."""
+"""Weight of one radian from the start of the refinement: joints that do not matter stay there."""
 
 ROOM_SHARE = 0.5
 """Part of the most room that a pose must leave the joint."""

@@ -8,7 +8,7 @@ from typing import TypeVar
 
 import numpy as np
 
-from oed.benchmarks.truth.effects import KNOWN, STRANGERS
+from oed.benchmarks.truth.effects import KNOWN, UNLISTED
 from oed.benchmarks.truth.effects.base import Effect
 
 Member = TypeVar("Member")
@@ -65,7 +65,7 @@ def tasks(cases: int, robots: Sequence[str], rng: np.random.Generator) -> Iterat
     strata = [name for name, count in counts(cases).items() for _ in range(count)]
     rng.shuffle(strata)
     seeds = rng.integers(2**62, size=cases)
-    pools = {"one": _shuffled(KNOWN, rng), "outside": _shuffled(STRANGERS, rng)}
+    pools = {"one": _shuffled(KNOWN, rng), "outside": _shuffled(UNLISTED, rng)}
     machines = _shuffled(tuple(robots), rng)
     used = dict.fromkeys(SHARES, 0)
     for number, (stratum, seed) in enumerate(zip(strata, seeds, strict=True), start=1):

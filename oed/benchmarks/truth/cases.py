@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 
 from oed.benchmarks.truth.dynamics import Projection, base_regressor
-from oed.benchmarks.truth.effects import KNOWN, STRANGERS, Effect
+from oed.benchmarks.truth.effects import KNOWN, UNLISTED, Effect
 from oed.benchmarks.truth.kinds import KINDS
 from oed.benchmarks.truth.machines import Machine, draw_machine
 from oed.benchmarks.truth.noise import Noise, draw_noise
@@ -127,7 +127,7 @@ def draw_case(
 
     effects: list[Effect] = []
     if isinstance(hide, (int, str)):
-        pool = STRANGERS if hide == "stranger" else KNOWN
+        pool = UNLISTED if hide == "stranger" else KNOWN
         for _ in range(60):
             if len(effects) == (1 if hide == "stranger" else hide):
                 break

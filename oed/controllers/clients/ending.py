@@ -18,7 +18,7 @@ STANDING_TIME = 0.3
 """How long the robot must stand at the end [s]."""
 
 STANDING_TIME_WITHOUT_STATUS = 1.0
-"""The same where the controller reports no state of motion [s]: points may be left in its buffer."""
+"""How long it must stand where the controller reports no state of motion [s]: points may be left in its buffer."""
 
 
 class Ending:

@@ -30,7 +30,7 @@ from robots.robot import Robot
 Array = NDArray[np.float64]
 
 EGM_CYCLE = 0.004
-"""Of the controller [s]."""
+"""Cycle of the controller [s]."""
 
 
 class VirtualEgm(Service):

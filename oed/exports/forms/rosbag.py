@@ -17,7 +17,7 @@ from robots.signals import Motion
 
 TOPIC, TYPE = "/joint_states", "sensor_msgs/msg/JointState"
 ROSBAG_VERSION = 8
-"""Of the bag's description; ROS 2 from Humble on reads it."""
+"""Version of the bag's description; ROS 2 from Humble on reads it."""
 
 
 class Rosbag(Form):

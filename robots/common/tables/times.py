@@ -73,7 +73,7 @@ def seconds_of(table: Table, name: str) -> FloatArray:
             values[row] = _seconds(text.strip().replace(",", "."))
         except ValueError as error:
             raise _no_time(table, name, row) from error
-    return _going_on(values, SECONDS_PER_DAY) if str(texts[0]).strip()[4:5] != "-" else values
+    return _unwrapped(values, SECONDS_PER_DAY) if str(texts[0]).strip()[4:5] != "-" else values
 
 
 def _no_time(table: Table, name: str, row: int) -> InputError:
@@ -87,7 +87,7 @@ def _no_time(table: Table, name: str, row: int) -> InputError:
     )
 
 
-def _going_on(values: FloatArray, period: float) -> FloatArray:
+def _unwrapped(values: FloatArray, period: float) -> FloatArray:
     """Adds a day or an hour wherever a clock without dates begins again."""
     again = np.concatenate([[False], np.diff(values) < -0.5 * period])
     return values + period * np.cumsum(again)
@@ -124,7 +124,7 @@ def _of_sheet(table: Table, name: str) -> FloatArray:
         if dates and len(dates) != row + 1:
             raise _no_time(table, name, row)
     if not dates:
-        return _going_on(hours, period)
+        return _unwrapped(hours, period)
     orders = ("dmy",) if mark == "." else ("mdy", "dmy")
     if dates[0][0] > 31:
         orders = ("ymd",)
