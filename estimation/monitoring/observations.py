@@ -115,8 +115,6 @@ def _common(heat_state: HeatState, rest: Array, variances: Array) -> tuple[Array
     return sensitivity, total, whole, covariance
 
 
-# Deviations of a joint, in standard deviations, from which it counts less, and not at all.
-FAR_SIGMAS, TOO_FAR_SIGMAS = 2.0, 4.0
 COMMON_CHANGE_ROUNDS = 10
 
 
@@ -151,12 +149,7 @@ def common_change(
     inverse = np.linalg.inv(prior)
     for _ in range(COMMON_CHANGE_ROUNDS):
         distance = np.abs(d - S @ values) / np.sqrt(v)
-        weight = (
-            np.where(
-                distance < TOO_FAR_SIGMAS, np.minimum(1.0, FAR_SIGMAS / np.maximum(distance, FAR_SIGMAS)) ** 2, 0.0
-            )
-            / v
-        )
+        weight = np.where(distance < 4.0, np.minimum(1.0, 2.0 / np.maximum(distance, 2.0)) ** 2, 0.0) / v
         inverse = np.linalg.inv(prior + (S * weight[:, None]).T @ S)
         values = inverse @ (S.T @ (weight * d))
     found[live] = values

@@ -21,7 +21,6 @@ Array = NDArray[np.float64]
 
 DRAWN_POSES = 4000  # poses from which the tool's nearest approach to its box is sought
 SEARCH_STARTS = 6
-START_ROOM = 0.1  # around a start pose, in the scale of the limits, mostly [m]
 BOX_TOLERANCE = 1e-5  # of the box's distance, below which the tool is within it [m]
 
 
@@ -183,7 +182,8 @@ def roomy_pose(
     room = limits.values(q, q, q).min(axis=1, initial=np.inf)
     if room.max(initial=-np.inf) < 0.0:
         return None
-    enough = np.flatnonzero(room >= min(START_ROOM, 0.8 * room.max()))
+    # Around a start pose there should be a tenth of the limits' scale, mostly [m].
+    enough = np.flatnonzero(room >= min(0.1, 0.8 * room.max()))
     return np.round(q[enough[np.linalg.norm(q[enough] - home, axis=1).argmin()]], 3)
 
 

@@ -14,7 +14,6 @@ from scipy.signal import butter, sosfiltfilt
 Array = NDArray[np.float64]
 
 FIT_BAND = 5.0  # of the low-pass of torque and columns before the fit [Hz]: above it, accelerations are poorly known
-REVERSAL_TIME = 0.25  # time [s] on both sides of a reversal in which filtered positions do not show the friction's jump
 LOW_PASS_ORDER = 4  # of the low-passes
 
 
@@ -93,7 +92,8 @@ def away_from_reversals(motion: Motion) -> NDArray[np.bool_]:
     """Flags rows (M, n), of those that `filtered` keeps, that are more than 0.25 s from a reversal of the joint."""
     turned = np.zeros(motion.v.shape, dtype=bool)
     turned[1:] = np.sign(motion.v[1:]) != np.sign(motion.v[:-1])
-    near = maximum_filter1d(turned, 2 * round(REVERSAL_TIME / motion.period) + 1, axis=0)
+    # Near a reversal filtered positions do not show the friction's jump.
+    near = maximum_filter1d(turned, 2 * round(0.25 / motion.period) + 1, axis=0)
     return ~np.asarray(near)[_kept(len(turned), motion.period)]
 
 

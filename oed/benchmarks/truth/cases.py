@@ -21,7 +21,6 @@ from oed.benchmarks.truth.plant import Record, open_loop, parts_links, play, pro
 from oed.benchmarks.truth.references import Reference, draw_aperiodic, draw_moves, draw_periodic
 
 SEARCH_STEP = 0.008  # sample period [s] of the open-loop rides in the search for an effect's amount
-UNSTABLE_EXCESS = 0.25  # distance from the joint range, as a fraction of it, at which the loop counts as unstable
 PROJECTION_STRIDE = 2  # step between the rows that projections use
 MOTION = ("q_true", "v_true", "a_true", "sign")
 
@@ -175,7 +174,7 @@ def draw_case(
 
 def _runs_away(machine: Machine, record: Record) -> bool:
     """Returns whether a joint leaves its range by more than a quarter of it, because the position loop is unstable."""
-    reach = UNSTABLE_EXCESS * (machine.upper - machine.lower)
+    reach = 0.25 * (machine.upper - machine.lower)
     return bool(np.any((record.q < machine.lower - reach) | (record.q > machine.upper + reach)))
 
 

@@ -14,7 +14,7 @@ from oed.controllers.virtual.fixed_packets import FixedPackets
 from oed.controllers.virtual.messages import feedback_frame, reply_frame, status_frame
 from oed.controllers.virtual.motoman import MotomanProgram
 from oed.controllers.virtual.options import ControllerOptions
-from oed.controllers.virtual.player import FAULT_REPORTED, Outcome, Player
+from oed.controllers.virtual.player import Fault, Outcome, Player
 from oed.controllers.virtual.ports import Client, Port, TcpPort, UdpPort
 from oed.controllers.virtual.robot import VirtualRobot
 from oed.controllers.virtual.service import Service
@@ -234,7 +234,7 @@ class VirtualController(Service):
         if faults.silent_after is not None and count > faults.silent_after:
             self._silent = True
         if faults.error_after is not None and count > faults.error_after:
-            self._player.fail(FAULT_REPORTED)
+            self._player.fail(Fault.REPORTED)
         if faults.e_stop_after is not None and count > faults.e_stop_after and self._state_now == "ready":
             self._player.stop()
             self._state_now = "e-stop"

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from enum import Enum
+from enum import Enum, IntEnum
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,8 +17,14 @@ from oed.exports.simple_message import FullPoint, Point, Special
 Array = NDArray[np.float64]
 
 
-FAULT_REPORTED, FAULT_UNDERRUN, FAULT_WRONG_START, FAULT_GAP, FAULT_BACKWARD = 1, 2, 3, 4, 5
-"""Error codes of the status message."""
+class Fault(IntEnum):
+    """Error codes of the status message."""
+
+    REPORTED = 1
+    UNDERRUN = 2
+    WRONG_START = 3
+    GAP = 4
+    BACKWARD = 5
 
 
 class Phase(Enum):
@@ -85,10 +91,10 @@ class Player:
 
     def clear_error(self) -> None:
         """Ends an error of a trajectory; one that was ordered stays."""
-        if self._error != FAULT_REPORTED:
+        if self._error != Fault.REPORTED:
             self._error = 0
 
-    def fail(self, code: int) -> None:
+    def fail(self, code: Fault) -> None:
         """Stops with an error."""
         self.stop()
         self._error = code
@@ -123,7 +129,7 @@ class Player:
                 return None
         outcome = buffer.accept(number, point)
         if outcome in (Outcome.GAP, Outcome.BACKWARD):
-            self.fail(FAULT_GAP if outcome == Outcome.GAP else FAULT_BACKWARD)
+            self.fail(Fault.GAP if outcome == Outcome.GAP else Fault.BACKWARD)
             return None
         if outcome == Outcome.ACCEPTED:
             self._count(now)
@@ -169,7 +175,7 @@ class Player:
                 self._phase = Phase.IDLE
                 self.played_trajectories += 1
             return self._stand(heard)
-        self.fail(FAULT_UNDERRUN)
+        self.fail(Fault.UNDERRUN)
         return self._stand(heard)
 
     @property
@@ -190,7 +196,7 @@ class Player:
     def _starts_here(self, point: FullPoint | Point) -> bool:
         away = np.abs(np.array(point.positions[: len(self.pose)]) - self.pose).max()
         if away > self._options.start_tolerance:
-            self.fail(FAULT_WRONG_START)
+            self.fail(Fault.WRONG_START)
         return not self._error
 
     def _put_download(self, point: FullPoint | Point, now: float) -> Outcome | None:
@@ -208,12 +214,12 @@ class Player:
             number = max(self._numbers, default=-1) + 1
             outcome = buffer.accept(number, point)
             if outcome != Outcome.ACCEPTED or buffer.end != number + 1 or not _even(buffer):
-                self.fail(FAULT_GAP)
+                self.fail(Fault.GAP)
                 return None
             self._count(now)
             return outcome
         if self._buffer is not buffer or number < 0:
-            self.fail(FAULT_GAP)
+            self.fail(Fault.GAP)
             return None
         most = None if self._options.driver is None else self._options.driver.most
         if most is not None and len(self._numbers) >= most - 1:
