@@ -99,8 +99,8 @@ class Instruments:
         for reference in self._references:
             inertia = inertia_matrices(self.data.base, values, reference)
             lengths = np.linalg.eigvalsh(inertia)
-            # Smallest eigenvalue of an inertia matrix, as a share of its smallest diagonal entry, that a simulation
-            # stands.
+            # Smallest eigenvalue of an inertia matrix, as a share of its smallest diagonal entry, that can be
+            # simulated.
             if (lengths[:, 0] <= 0.02 * np.diagonal(inertia, axis1=1, axis2=2).min(axis=1)).any():
                 return False
         return True

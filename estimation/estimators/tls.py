@@ -135,8 +135,8 @@ def _regressor_noise(data: RegressionData, noise: Array) -> Array:
     stride = max(1, rows // 6000)
     for part in data.parts:
         chosen = np.arange(stride // 2, len(part.motion), stride)
-        for rows in chunks(len(chosen)):
-            at = chosen[rows]
+        for piece in chunks(len(chosen)):
+            at = chosen[piece]
             state = np.stack([part.motion.q[at], part.motion.dq[at], part.motion.ddq[at]])
             for joint, root in enumerate(roots):
                 for direction in root.T:

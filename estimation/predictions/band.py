@@ -100,7 +100,7 @@ def beyond_the_recorded(model: Model, motion: Motion) -> tuple[str, ...]:
     if recorded is None:
         return ()
     lowest, highest = (np.asarray(bound, dtype=float) for bound in recorded["position"])
-    # A speed, acceleration or range larger than the recorded one by this factor is said.
+    # A speed, acceleration or range larger than the recorded one by this factor is reported.
     beyond = 1.1
     for joint, name in enumerate(model.robot.joint_names):
         texts = [

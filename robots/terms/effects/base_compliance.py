@@ -87,7 +87,7 @@ class BaseCompliance(Effect):
 
     def bounds(self, situation: Situation, joint: Place) -> tuple[tuple[float, float], ...]:
         """Bounds the stiffness to usual resonances, and the base's own inertia to the robot's."""
-        # [Hz]
+        # Resonances from 2 to 1000 Hz.
         pairs = zip(_stiffness(situation, 2.0), _stiffness(situation, 1000.0), strict=True)
         damping = self.shapes[3]
         return (*pairs, (0.0, float(_inertia(situation).mean(axis=0).max())), (damping.lower, damping.upper))

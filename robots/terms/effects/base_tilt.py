@@ -61,7 +61,7 @@ class BaseTilt(Effect):
     def complete(self, situation: Situation, joint: Place, shape: tuple[float, ...]) -> tuple[float, ...]:
         """Adds start values of the first axis' moments if they are possible; without them the angles are biased."""
         most = _largest(situation)
-        # Start of their search, as a fraction of that bound.
+        # Start of the search for the own moments, as a fraction of their bound.
         near = 0.01
         return shape if any(shape) or not most else (near * most, near * most)
 
