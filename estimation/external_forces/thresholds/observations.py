@@ -64,7 +64,7 @@ def observe_robustly(signals: Signals, calibration: Calibration) -> tuple[Signal
     for _ in range(12):
         observed = observe(signals, calibration.errors, calibration.bandwidth)
         before, weights = weights, contact_weight(observed.statistic / calibration.threshold.value)
-        # ... until no weight changes any more.
+        # ... until the weights have settled.
         if np.abs(weights - before).max() <= 1e-3:
             break
         signals = signals.levelled(weights)
