@@ -37,7 +37,7 @@ from oed.benchmarks.truth.effects.base import Effect
 from oed.benchmarks.truth.effects.friction import FrictionStep, Warming
 from oed.benchmarks.truth.machines import Machine, draw_machine
 from oed.benchmarks.truth.noise import draw_noise
-from oed.benchmarks.truth.plant import PAUSE, Record, play
+from oed.benchmarks.truth.plant import LOG_PAUSE, Record, play
 from oed.benchmarks.truth.references import draw_periodic
 from robots import load_robot
 from robots.robot import Robot
@@ -76,7 +76,7 @@ def pair(seed: int, same_motion: bool, damaged: int | None) -> ModelComparison:
     two = one if same_motion else draw_periodic(machine, rng, period=PERIOD, cycles=REPEATS)
     effects: list[Effect] = []
     if damaged is not None:
-        effects = [FrictionStep(joint=damaged, amount=DAMAGE, moment=one.duration + PAUSE / 2)]
+        effects = [FrictionStep(joint=damaged, amount=DAMAGE, moment=one.duration + LOG_PAUSE / 2)]
     records = play(machine, [one, two], effects, noise, rng)
     logs = [log_of(record, k) for k, record in enumerate(records, start=1)]
     return compare(identify_runs(described(machine), logs))

@@ -35,7 +35,7 @@ from oed.controllers import (
     virtual_controller,
 )
 from oed.controllers.clients.requests import Requests
-from oed.controllers.clients.watching import RADIANS
+from oed.controllers.clients.watching import USUAL_ANGLE_TOLERANCE
 from oed.controllers.drivers import DRIVERS
 from oed.controllers.links import open_link
 from oed.controllers.recording.recorder import Recorder
@@ -171,7 +171,7 @@ def stop_delay(log: Log, motion: Motion) -> float:
     moved = int((np.abs(log.q - motion.q[0]).max(axis=1) > 1e-6).argmax())
     sample = int(np.abs(motion.q[:200] - log.q[moved]).max(axis=1).argmin())
     numbers = np.clip(sample + np.rint((log.t - log.t[moved]) / PERIOD).astype(int), 0, len(motion) - 1)
-    away = np.abs(log.q - motion.q[numbers]).max(axis=1) > RADIANS
+    away = np.abs(log.q - motion.q[numbers]).max(axis=1) > USUAL_ANGLE_TOLERANCE
     return float(log.t[-1] - log.t[away.argmax()])
 
 

@@ -26,7 +26,7 @@ import oed
 from estimation import identify
 from estimation.models.model import Model
 from estimation.preprocessing import resample, smooth
-from estimation.regressions.preparation import SLOW
+from estimation.regressions.preparation import SIGN_SPEED_SHARE
 from estimation.thermal import fit_campaign, start_temperatures
 from oed.campaigns import Programme, play
 from robots.common.errors import AssumedValueWarning
@@ -94,7 +94,7 @@ def main() -> int:
         speed = np.sqrt(np.mean(seen.dq**2, axis=0))
         for rows_name, used in (
             ("all", np.ones(seen.q.shape, dtype=bool)),
-            ("moving", np.abs(seen.dq) >= SLOW * speed),
+            ("moving", np.abs(seen.dq) >= SIGN_SPEED_SHARE * speed),
         ):
             floor = rms(noise, used)
             for label, torque in rows.items():

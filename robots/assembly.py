@@ -16,7 +16,7 @@ from robots.description_notes import assumed_in_urdf, assumed_limits, require_st
 from robots.geometry.chain import Chain, LinkPlace, homogeneous, rotation_from_rpy
 from robots.geometry.dh import Convention, DhRow, chain_from_dh, dh_frames
 from robots.geometry.dh_tables import table_notes, table_rows
-from robots.geometry.inertia import SIZE, check_body, inertial_parameters, symmetric
+from robots.geometry.inertia import BODY_PARAMETERS, check_body, inertial_parameters, symmetric
 from robots.geometry.urdf import read_urdf
 from robots.geometry.urdf_selection import Choice, digest_of
 from robots.joints.controller_axes import ControllerAxes
@@ -114,7 +114,7 @@ def robot_from_yaml(
         convention, rows = text.geometry.convention, table_rows(text.geometry, str(path))
         chain = _chain(text, rows, convention)
         entries = PerJoint(str(path), chain, chain.names)
-        inertia, friction, limits = np.full((chain.n, SIZE), np.nan), None, None
+        inertia, friction, limits = np.full((chain.n, BODY_PARAMETERS), np.nan), None, None
         frames, notes = dh_frames(rows, convention), table_notes(rows, convention)
         digest = digest_of(content)
     elif text.mjcf is not None:

@@ -17,7 +17,7 @@ from robots.terms import Column
 Array = NDArray[np.float64]
 log = logging.getLogger(__name__)
 
-_ROUNDING = 1e-9  # of a column; rounding in the regressor, and in its least squares, stays well below
+_COLUMN_ROUNDING = 1e-9  # of a column; rounding in the regressor, and in its least squares, stays well below
 
 IDENTIFIABLE, COMBINED, UNIDENTIFIABLE = "identifiable", "in combination", "unidentifiable"
 
@@ -191,7 +191,7 @@ def find_base_parameters(
     neglected = float(left.max())
     # Columns of friction may be nearly alike, too: that is not the geometry's.
     of_links = np.array([column.term == "rigid_body" for column in model.columns])
-    if left[of_links].max(initial=0.0) > _ROUNDING:
+    if left[of_links].max(initial=0.0) > _COLUMN_ROUNDING:
         log.warning(
             (
                 "%s: axes that are nearly parallel, perpendicular or intersecting are treated as exactly so (%.1e of "
@@ -202,7 +202,7 @@ def find_base_parameters(
         )
     grouping = combination * scale[None, :] / scale[independent][:, None]
     # Values as small as the neglected part are its noise.
-    grouping = np.where(np.abs(combination) < max(_ROUNDING, 10 * neglected), 0.0, _snap(grouping))
+    grouping = np.where(np.abs(combination) < max(_COLUMN_ROUNDING, 10 * neglected), 0.0, _snap(grouping))
     grouping[:, independent] = np.eye(len(independent))
     return BaseParameters(model, tuple(independent), grouping, singular_values, neglected, others)
 
@@ -244,7 +244,7 @@ def _walk(scaled: Array, tolerance: float) -> list[int]:
 
 
 def _confirm(singular_values: Array, kept: int) -> None:
-    rank = int(np.sum(singular_values > _ROUNDING * singular_values[0]))
+    rank = int(np.sum(singular_values > _COLUMN_ROUNDING * singular_values[0]))
     if kept > rank:
         raise NotIdentifiableError(
             f"{kept} base parameters by QR, {rank} by SVD: columns that differ only by rounding were kept",

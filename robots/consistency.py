@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from robots.common.errors import InputError
-from robots.geometry.inertia import SIZE
+from robots.geometry.inertia import BODY_PARAMETERS
 
 Array = NDArray[np.float64]
 
@@ -14,7 +14,7 @@ _SIGMA = ((4, (0, 0)), (5, (0, 1)), (6, (0, 2)), (7, (1, 1)), (8, (1, 2)), (9, (
 
 
 def _basis() -> Array:
-    basis = np.zeros((SIZE, 4, 4))
+    basis = np.zeros((BODY_PARAMETERS, 4, 4))
     basis[0, 3, 3] = 1.0
     for axis in range(3):
         basis[1 + axis, axis, 3] = basis[1 + axis, 3, axis] = 1.0
@@ -48,8 +48,10 @@ def pseudo_inertia(parameters: ArrayLike) -> Array:
         InputError: another number of parameters.
     """
     values = np.asarray(parameters, dtype=np.float64)
-    if values.ndim == 0 or values.shape[-1] != SIZE:
-        raise InputError(f"inertial parameters of shape {values.shape}", allowed=f"a last dimension of {SIZE}")
+    if values.ndim == 0 or values.shape[-1] != BODY_PARAMETERS:
+        raise InputError(
+            f"inertial parameters of shape {values.shape}", allowed=f"a last dimension of {BODY_PARAMETERS}"
+        )
     return np.asarray(np.tensordot(values, BASIS, axes=1))
 
 
@@ -64,7 +66,7 @@ def inertial_from_pseudo(pseudo: ArrayLike) -> Array:
     """
     matrix = np.asarray(pseudo, dtype=np.float64)
     trace = np.trace(matrix[..., :3, :3], axis1=-2, axis2=-1)
-    parameters = np.empty((*matrix.shape[:-2], SIZE))
+    parameters = np.empty((*matrix.shape[:-2], BODY_PARAMETERS))
     parameters[..., 0] = matrix[..., 3, 3]
     parameters[..., 1:4] = matrix[..., :3, 3]
     for k, (i, j) in _SIGMA:

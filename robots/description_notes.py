@@ -16,9 +16,6 @@ from robots.robot import MASSES_REMEDY
 
 Array = NDArray[np.float64]
 
-# Sum of the distances between joints that no arm has [m].
-FAR = 50.0
-
 
 def require_stops(names: Sequence[str], accepted: bool, file: str | Path) -> None:
     """Refuses joints with stops whose positions are not stated.
@@ -56,7 +53,8 @@ def urdf_notes(taken: UrdfChain, unused: Sequence[str]) -> tuple[str, ...]:
     """
     notes = list(taken.notes)
     reach = sum(float(np.linalg.norm(joint.translation)) for joint in taken.chain.joints[1:])
-    if reach > FAR:
+    # Sum of the distances between joints that no arm has [m].
+    if reach > 50.0:
         notes.append(f"the distances between its joints add up to {reach:.3g} m: they may be in millimetres")
     if taken.unlimited:
         word = "joint" if len(taken.unlimited) == 1 else "joints"

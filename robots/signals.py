@@ -22,9 +22,6 @@ from robots.signal_checks import (
 
 FloatArray = NDArray[np.float64]
 
-JITTER = 1e-6
-"""Relative deviation of a time step from the mean step up to which a signal counts as uniform."""
-
 UNKNOWN_PAUSE = 60.0
 """Pause [s] assumed between two logs where it was not recorded."""
 
@@ -243,7 +240,8 @@ def uniform_period(t: FloatArray) -> float | None:
     period = float(t[-1] - t[0]) / (len(t) - 1)
     # Times far from zero, such as those since 1970, carry a rounding error that is no jitter.
     rounding = 2.0 * float(np.spacing(np.abs(t[[0, -1]]).max()))
-    even = bool(np.abs(np.diff(t) - period).max() <= JITTER * period + rounding)
+    # Relative deviation of a time step from the mean step up to which a signal counts as uniform.
+    even = bool(np.abs(np.diff(t) - period).max() <= 1e-6 * period + rounding)
     return period if even else None
 
 

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 from oed.benchmarks.truth.cases import Case, Hidden, draw_case
-from oed.benchmarks.truth.effects import KNOWN, STRANGERS
+from oed.benchmarks.truth.effects import KNOWN, UNLISTED
 from oed.benchmarks.truth.effects.base import Effect
 from oed.benchmarks.truth.kinds import KINDS
 
@@ -97,7 +97,7 @@ def draw(task: Task) -> Case | None:
     # Robots take turns faster than lengths do: each has logs of every length.
     duration = stratum.durations[task.seed // (2 * len(KINDS)) % len(stratum.durations)]
     kinds = [KINDS[(task.seed // 2 + k) % len(KINDS)] for k in range(len(KINDS))]
-    pool: tuple[type[Effect], ...] = STRANGERS if stratum.strange else KNOWN
+    pool: tuple[type[Effect], ...] = UNLISTED if stratum.strange else KNOWN
     hide: list[type[Effect]] | int = stratum.hidden
     if stratum.hidden == 1:
         # Each effect is met by robots of all kinds, in periodic and in other motion.

@@ -19,14 +19,6 @@ from robots.terms import FrictionTerm
 
 Array = NDArray[np.float64]
 
-# Gauss-Seidel rounds on the joints' coupled dry friction: geared joints hardly feel each other's. The last ones mend
-# the straight-lined friction by Newton steps towards tanh.
-ROUNDS, NEWTON_ROUNDS, NEWTON_STEPS = 12, 3, 3
-# Samples handed to CasADi's loop at a time.
-CHUNK = 1000
-# Bandwidth of an undeclared controller [rad/s].
-BANDWIDTH = 60.0
-
 
 @dataclass(frozen=True, kw_only=True)
 class Controller:
@@ -62,9 +54,11 @@ def stiff_controller(base: BaseParameters, values: Array, reference: Motion) -> 
     """
     inertia = np.diagonal(inertia_matrices(base, values, reference), axis1=1, axis2=2).mean(axis=0)
     inertia = np.maximum(inertia, 1e-3 * max(float(inertia.max()), np.finfo(float).tiny))
+    # Bandwidth of an undeclared controller [rad/s].
+    bandwidth = 60.0
     return Controller(
-        proportional=inertia * BANDWIDTH**2,
-        derivative=2 * inertia * BANDWIDTH,
+        proportional=inertia * bandwidth**2,
+        derivative=2 * inertia * bandwidth,
         feedforward=lambda motion: base.torque(motion.q, motion.dq, motion.ddq, values),
     )
 
@@ -123,7 +117,8 @@ class ClosedLoop:
         gains = np.concatenate([controller.proportional, controller.derivative])
         state = np.concatenate([reference.q[0], reference.dq[0], reference.ddq[0]])
         states = [state[:, None]]
-        for inputs in _chunks(targets, CHUNK):
+        # Samples are handed to CasADi's loop piece by piece.
+        for inputs in _chunks(targets, 1000):
             loop = self._step.mapaccum(inputs.shape[1])
             outcome = np.asarray(loop(state, inputs, gains, values))
             states.append(outcome)
@@ -175,8 +170,11 @@ class ClosedLoop:
         """Solves matrix z + f1 tanh(z / width) = right, joint after joint."""
         n = z.shape[0]
         current = [z[j] for j in range(n)]
-        for round_ in range(ROUNDS):
-            newton = NEWTON_STEPS if round_ >= ROUNDS - NEWTON_ROUNDS else 0
+        # Gauss-Seidel rounds on the joints' coupled dry friction: geared joints hardly feel each other's. The last ones
+        # mend the straight-lined friction by Newton steps towards tanh.
+        rounds = 12
+        for round_ in range(rounds):
+            newton = 3 if round_ >= rounds - 3 else 0
             for j in range(n):
                 rest = right[j] - sum((matrix[j, k] * current[k] for k in range(n) if k != j), start=casadi.SX(0))
                 if j in self._dry:

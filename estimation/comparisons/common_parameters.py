@@ -16,14 +16,9 @@ from robots.terms import Column, FrictionTerm
 
 Array = NDArray[np.float64]
 
-# Places and directions of joints that differ by more than this [m, rad] make another robot.
-SAME_PLACE = 1e-3
 # What a model lacks biases the parameters alike where the motion is the same, and otherwise where it is not. Standard
 # errors do not hold that bias. Between other motions they are this many times larger (`benchmarks/comparison.py`).
-OTHER_MOTION = 3.0
-# Ranges of positions and speeds that agree within this share are of one motion; below the floor [rad, m, rad/s, m/s]
-# all do. Filtered speeds of one motion differ by a few per cent with the noise and the control loop.
-SAME_MOTION, SAME_MOTION_FLOOR = 0.05, 0.1
+OTHER_MOTION_FACTOR = 3.0
 # Speeds at which friction curves are fitted to each other, as shares of the largest.
 SHARES = np.linspace(0.02, 1.0, 60)
 
@@ -83,7 +78,7 @@ def common_parameters(runs: Sequence[Run], speeds: Array) -> CommonParameters:
     return CommonParameters(
         columns=first.parameters,
         values=np.array(values),
-        covariances=np.array(covariances) * (1.0 if same else OTHER_MOTION**2),
+        covariances=np.array(covariances) * (1.0 if same else OTHER_MOTION_FACTOR**2),
         same_motion=same,
         determined=determined,
         misfit=misfit,
@@ -97,8 +92,10 @@ def is_same_motion(runs: Sequence[Run]) -> bool:
     if not all(recorded):
         return False
     ranges = [np.concatenate([np.ravel(known[key]) for key in ("position", "velocity")]) for known in recorded if known]
-    scale = np.maximum(np.abs(ranges[0]), SAME_MOTION_FLOOR)
-    return all(bool((np.abs(other - ranges[0]) <= SAME_MOTION * scale).all()) for other in ranges[1:])
+    # Ranges of positions and speeds that agree within 5 % are of one motion, and so are all below a floor [rad, m,
+    # rad/s, m/s]. Filtered speeds of one motion differ by a few per cent with the noise and the control loop.
+    scale = np.maximum(np.abs(ranges[0]), 0.1)
+    return all(bool((np.abs(other - ranges[0]) <= 0.05 * scale).all()) for other in ranges[1:])
 
 
 def require_comparable(runs: Sequence[Run]) -> None:
@@ -140,7 +137,8 @@ def _robot_difference(one: Model, other: Model) -> tuple[str | None, str]:
         pairs = ((p.translation, q.translation, "m"), (p.rotation, q.rotation, "rad"), (p.axis, q.axis, "rad"))
         for u, v, unit in pairs:
             off = float(np.abs(np.asarray(u) - np.asarray(v)).max())
-            if off > SAME_PLACE:
+            # Places and directions of joints that differ by more than this [m, rad] make another robot.
+            if off > 1e-3:
                 what = "stands" if unit == "m" else "points"
                 return f"joint {j} of {b.name} {what} otherwise than that of {a.name}, by {off:.3g} {unit}", remedy
     return None, ""

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from estimation.comparisons.common_parameters import (
-    OTHER_MOTION,
+    OTHER_MOTION_FACTOR,
     CommonParameters,
     common_parameters,
     require_comparable,
@@ -23,13 +23,8 @@ from estimation.models.model import Model
 from robots.common.errors import InputError
 from robots.common.plain import percent
 
-# Chance of any false alarm among all tests of a comparison.
-FALSE_ALARMS = 0.01
-# A converted friction curve that misses by more than this share is said.
-MISFIT = 0.01
 
-
-def compare(models: Sequence[Model | Run], *, alpha: float = FALSE_ALARMS) -> ModelComparison:
+def compare(models: Sequence[Model | Run], *, alpha: float = 0.01) -> ModelComparison:
     """Compares identified models: which differences are real, drift over the runs, and a merged estimate.
 
     Runs are put in order of time where their logs or names state dates; the first is the baseline. Differences are
@@ -112,9 +107,10 @@ def _warnings(runs: Sequence[Run], common: CommonParameters) -> list[str]:
     if not common.same_motion:
         found.append(
             f"The runs recorded different motions, which model errors bias differently. All standard errors are "
-            f"multiplied by {OTHER_MOTION:g}. Record the same motion in every run to find smaller differences."
+            f"multiplied by {OTHER_MOTION_FACTOR:g}. Record the same motion in every run to find smaller differences."
         )
-    if misfit > MISFIT:
+    # A converted friction curve that misses by more than 1 % is reported.
+    if misfit > 0.01:
         found.append(
             f"The friction curves have different shapes; converted to that of {runs[0].label} they miss by up to "
             f"{percent(misfit)} of the friction. Compare the logs (oed compare --robot) for one common shape."

@@ -20,8 +20,6 @@ Level = Literal["whole", "part", "parameter"]
 
 PARTS = {"rigid_body": "rigid body", "rotor_inertia": "rotor inertia", "torque_offset": "torque offset"}
 FRICTION = "friction"
-LEVELS = 3
-"""Families of tests; each has a third of the family-wise rate."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -125,7 +123,8 @@ def find_differences(common: CommonParameters, curves: Sequence[FrictionCurves] 
     families: list[list[Difference]] = [list(_tests(common, means, level)) for level in ("whole", "part", "parameter")]
     found: list[Difference] = []
     for family in families:
-        adjusted = np.minimum(LEVELS * adjust_holm([item.p_value for item in family]), 1.0)
+        # Each of the three families of tests has a third of the family-wise rate.
+        adjusted = np.minimum(3 * adjust_holm([item.p_value for item in family]), 1.0)
         found += [replace(item, adjusted=float(p)) for item, p in zip(family, adjusted, strict=True)]
     return tuple(found)
 

@@ -10,17 +10,12 @@ from numpy.typing import NDArray
 from scipy.stats import t
 
 from estimation.comparisons.common_parameters import CommonParameters
-from estimation.comparisons.friction_curves import LEVEL_SHARE, FrictionCurves
+from estimation.comparisons.friction_curves import LEVEL_SPEED_SHARE, FrictionCurves
 from estimation.comparisons.hypothesis_tests import adjust_holm
 from estimation.uncertainty.quantiles import normal_limit
 from robots.common.records import Record
 
 Array = NDArray[np.float64]
-
-# Fewer runs show no course.
-FEWEST_RUNS = 4
-# The last part of the runs is what a quantity settles at.
-LAST_SHARE = 1 / 3
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -89,12 +84,13 @@ def find_drifts(
         One a quantity; nothing for fewer than four runs.
     """
     count = len(common.values)
-    if count < FEWEST_RUNS:
+    # Fewer runs show no course.
+    if count < 4:
         return ()
     x = np.arange(count, dtype=float) if hours is None else hours
     errors = np.sqrt(np.maximum(np.einsum("kii->ki", common.covariances), 0.0))
     series = [
-        (f"friction of joint {c.joint} at {100 * LEVEL_SHARE:.0f} % speed", c.joint, "", c.level, c.level_error)
+        (f"friction of joint {c.joint} at {100 * LEVEL_SPEED_SHARE:.0f} % speed", c.joint, "", c.level, c.level_error)
         for c in curves
         if (c.level_error > 0).all()
     ]
@@ -157,7 +153,8 @@ def settled_from(values: Array, errors: Array, alpha: float) -> tuple[int | None
         The index of the run, None where the last third does not agree with itself, or nothing before it does.
     """
     count = len(values)
-    last = np.arange(count) >= count - max(2, round(count * LAST_SHARE))
+    # A quantity settles at its mean over the last third of the runs.
+    last = np.arange(count) >= count - max(2, round(count / 3))
     w = np.where(last, errors**-2.0, 0.0)
     w /= w.sum()
     final = float(w @ values)

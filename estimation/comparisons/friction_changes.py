@@ -17,12 +17,6 @@ from robots.common.records import Record
 Array = NDArray[np.float64]
 Kind = Literal["unchanged", "common", "own", "unequal", "changed"]
 
-# Joints warm unequally: their relative changes scatter about the common one by this share of it (one sigma).
-HEAT_SCATTER = 0.3
-# A split needs a majority of joints that share a change.
-FEWEST_JOINTS = 3
-ITERATIONS = 20
-
 
 @dataclass(frozen=True, kw_only=True)
 class CurveDifference:
@@ -187,7 +181,9 @@ def _log_level(rows: Array, values: Array) -> tuple[Array, Array]:
 
 def _split(change: Array, S: Array, joints: Sequence[int], run: int, limit: float) -> list[FrictionChange]:
     n, aside = len(change), [False] * len(change)
-    for _ in range((n - 1) // 2 if n >= FEWEST_JOINTS else 0):
+    # A split needs a majority of joints that share a change.
+    fewest = 3
+    for _ in range((n - 1) // 2 if n >= fewest else 0):
         rest = [j for j in range(n) if not aside[j]]
         z = np.zeros(n)
         for j in rest:
@@ -204,7 +200,7 @@ def _split(change: Array, S: Array, joints: Sequence[int], run: int, limit: floa
         significant = abs(change[j]) > limit * error
         shared, own, noise, scatter = np.nan, np.nan, np.nan, np.nan
         kind: Kind = "changed" if significant else "unchanged"
-        if n >= FEWEST_JOINTS:
+        if n >= fewest:
             own, noise, scatter, shared = _against(change, S, j, [i for i in range(n) if i != j and not aside[i]])
             if abs(own) > limit * scatter:
                 kind = "own"
@@ -231,8 +227,10 @@ def _against(change: Array, S: Array, j: int, rest: Sequence[int]) -> tuple[floa
     among = list(rest)
     shared = float(np.median(change[among]))
     weights = np.full(len(among), 1 / len(among))
-    for _ in range(ITERATIONS):
-        V = S[np.ix_(among, among)] + (HEAT_SCATTER * shared) ** 2 * np.eye(len(among))
+    # Joints warm unequally: their relative changes scatter about the common one by this share of it (one sigma).
+    heat_scatter = 0.3
+    for _ in range(20):
+        V = S[np.ix_(among, among)] + (heat_scatter * shared) ** 2 * np.eye(len(among))
         solved = np.linalg.solve(V, np.ones(len(among)))
         weights, before = solved / solved.sum(), shared
         shared = float(weights @ change[among])
@@ -241,7 +239,7 @@ def _against(change: Array, S: Array, j: int, rest: Sequence[int]) -> tuple[floa
     row = np.zeros(len(change))
     row[j], row[among] = 1.0, -weights
     noise = float(row @ S @ row)
-    heat = (HEAT_SCATTER * shared) ** 2 * (1 + float(weights @ weights))
+    heat = (heat_scatter * shared) ** 2 * (1 + float(weights @ weights))
     own = float(change[j] - shared)
     return own, float(np.sqrt(max(noise, np.finfo(float).tiny))), float(np.sqrt(max(noise + heat, 1e-300))), shared
 

@@ -20,9 +20,7 @@ Array = NDArray[np.float64]
 # Speeds of the curves, as shares of the largest common speed; below the first the width of the sign decides.
 SHARES = np.linspace(0.05, 1.0, 40)
 # Share of the largest speed at which the thesis follows friction over time (its Figs. 39 and 40).
-LEVEL_SHARE = 0.6
-# Draws of the largest standardised deviation of a curve: they give its 95 % point to 2 %.
-DRAWS, BAND_SEED = 4000, 0
+LEVEL_SPEED_SHARE = 0.6
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -101,7 +99,7 @@ def friction_curves(runs: Sequence[Run], common: CommonParameters, speeds: Array
     first = runs[0].model
     names = [column.name for column in common.columns]
     table = friction_table(first, names, speeds, SHARES)
-    at_level = friction_table(first, names, speeds, np.array([LEVEL_SHARE]))[0]
+    at_level = friction_table(first, names, speeds, np.array([LEVEL_SPEED_SHARE]))[0]
     found = []
     for joint in range(1, first.robot.n + 1):
         own = [i for i, column in enumerate(common.columns) if column.friction and column.joint == joint]
@@ -146,7 +144,8 @@ def simultaneous_factor(rows: Array, covariance: Array, confidence: float = 0.95
     if not used.any():
         return NORMAL_95
     standard = (rows[used] / scale[used, None]) @ square_root(covariance)
-    draws = np.random.default_rng(BAND_SEED).normal(size=(DRAWS, standard.shape[1]))
+    # These draws of the largest standardised deviation give its 95 % point to 2 %.
+    draws = np.random.default_rng(0).normal(size=(4000, standard.shape[1]))
     largest = np.abs(draws @ standard.T).max(axis=1)
     return float(np.quantile(largest, confidence))
 

@@ -12,7 +12,7 @@ from scipy.special import chdtrc
 Array = NDArray[np.float64]
 
 # Directions whose variance is below this share of the largest, after scaling, are rounding.
-ROUNDING = 1e-10
+VARIANCE_ROUNDING = 1e-10
 
 
 @dataclass(frozen=True)
@@ -47,7 +47,7 @@ def agreement_test(values: ArrayLike, covariances: ArrayLike) -> ChiSquareTest:
     scale = np.sqrt(np.maximum(np.einsum("kii->ki", C).mean(axis=0), np.finfo(float).tiny))
     x, C = x / scale, C / scale[:, None] / scale
     variance, ways = np.linalg.eigh(C.mean(axis=0))
-    ways = ways[:, variance > ROUNDING * variance.max()]
+    ways = ways[:, variance > VARIANCE_ROUNDING * variance.max()]
     x, C = x @ ways, ways.T @ C @ ways
     x = x - x[0]  # the statistic does not depend on the origin, its rounding does
     W = np.linalg.inv(C)

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from estimation.comparisons.common_parameters import CommonParameters
-from estimation.comparisons.hypothesis_tests import ROUNDING, agreement_test
+from estimation.comparisons.hypothesis_tests import VARIANCE_ROUNDING, agreement_test
 from estimation.linear_algebra.scaled import inverse, inverse_root
 from estimation.models.model import Model
 from estimation.payloads.determination import determined
@@ -19,16 +19,11 @@ from estimation.payloads.physical import physical_body
 from estimation.uncertainty.quantiles import normal_limit
 from robots.base_parameters import find_base_parameters
 from robots.common.records import Record
-from robots.geometry.inertia import SIZE
+from robots.geometry.inertia import BODY_PARAMETERS
 from robots.terms.situations.flange_body import FLANGE, link_columns
 from robots.terms.situations.sensitivities import moved_body
 
 Array = NDArray[np.float64]
-
-# Share of the excess chi-square of the inertial parameters that a body on the flange must explain to be named.
-EXPLAINED = 0.9
-# Spread of a body's parameters before any data [kg, kg m, kg m2]: what the models leave open keeps it.
-OPEN = 100.0
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -140,7 +135,7 @@ def _flange_columns(common: CommonParameters, model: Model) -> Array:
     terms = model.torque_model
     base = find_base_parameters(terms, gravities=model.gravities)
     rows = dict(zip((column.name for column in base.columns), base.grouping[:, list(link_columns(terms))], strict=True))
-    nothing = np.zeros(SIZE)
+    nothing = np.zeros(BODY_PARAMETERS)
     return np.array([rows.get(column.name, nothing) for column in common.columns]) @ moved_body(terms.robot.chain.tip)
 
 
@@ -148,9 +143,10 @@ def _payload(
     common: CommonParameters, run: int, columns: Array, used: Sequence[int], alpha: float
 ) -> PayloadDifference | None:
     d = (common.values[run] - common.values[0])[used]
-    whitening = inverse_root((common.covariances[run] + common.covariances[0])[np.ix_(used, used)], ROUNDING).T
+    whitening = inverse_root((common.covariances[run] + common.covariances[0])[np.ix_(used, used)], VARIANCE_ROUNDING).T
     target, G = whitening @ d, whitening @ columns[used]
-    precision = G.T @ G + np.eye(SIZE) / OPEN**2
+    # Spread of a body's parameters before any data [kg, kg m, kg m2]: what the models leave open keeps it.
+    precision = G.T @ G + np.eye(BODY_PARAMETERS) / 100.0**2
     covariance = inverse(precision)
     p = covariance @ G.T @ target
     rest, free = float(np.sum((target - G @ p) ** 2)), len(target) - np.linalg.matrix_rank(G)
@@ -159,7 +155,8 @@ def _payload(
     # What the body leaves unexplained is an error of the models: it widens the intervals.
     covariance = covariance * max(rest / max(free, 1), 1.0)
     significant = abs(p[0]) > normal_limit(alpha) * np.sqrt(covariance[0, 0])
-    if not significant or explained < EXPLAINED:
+    # Share of the excess chi-square of the inertial parameters that a body on the flange must explain to be named.
+    if not significant or explained < 0.9:
         return None
     removed = bool(p[0] < 0)
     own = -p if removed else p

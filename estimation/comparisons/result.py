@@ -29,7 +29,7 @@ Array = NDArray[np.float64]
 
 COMPARISON, MODEL = "compare.json", "model.json"
 # Parts and parameters that the summary lists of each run.
-LISTED = 8
+LISTED_DIFFERENCES = 8
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -264,13 +264,13 @@ class ModelComparison(Result, format="robot-oed comparison", shares=("labels", "
         )
         if found:
             yield f"  parameters that differ, {self.labels[run]} against {self.labels[0]}:"
-        for item in found[:LISTED]:
+        for item in found[:LISTED_DIFFERENCES]:
             yield (
                 f"    {item.name:12} {item.change:+11.4g} ± {item.error:<9.2g} {item.unit:12} "
                 f"{item.percent:+8.2f} %   adjusted p {item.adjusted:.2g}"
             )
-        if len(found) > LISTED:
-            yield f"    and {len(found) - LISTED} more"
+        if len(found) > LISTED_DIFFERENCES:
+            yield f"    and {len(found) - LISTED_DIFFERENCES} more"
 
     def _drift_lines(self) -> Iterator[str]:
         if not self.drifts:
@@ -278,7 +278,7 @@ class ModelComparison(Result, format="robot-oed comparison", shares=("labels", "
         moving = [item for item in self.drifts if item.adjusted < self.alpha]
         per = "hour" if self.hours is not None else "run"
         yield f"  drift: {len(moving)} of {len(self.drifts)} quantities have a significant trend"
-        for item in moving[:LISTED]:
+        for item in moving[:LISTED_DIFFERENCES]:
             settled = "not settled" if item.settled is None else f"settled from {self.labels[item.settled]}"
             yield (
                 f"    {item.name:32} {item.slope:+.3g} ± {item.slope_error:.2g} {item.unit} per {per}; {settled}; "

@@ -18,12 +18,11 @@ from estimation.models.model import Model, load_model
 from robots.common.errors import InputError
 from robots.common.plain import number
 from robots.common.records import Record
+from robots.common.tables.times import YEAR_2000
 from robots.terms import PositionTorque
 
 Array = NDArray[np.float64]
 
-# Times from here on [s] are counted from 1970: the year 2000.
-ABSOLUTE = 946_684_800.0
 _DATE = re.compile(r"(?<!\d)(20\d\d)[-_.]?([01]\d)[-_.]?([0-3]\d)(?:[T_ -]?([0-2]\d)[-:_h]?([0-5]\d))?(?!\d)")
 
 
@@ -73,7 +72,7 @@ def run_of(model: Model, label: str, file: str | Path = "") -> Run:
     logs: Sequence[Mapping[str, Any]] = model.provenance.get("logs", ())
     start = float(logs[0]["start"]) if logs and logs[0].get("start") is not None else None
     names = [*reversed(Path(file).parts[-2:]), label, *(str(log.get("name", "")) for log in logs[:1])]
-    date = start if start is not None and start >= ABSOLUTE else date_in(names)
+    date = start if start is not None and start >= YEAR_2000 else date_in(names)
     n, weights = model.robot.n, np.array([float(log.get("samples", 1)) for log in logs])
     rows = [
         [number(value, np.nan) for value in log["temperature"]] if log.get("temperature") else [np.nan] * n

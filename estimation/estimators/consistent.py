@@ -31,18 +31,9 @@ from robots.consistency import BASIS, normalised_eigenvalues
 Array = NDArray[np.float64]
 
 # Smallest eigenvalue of a pseudo-inertia, in units in which the reference body's trace is 2.
-EPSILON = 1e-5
-# A value closer to its bound than this fraction of its scale counts as at the bound.
-AT = 1e-4
+LEAST_BODY_EIGENVALUE = 1e-5
 # Weights of the prior, in units of the data's whole misfit; chosen by cross-validation.
 PULLS = (1e-5, 1e-4, 1e-3, 1e-2)
-BLOCKS = 4
-# A stronger prior is used if its held-out error is at most this much worse (mean log).
-SLACK = 0.002
-# Misfit that counts as exact, as a fraction of the squared torque.
-SMALLEST_MISFIT = 1e-4
-# Keeps parameters that the data do not touch where they are; far below what data say of any other.
-FAINT = 1e-9
 
 
 @dataclass(frozen=True)
@@ -70,12 +61,14 @@ class _Problem:
         strength = ridge * float(weights @ moments.square) / level * self.precision
         quadratic[range(size), range(size)] += strength
         linear[:size] -= strength * self.target
-        quadratic[range(size), range(size)] += FAINT
-        linear[bodies] -= FAINT * self.scaling.unit_reference
+        # Keeps parameters that the data do not touch where they are; far below what data say of any other.
+        faint = 1e-9
+        quadratic[range(size), range(size)] += faint
+        linear[bodies] -= faint * self.scaling.unit_reference
         for link, columns in enumerate(bodies):
             basis = np.zeros((program.size, 4, 4))
             basis[columns] = BASIS
-            program.semidefinite(basis, -EPSILON * np.eye(4))
+            program.semidefinite(basis, -LEAST_BODY_EIGENVALUE * np.eye(4))
             reference = np.tensordot(self.scaling.unit_reference[link], BASIS, axes=1)
             inverse = np.linalg.inv(reference)
             if self.entropic:
@@ -170,8 +163,10 @@ class PhysicallyConsistent(WeightedLeastSquares):
                 remedy="use a larger prior weight",
             )
         margins = problem.rows @ (standard / units.scale)
-        alone = (np.count_nonzero(rows, axis=1) == 1) & (margins < AT)
-        flat = np.flatnonzero((eigenvalues < AT).any(axis=1)) + 1
+        # A value closer to its bound than this fraction of its scale counts as at the bound.
+        close = 1e-4
+        alone = (np.count_nonzero(rows, axis=1) == 1) & (margins < close)
+        flat = np.flatnonzero((eigenvalues < close).any(axis=1)) + 1
         active = [model.names[k] for k in np.flatnonzero(rows[alone].any(axis=0))] + [f"body of link {k}" for k in flat]
         return Solution(
             values=data.base.from_standard(standard),
@@ -196,7 +191,7 @@ class PhysicallyConsistent(WeightedLeastSquares):
 
     def _weight(self, problem: _Problem, data: RegressionData, weights: Array) -> float:
         """The strongest prior whose held-out error is as good as the best."""
-        blocks = data.blocks(BLOCKS)
+        blocks = data.blocks(4)
         if len(blocks) < 2:
             return PULLS[0]
         spread = np.maximum(data.moments.square, np.finfo(float).tiny)
@@ -205,7 +200,8 @@ class PhysicallyConsistent(WeightedLeastSquares):
             error = sum(self._left_out(problem, data, blocks, index, weights, pull) for index in range(len(blocks)))
             costs.append(float(np.log(np.clip(error / spread, 1e-18, 1.0)).mean()) / 2)
         best = min(costs)
-        return max(pull for pull, cost in zip(PULLS, costs, strict=True) if cost <= best + SLACK)
+        # A stronger prior is used if its held-out error is at most this much worse (mean log).
+        return max(pull for pull, cost in zip(PULLS, costs, strict=True) if cost <= best + 0.002)
 
     @staticmethod
     def _left_out(
@@ -225,7 +221,8 @@ def standard_of(solution: Solution) -> Array | None:
 def _level(moments: Moments, weights: Array, ridge: float) -> float:
     """The weighted misfit of least squares, floored at a per cent of the torque: an exact fit still keeps a prior."""
     values = moments.solve(weights, max(ridge, 1e-12))
-    floor = SMALLEST_MISFIT * float(weights @ moments.square)
+    # Misfit that counts as exact, as a fraction of the squared torque.
+    floor = 1e-4 * float(weights @ moments.square)
     return max(float(weights @ (np.maximum(moments.count, 1) * moments.level(values) ** 2)), floor)
 
 

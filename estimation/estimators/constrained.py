@@ -13,18 +13,12 @@ from scipy.linalg import null_space
 from estimation.estimators.base import Array, Solution
 from estimation.estimators.wls import WeightedLeastSquares
 from estimation.linear_algebra.scaled import square_root
-from estimation.regressions.covariances import FAINT as OPEN
-from estimation.regressions.covariances import Equations, regressor_rows, robust_covariance
+from estimation.regressions.covariances import COVARIANCE_RIDGE, Equations, regressor_rows, robust_covariance
 from estimation.regressions.regression_data import RegressionData
 from estimation.regressions.regularisation import regularisation
 from estimation.regressions.standard_parameters import body_columns, largest_speed, nonnegative_rows, scaling
 from robots.common.errors import InfeasibleError, InputError, SolverError
 from robots.regressor import TorqueModel
-
-# Weak prior for undetermined directions: the description, or a plausible arm. Far below the data's information.
-FAINT = 1e-8
-# A parameter within this share of its own scale of a bound lies at it.
-AT = 1e-6
 
 
 class ConstrainedLeastSquares(WeightedLeastSquares):
@@ -88,7 +82,8 @@ class ConstrainedLeastSquares(WeightedLeastSquares):
         target = np.linalg.lstsq(root.T, (weights @ data.moments.cross + right) / level, rcond=None)[0]
         reference = np.zeros(model.size)
         reference[units.bodies] = units.unit_reference
-        pull = np.full(model.size, np.sqrt(FAINT))
+        # Weak prior for undetermined directions: the description, or a plausible arm. Far below the data's information.
+        pull = np.full(model.size, np.sqrt(1e-8))
         standard = scale * _solve(
             np.vstack([root @ grouping, np.diag(pull)]),
             np.concatenate([target, pull * reference]),
@@ -100,8 +95,9 @@ class ConstrainedLeastSquares(WeightedLeastSquares):
         active = np.isclose(standard, limits[:, 0], rtol=1e-6, atol=1e-9) | np.isclose(
             standard, limits[:, 1], rtol=1e-6, atol=1e-9
         )
+        # A parameter within this share of its own scale of a bound lies at it.
         alone = rows[
-            (np.count_nonzero(rows, axis=1) == 1) & (np.abs(rows @ standard - lower) <= AT * (np.abs(rows) @ scale))
+            (np.count_nonzero(rows, axis=1) == 1) & (np.abs(rows @ standard - lower) <= 1e-6 * (np.abs(rows) @ scale))
         ]
         active |= (alone != 0).any(axis=0)
         names = tuple(name for name, bound in zip(model.names, active, strict=True) if bound)
@@ -144,7 +140,7 @@ def _covariance(data: RegressionData, values: Array, weights: Array, grouping: A
     gram = np.tensordot(weights, data.moments.gram, axes=1)
     level = float(np.trace(grouping.T @ gram @ grouping)) / grouping.shape[1]
     free = null_space(fixed)
-    normal = free.T @ (grouping.T @ gram @ grouping / level + OPEN * np.eye(grouping.shape[1])) @ free
+    normal = free.T @ (grouping.T @ gram @ grouping / level + COVARIANCE_RIDGE * np.eye(grouping.shape[1])) @ free
     moved = grouping @ free
     inverse = moved @ np.linalg.solve(normal, moved.T) / level
     equations = [

@@ -6,12 +6,10 @@ from functools import reduce
 from operator import add
 
 from estimation.estimators.base import Array, Solution
-from estimation.estimators.simulated import SETTLED, Instruments, SimulatingEstimator, simulated_moments
+from estimation.estimators.simulated import SETTLED_TORQUE_SHARE, Instruments, SimulatingEstimator, simulated_moments
 from estimation.regressions.regression_data import RegressionData
 from estimation.regressions.regularisation import torque_change
 from robots.signals import Motion
-
-ITERATIONS = 12
 
 
 class DirectAndInverse(SimulatingEstimator):
@@ -41,13 +39,13 @@ class DirectAndInverse(SimulatingEstimator):
         level = data.moments.level(values)
         motions: list[Motion] = []
         rounds, settled = 0, False
-        while not settled and rounds < ITERATIONS:
+        while not settled and rounds < 12:
             rounds += 1
             motions = instruments.simulate(values)
             parts = zip(data.parts, motions, instruments.masks(motions), strict=True)
             moments = reduce(add, (simulated_moments(data, part, motion, mask) for part, motion, mask in parts))
             before, values = values, moments.pulled(data.moments.pull).solve(weights, data.ridge)
-            settled = bool((torque_change(moments, values - before) <= SETTLED * level).all())
+            settled = bool((torque_change(moments, values - before) <= SETTLED_TORQUE_SHARE * level).all())
         return Solution(
             values=values,
             weights=weights,

@@ -10,17 +10,11 @@ from numpy.typing import ArrayLike
 
 from estimation.estimators.base import Array
 from estimation.linear_algebra.scaled import lengths
-from estimation.regressions.regression_data import CHUNK
 from robots.base_parameters import BaseParameters
 from robots.common.errors import InputError, NotIdentifiableError
-from robots.geometry.inertia import SIZE
+from robots.common.stretches import chunks
+from robots.geometry.inertia import BODY_PARAMETERS
 from robots.signals import Motion
-
-ITERATIONS = 8
-# Gains have settled when none moves by more than this share.
-SETTLED = 1e-6
-# Ratio of smallest to largest eigenvalue of the scaled normal equations, below which a gain is undetermined.
-REGULAR = 1e-13
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -85,14 +79,13 @@ def fit_drive_gains(base: BaseParameters, runs: Sequence[CurrentRun]) -> DriveGa
     count = np.zeros(n)
     for run in runs:
         load = None if run.payload is None else np.asarray(run.payload, dtype=float)
-        if load is not None and load.shape != (SIZE,):
-            raise InputError(f"a payload of {load.shape} parameters", allowed=f"({SIZE},)")
+        if load is not None and load.shape != (BODY_PARAMETERS,):
+            raise InputError(f"a payload of {load.shape} parameters", allowed=f"({BODY_PARAMETERS},)")
         if np.shape(run.current) != run.motion.q.shape:
             raise InputError(f"currents of shape {np.shape(run.current)}", allowed=f"{run.motion.q.shape}")
         count = count + run.mask.sum(axis=0)
-        for start in range(0, len(run.motion), CHUNK):
-            rows = slice(start, start + CHUNK)
-            total += _sums(base, run, load, bodies[-SIZE:], rows)
+        for rows in chunks(len(run.motion)):
+            total += _sums(base, run, load, bodies[-BODY_PARAMETERS:], rows)
     return _fit(total, count, size, n)
 
 
@@ -115,7 +108,7 @@ def _fit(total: Array, count: Array, size: int, n: int) -> DriveGains:
     gains_at = size + np.arange(n)
     weights, noise = np.ones(n), np.zeros(n)
     gains = np.zeros(n)
-    for _ in range(ITERATIONS):
+    for _ in range(8):
         matrix = np.tensordot(weights, total, axes=1)
         gram, right = matrix[:-1, :-1].copy(), matrix[:-1, -1]
         # The currents' own noise, in their mean square: least squares would shrink the gains by it.
@@ -123,7 +116,8 @@ def _fit(total: Array, count: Array, size: int, n: int) -> DriveGains:
         scale = lengths(gram)
         scaled = gram / scale[:, None] / scale
         eigenvalues = np.linalg.eigvalsh(scaled)
-        if eigenvalues[0] < REGULAR * eigenvalues[-1]:
+        # Ratio of smallest to largest eigenvalue of the scaled normal equations, below which a gain is undetermined.
+        if eigenvalues[0] < 1e-13 * eigenvalues[-1]:
             raise NotIdentifiableError(
                 "the runs do not determine all drive gains",
                 remedy="move every joint, with a payload that loads each of them",
@@ -136,7 +130,8 @@ def _fit(total: Array, count: Array, size: int, n: int) -> DriveGains:
         floor = 1e-12 * total[:, -1, -1].max() / max(count.max(), 1)
         weights = 1 / np.maximum(torque_noise, max(floor, np.finfo(float).tiny))
         noise = torque_noise / np.where(gains != 0, gains, np.inf) ** 2
-        if (np.abs(gains - before) <= SETTLED * np.abs(gains)).all():
+        # Gains have settled when none moves by more than this share.
+        if (np.abs(gains - before) <= 1e-6 * np.abs(gains)).all():
             break
     inverse = np.linalg.inv(scaled) / scale[:, None] / scale
     return DriveGains(

@@ -17,14 +17,6 @@ from estimation.regressions.regularisation import torque_change
 from estimation.uncertainty.quantiles import robust_deviation
 from robots.common.errors import InputError
 
-REWEIGHTINGS = 50
-# Parameters have settled when no joint's torque moves by more than this share of its residual level.
-SETTLED = 1e-4
-# A scale below this share of a joint's torque is rounding.
-EXACT = 1e-9
-# Mean slope of the influence below which the residual has no middle.
-LEAST_SLOPE = 0.1
-
 
 class ReweightedLeastSquares(WeightedLeastSquares):
     """min sum_ij w_j rho(r_ij / s_j), s_j the residual's median absolute deviation, made consistent for normal noise.
@@ -82,17 +74,19 @@ class ReweightedLeastSquares(WeightedLeastSquares):
             slope += (self.slopes(share) * (part.mask > 0)).sum(axis=0)
             regressor = partial(regressor_rows, data.base, motion, gravity=part.gravity)
             equations.append(Equations(len(motion), regressor, part.mask, residual * self.factors(share)))
-        slope = np.maximum(slope / np.maximum(data.moments.count, 1), LEAST_SLOPE)
+        # Mean slope of the influence below which the residual has no middle.
+        slope = np.maximum(slope / np.maximum(data.moments.count, 1), 0.1)
         return robust_covariance(equations, weights, np.tensordot(weights * slope, data.moments.gram, axes=1))
 
     def _settle(self, data: RegressionData, values: Array) -> tuple[Array, Array]:
         scale = _scale(data, values)
-        for _ in range(REWEIGHTINGS):
+        for _ in range(50):
             total = _reweighted(data, values, partial(_row_weights, self.factors, self.tuning * scale))
             new = total.pulled(data.moments.pull).solve(_joint_weights(scale, self.temper), data.ridge)
             moved = torque_change(data.moments, new - values)
             values, scale = new, _scale(data, new)
-            if (moved <= SETTLED * scale).all():
+            # Parameters have settled when no joint's torque moves by more than this share of its residual level.
+            if (moved <= 1e-4 * scale).all():
                 break
         return values, scale
 
@@ -163,5 +157,6 @@ def _scale(data: RegressionData, values: Array) -> Array:
     empty = np.isnan(residual).all(axis=0)
     residual[:, empty] = 0.0
     rms = np.sqrt(data.moments.square / np.maximum(data.moments.count, 1))
-    floor = np.maximum(EXACT * rms, np.finfo(float).tiny)
+    # A scale below this share of a joint's torque is rounding.
+    floor = np.maximum(1e-9 * rms, np.finfo(float).tiny)
     return np.maximum(robust_deviation(residual), floor)

@@ -5,13 +5,11 @@ from __future__ import annotations
 import numpy as np
 
 from estimation.estimators.base import Array, Solution
-from estimation.estimators.simulated import SETTLED, Instruments, SimulatingEstimator, instrumented_moments
+from estimation.estimators.simulated import SETTLED_TORQUE_SHARE, Instruments, SimulatingEstimator, instrumented_moments
 from estimation.regressions.regression_data import RegressionData
 from estimation.regressions.regularisation import regularisation, solve_scaled, torque_change
 from robots.common.errors import SolverError
 from robots.signals import Motion
-
-ITERATIONS = 10
 
 
 class InstrumentalVariables(SimulatingEstimator):
@@ -41,7 +39,7 @@ class InstrumentalVariables(SimulatingEstimator):
         level = data.moments.level(values)
         motions: list[Motion] = []
         rounds, settled = 0, False
-        while not settled and rounds < ITERATIONS:
+        while not settled and rounds < 10:
             rounds += 1
             motions = instruments.simulate(values)
             gram, cross = np.zeros_like(data.moments.gram), np.zeros_like(data.moments.cross)
@@ -51,7 +49,7 @@ class InstrumentalVariables(SimulatingEstimator):
             total = np.tensordot(weights, gram, axes=1)
             extra, right = regularisation(data.moments, weights, np.abs(total), data.ridge)
             before, values = values, _solve(total + extra, weights @ cross + right)
-            settled = bool((torque_change(data.moments, values - before) <= SETTLED * level).all())
+            settled = bool((torque_change(data.moments, values - before) <= SETTLED_TORQUE_SHARE * level).all())
         return Solution(
             values=values,
             weights=weights,

@@ -10,14 +10,9 @@ from estimation.estimators.base import Array, Solution
 from estimation.estimators.wls import WeightedLeastSquares
 from estimation.linear_algebra.scaled import inverse
 from estimation.regressions.covariances import Equations, regressor_rows, robust_covariance
-from estimation.regressions.regression_data import CHUNK, FittedRows, RegressionData
+from estimation.regressions.regression_data import FittedRows, RegressionData
 from estimation.regressions.regularisation import regularisation, solve_scaled
-
-REWEIGHTINGS = 20
-# The likelihood has settled when no standardised residual level moves by more.
-SETTLED = 1e-6
-# Share of a joint's torque below which a residual is rounding, and of the correlations' size that keeps them regular.
-EXACT, REGULAR = 1e-6, 1e-6
+from robots.common.stretches import chunks
 
 
 class MaximumLikelihood(WeightedLeastSquares):
@@ -39,12 +34,13 @@ class MaximumLikelihood(WeightedLeastSquares):
     def refine(self, data: RegressionData, values: Array, weights: Array) -> Solution:
         """Alternates until the likelihood settles."""
         noise = _noise(data, values)
-        for _ in range(REWEIGHTINGS):
+        for _ in range(20):
             precision = inverse(noise)
             values = _generalised(data, precision)
             before, noise = noise, _noise(data, values)
             level = np.sqrt(np.diag(noise))
-            if np.abs((noise - before) / level[:, None] / level).max() <= SETTLED:
+            # The likelihood has settled when no standardised residual level moves by more.
+            if np.abs((noise - before) / level[:, None] / level).max() <= 1e-6:
                 break
         precision = inverse(noise)
         return Solution(
@@ -84,8 +80,8 @@ def _covariance(data: RegressionData, values: Array, precision: Array) -> Array:
         residual = (part.tau - torque) * part.mask
         rows = partial(whitened, part)
         equations.append(Equations(len(motion), rows, np.ones_like(part.mask), residual @ root.T))
-        for start in range(0, len(motion), CHUNK):
-            flat = rows(start, min(start + CHUNK, len(motion))).reshape(-1, size)
+        for at in chunks(len(motion)):
+            flat = rows(at.start, at.stop).reshape(-1, size)
             gram += flat.T @ flat
     return robust_covariance(equations, np.ones(len(root)), gram)
 
@@ -98,11 +94,12 @@ def _noise(data: RegressionData, values: Array) -> Array:
         total, both = total + residual.T @ residual, both + mask.T @ mask
     covariance = total / np.maximum(both, 1)
     rows = np.maximum(data.moments.count, 1)
-    floor = EXACT**2 * np.maximum(data.moments.square / rows, np.finfo(float).tiny)
+    # Below this share of a joint's torque a residual is rounding.
+    floor = 1e-6**2 * np.maximum(data.moments.square / rows, np.finfo(float).tiny)
     level = np.sqrt(np.maximum(np.diag(covariance), floor))
     correlation = covariance / level[:, None] / level
     correlation[np.diag_indices_from(correlation)] = 1.0
     # Rows that count in one joint alone can make the pairs contradict each other.
     eigenvalues, vectors = np.linalg.eigh(correlation)
-    regular = (vectors * np.maximum(eigenvalues, REGULAR)) @ vectors.T
+    regular = (vectors * np.maximum(eigenvalues, 1e-6)) @ vectors.T
     return np.asarray(regular * level[:, None] * level)

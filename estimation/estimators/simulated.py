@@ -16,26 +16,18 @@ from estimation.estimators.wls import WeightedLeastSquares
 from estimation.regressions.covariances import Equations, regressor_rows, robust_covariance
 from estimation.regressions.moments import Moments
 from estimation.regressions.position_noise import smoothed_noise
+from estimation.regressions.preparation import SIGN_SPEED_SHARE
 from estimation.regressions.regression_data import FittedRows, RegressionData
 from robots.common.errors import InputError
+from robots.common.stretches import chunks
 from robots.signals import Motion
 
 # Of a reference that nobody recorded: the share of the measured motion's bandwidth that it keeps, the first that takes
-# no more off the velocity than so many deviations of its noise. Noise in an acceleration grows with the fifth power of
-# the bandwidth, so what such a reference shares with the regressor is little.
-SHARES, NOISE_ONLY = (0.5, 0.7, 0.85), 1.5
-# Time at the start [s] that a simulation from the reference's own state takes to settle.
-SETTLING = 0.3
-# Rows count where the simulated joint is faster than this share of its RMS speed, and than so many deviations of the
-# measured speed from the simulated: there both have the same sign. That leaves out such a share at most.
-SLOW, CERTAIN, LEFT_OUT = 0.008, 3.0, 0.2
-CHUNK = 4096
-# Smallest eigenvalue of an inertia matrix, as a share of its smallest diagonal entry, that a simulation stands.
-INDEFINITE = 0.02
+# no more off the velocity than 1.5 deviations of its noise. Noise in an acceleration grows with the fifth power of the
+# bandwidth, so what such a reference shares with the regressor is little.
+SHARES = (0.5, 0.7, 0.85)
 # Parameters have settled when the torque of their change is below this share of the residual, in every joint.
-SETTLED = 0.01
-# Of the physically consistent fit that stands in, see `PhysicallyConsistent`.
-PULL = 1e-3
+SETTLED_TORQUE_SHARE = 0.01
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -107,14 +99,16 @@ class Instruments:
         for reference in self._references:
             inertia = inertia_matrices(self.data.base, values, reference)
             lengths = np.linalg.eigvalsh(inertia)
-            if (lengths[:, 0] <= INDEFINITE * np.diagonal(inertia, axis1=1, axis2=2).min(axis=1)).any():
+            # Smallest eigenvalue of an inertia matrix, as a share of its smallest diagonal entry, that can be
+            # simulated.
+            if (lengths[:, 0] <= 0.02 * np.diagonal(inertia, axis1=1, axis2=2).min(axis=1)).any():
                 return False
         return True
 
     @cached_property
     def _consistent(self) -> Array:
         weights = self.data.moments.level(np.zeros(self.data.base.size)) ** -1
-        return PhysicallyConsistent(weight=PULL, boxes={}).refine(self.data, np.zeros(0), weights).values
+        return PhysicallyConsistent(weight=1e-3, boxes={}).refine(self.data, np.zeros(0), weights).values
 
     def masks(self, motions: Sequence[Motion]) -> list[Array]:
         """Finds the rows that count (N, n), by the simulated speed: by the measured one, noise would choose."""
@@ -123,13 +117,15 @@ class Instruments:
             dq = motion.dq
             speed = np.sqrt(np.mean(dq**2, axis=0))
             doubt = (part.motion.dq - dq).std(axis=0)
-            # However doubtful: most rows must stay.
-            most = np.quantile(np.abs(dq), LEFT_OUT, axis=0)
-            fast = (np.abs(dq) >= np.maximum(SLOW * speed, np.minimum(CERTAIN * doubt, most))) | (speed < 1e-9)
-            settled = motion.t - motion.t[0] >= min(SETTLING, 0.1 * motion.duration)
+            # Where the speed is three deviations of the measured from the simulated one, both have the same sign.
+            # However doubtful: four fifths of the rows must stay.
+            most = np.quantile(np.abs(dq), 0.2, axis=0)
+            fast = (np.abs(dq) >= np.maximum(SIGN_SPEED_SHARE * speed, np.minimum(3.0 * doubt, most))) | (speed < 1e-9)
+            # Time at the start [s] that a simulation from the reference's own state takes to settle.
+            settled = motion.t - motion.t[0] >= min(0.3, 0.1 * motion.duration)
             # A row that does not count although its joint moves, such as a clipped one, has another reason.
             measured = np.abs(part.motion.dq)
-            moving = measured > 2 * SLOW * np.sqrt(np.mean(measured**2, axis=0))
+            moving = measured > 2 * SIGN_SPEED_SHARE * np.sqrt(np.mean(measured**2, axis=0))
             masks.append((fast & settled[:, None] & ~(moving & (part.mask == 0))).astype(float))
         return masks
 
@@ -159,8 +155,7 @@ def instrumented_moments(data: RegressionData, part: FittedRows, motion: Motion,
     """Sums Z_j' Y_j (n, b, b) and Z_j' tau_j (n, b), Z the regressor of the simulated motion."""
     n, size = data.robot.n, data.base.size
     gram, cross = np.zeros((n, size, size)), np.zeros((n, size))
-    for start in range(0, len(motion), CHUNK):
-        rows = slice(start, start + CHUNK)
+    for rows in chunks(len(motion)):
         Z = data.base.regressor(motion.q[rows], motion.dq[rows], motion.ddq[rows]) * mask[rows, :, None]
         Y = data.base.regressor(part.motion.q[rows], part.motion.dq[rows], part.motion.ddq[rows])
         for joint in range(n):
@@ -172,8 +167,7 @@ def instrumented_moments(data: RegressionData, part: FittedRows, motion: Motion,
 def simulated_moments(data: RegressionData, part: FittedRows, motion: Motion, mask: Array) -> Moments:
     """Sums normal equations of the measured torque on the simulated motion's regressor."""
     total: Moments | None = None
-    for start in range(0, len(motion), CHUNK):
-        rows = slice(start, start + CHUNK)
+    for rows in chunks(len(motion)):
         Z = data.base.regressor(motion.q[rows], motion.dq[rows], motion.ddq[rows])
         moments = Moments.of(Z, part.tau[rows], mask[rows])
         total = moments if total is None else total + moments
@@ -222,7 +216,7 @@ def _smoothed(motion: Motion, data: RegressionData, noise: Array) -> Motion:
         return motion
     for share in SHARES:
         smoother = _low_passed(motion, share * data.smoother.cutoff)
-        if smoother is not None and ((motion.dq - smoother.dq).std(axis=0) <= NOISE_ONLY * noise).all():
+        if smoother is not None and ((motion.dq - smoother.dq).std(axis=0) <= 1.5 * noise).all():
             return smoother
     return motion
 

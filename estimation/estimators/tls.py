@@ -13,18 +13,10 @@ from estimation.estimators.wls import WeightedLeastSquares
 from estimation.linear_algebra.scaled import lengths, square_root
 from estimation.regressions.moments import Moments
 from estimation.regressions.position_noise import smoothed_noise
-from estimation.regressions.regression_data import CHUNK, RegressionData
+from estimation.regressions.regression_data import RegressionData
 from estimation.regressions.regularisation import regularisation
 from robots.common.errors import InputError, SolverError
-
-# Rows on which the regressor's noise is worked out: more don't know its mean square better.
-MOST_ROWS = 6000
-ITERATIONS = 5
-# A direction of the parameters of which more than this share is noise is corrected as if it were this share: what is
-# left of its signal is too little to divide by.
-MOST_NOISE = 0.8
-# Share of a joint's misfit that is left to the torque's own noise at least.
-LEAST_TORQUE_NOISE = 0.05
+from robots.common.stretches import chunks
 
 
 class TotalLeastSquares(WeightedLeastSquares):
@@ -76,7 +68,7 @@ class TotalLeastSquares(WeightedLeastSquares):
         mu = 0.0
         if errors.any():
             problem = _Problem(data.moments, weights, errors, data.ridge)
-            for _ in range(ITERATIONS):
+            for _ in range(5):
                 values, mu = problem.solve(values)
         return Solution(values=values, weights=weights, extras={"noise_share": share, "mu": mu})
 
@@ -93,7 +85,8 @@ class _Problem:
         moments, weights = self.moments, self.weights
         misfit = np.maximum(moments.count, 1) * moments.level(values) ** 2
         by_motion = np.einsum("p,jpq,q->j", values, self.errors, values, optimize=True)
-        torque = weights @ np.maximum(misfit - by_motion, LEAST_TORQUE_NOISE * misfit)
+        # Share of a joint's misfit that is left to the torque's own noise at least.
+        torque = weights @ np.maximum(misfit - by_motion, 0.05 * misfit)
         gram = np.tensordot(weights, moments.gram, axes=1)
         errors = np.tensordot(weights, self.errors, axes=1)
         cross, square = weights @ moments.cross, weights @ moments.square
@@ -114,7 +107,9 @@ class _Problem:
             share, directions = np.linalg.eigh(
                 solve_triangular(lower, solve_triangular(lower, errors, lower=True).T, lower=True)
             )
-            gain = 1 / (1 - np.minimum(mu * share, MOST_NOISE))
+            # A direction of the parameters of which more than this share is noise is corrected as if it were this
+            # share: what is left of its signal is too little to divide by.
+            gain = 1 / (1 - np.minimum(mu * share, 0.8))
             inner = directions @ (gain * (directions.T @ solve_triangular(lower, cross + right, lower=True)))
             return solve_triangular(lower.T, inner) / scale, mu
         except np.linalg.LinAlgError as error:
@@ -136,11 +131,12 @@ def _regressor_noise(data: RegressionData, noise: Array) -> Array:
     if not np.any(roots):
         return total
     rows = sum(len(part.motion) for part in data.parts)
-    stride = max(1, rows // MOST_ROWS)
+    # Rows on which the regressor's noise is worked out: more don't know its mean square better.
+    stride = max(1, rows // 6000)
     for part in data.parts:
         chosen = np.arange(stride // 2, len(part.motion), stride)
-        for start in range(0, len(chosen), CHUNK):
-            at = chosen[start : start + CHUNK]
+        for piece in chunks(len(chosen)):
+            at = chosen[piece]
             state = np.stack([part.motion.q[at], part.motion.dq[at], part.motion.ddq[at]])
             for joint, root in enumerate(roots):
                 for direction in root.T:

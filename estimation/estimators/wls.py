@@ -8,10 +8,6 @@ from estimation.estimators.base import Array, Estimator
 from estimation.regressions.moments import Moments
 from robots.common.errors import InputError
 
-REWEIGHTINGS = 2
-# A joint's mean square torque counts as this share of the largest one's at least.
-SMALLEST = 1e-12
-
 
 class WeightedLeastSquares(Estimator):
     """min sum_j w_j ||tau_j - Y_j pi||^2 with w_j = sigma_j^(-2 temper), sigma_j the residual level of the joint.
@@ -36,7 +32,8 @@ class WeightedLeastSquares(Estimator):
     def weights(self, moments: Moments, ridge: float) -> Array:
         """Gives the inverse residual level to the power of twice the temper (n,)."""
         torque = moments.square / np.maximum(moments.count, 1)
-        weights = np.maximum(torque, SMALLEST * float(torque.max()) + np.finfo(float).tiny) ** -self.temper
-        for _ in range(REWEIGHTINGS):
+        # A joint's mean square torque counts as this share of the largest one's at least.
+        weights = np.maximum(torque, 1e-12 * float(torque.max()) + np.finfo(float).tiny) ** -self.temper
+        for _ in range(2):
             weights = moments.level(moments.solve(weights, ridge)) ** (-2 * self.temper)
         return weights

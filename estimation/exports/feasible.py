@@ -8,17 +8,12 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from estimation.exports.standard import MARGIN, rigid_grouping, semidefinite_bodies
+from estimation.exports.standard import BODY_MARGIN, rigid_grouping, semidefinite_bodies
 from estimation.linear_algebra.conic import ConicProgram
 from estimation.models.model import Model
 from estimation.regressions.parameter_priors import link_spreads
 
 Array = NDArray[np.float64]
-
-ROOM = 10.0  # of the margin that `standard_parameters` demands, so that its own search has an interior
-PRIOR = 1e-2  # weight of the description, in units of each link's mass and reach: it decides what the data leave open
-FLOOR = 1e-9  # of a correlation matrix, against rounding
-
 
 NEAREST = (
     "no bodies that can exist have exactly the identified inertial parameters; those of the nearest ones differ by up "
@@ -51,13 +46,14 @@ def nearest_feasible(model: Model, inertia: Array, rotor_inertia: Array) -> tupl
     rest = values - grouped @ np.asarray(rotor_inertia, dtype=float)[rotors]
     spread = link_spreads(inertia)
     scaled = grouping * spread.reshape(-1)
+    # Ten times the margin that `standard_parameters` demands, so that its own search has an interior.
     return nearest_within_errors(
         model,
         own,
         scaled,
         rest,
         (inertia / spread).reshape(-1),
-        lambda program: semidefinite_bodies(program, spread, program.size, ROOM * MARGIN),
+        lambda program: semidefinite_bodies(program, spread, program.size, 10.0 * BODY_MARGIN),
         "bodies that can exist",
     )
 
@@ -97,7 +93,8 @@ def nearest_within_errors(
     # What is not determined may be anything within the sizes of links.
     error = np.where(determined & (error > 0.0), error, np.abs(scaled).sum(axis=1))
     correlation = np.where(np.outer(determined, determined), covariance / np.outer(error, error), np.eye(len(error)))
-    correlation = correlation + FLOOR * np.eye(len(error))
+    # Keeps a correlation matrix definite against rounding.
+    correlation = correlation + 1e-9 * np.eye(len(error))
     whiten = np.linalg.inv(np.linalg.cholesky(correlation)) / error
     count, free = scaled.shape
     program = ConicProgram(free + count)
@@ -105,7 +102,8 @@ def nearest_within_errors(
     unit = np.maximum(np.abs(rows).max(axis=1), 1.0)
     program.equal(rows / unit[:, None], -(whiten @ rest) / unit)
     constrain(program)
-    weights = np.concatenate([np.full(free, PRIOR), np.ones(count)])
+    # The description decides what the data leave open: a weak prior, in units of each link's mass and reach.
+    weights = np.concatenate([np.full(free, 1e-2), np.ones(count)])
     found = program.solve(np.diag(weights), -weights * np.concatenate([start, np.zeros(count)]), what)
     change = scaled @ found[:free] - rest
     moved = np.array(model.values)

@@ -12,8 +12,8 @@ from estimation.models.model import Model
 
 Array = NDArray[np.float64]
 
-SPEEDS = 50
-SLOWEST = 0.02  # of the fastest: below it the sign function of the model is smooth
+# A larger difference from the identified curve, as a share of the largest friction or spring torque, is named.
+NAMED_DIFFERENCE = 0.02
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -53,14 +53,16 @@ def linear_friction(model: Model) -> LinearFriction | None:
     limits = np.where(np.isfinite(model.robot.limits.velocity), model.robot.limits.velocity, 1.0)
     fastest = np.asarray(limits if recorded is None else recorded["velocity"][0], dtype=float)
     fastest = np.where(fastest > 0.0, fastest, 1.0)
-    shares = np.linspace(SLOWEST, 1.0, SPEEDS)
+    # Below 2 % of the fastest speed the sign function of the model is smooth.
+    count = 50
+    shares = np.linspace(0.02, 1.0, count)
     speeds = shares[:, None] * fastest
-    still = np.zeros((SPEEDS, n))
+    still = np.zeros((count, n))
     values = np.where(friction, model.values, 0.0)
     # Friction that differs by direction cannot be stated: its mean counts.
     forward, backward = (torque_model.torque(still, v, still, values, columns=model.columns) for v in (speeds, -speeds))
     curve = (forward - backward) / 2.0
-    found = np.array([nnls(np.column_stack([np.ones(SPEEDS), speeds[:, j]]), curve[:, j])[0] for j in range(n)])
+    found = np.array([nnls(np.column_stack([np.ones(count), speeds[:, j]]), curve[:, j])[0] for j in range(n)])
     return LinearFriction(
         coulomb=found[:, 0],
         viscous=found[:, 1],

@@ -13,12 +13,12 @@ from estimation.regressions.parameter_priors import link_spreads
 from robots.base_parameters import find_base_parameters
 from robots.common.errors import InfeasibleError, InputError
 from robots.consistency import BASIS, normalised_eigenvalues
-from robots.geometry.inertia import SIZE
+from robots.geometry.inertia import BODY_PARAMETERS
 
 Array = NDArray[np.float64]
 
 # Smallest eigenvalue of a pseudo-inertia, in units of the link's own mass and reach.
-MARGIN = 1e-6
+BODY_MARGIN = 1e-6
 REMEDY = "identify with --method consistent, which fits physically possible bodies"
 
 
@@ -98,7 +98,9 @@ def _chosen(model: Model) -> tuple[Array, Array] | None:
     for column, value in zip(columns, values, strict=True):
         if column.term == "rotor_inertia" and column.joint is not None:
             rotors[column.joint - 1] = value
-    return values[[i for i, column in enumerate(columns) if column.term == "rigid_body"]].reshape(n, SIZE), rotors
+    return values[[i for i, column in enumerate(columns) if column.term == "rigid_body"]].reshape(
+        n, BODY_PARAMETERS
+    ), rotors
 
 
 def rigid_grouping(model: Model, described: Array) -> tuple[Array, Array, Array]:
@@ -139,18 +141,18 @@ def _nearest(grouping: Array, values: Array, described: Array) -> Array:
     scaled = grouping * spread.reshape(-1)
     start = described / spread
     unit = np.maximum(np.abs(scaled).max(axis=1), np.finfo(float).tiny)
-    program = ConicProgram(SIZE * n)
+    program = ConicProgram(BODY_PARAMETERS * n)
     program.equal(scaled / unit[:, None], -values / unit)
-    semidefinite_bodies(program, spread, SIZE * n, MARGIN)
+    semidefinite_bodies(program, spread, BODY_PARAMETERS * n, BODY_MARGIN)
     try:
-        found = program.solve(np.eye(SIZE * n), -start.reshape(-1), "standard parameters")
+        found = program.solve(np.eye(BODY_PARAMETERS * n), -start.reshape(-1), "standard parameters")
     except InfeasibleError as error:
         raise InfeasibleError(
             "no physically possible bodies have the identified base parameters", remedy=REMEDY
         ) from error
     # Onto the base parameters to the last digit: the solver stops at some 1e-8.
     found = found + scaled.T @ np.linalg.solve(scaled @ scaled.T, values - scaled @ found)
-    standard = np.asarray(found.reshape(n, SIZE) * spread)
+    standard = np.asarray(found.reshape(n, BODY_PARAMETERS) * spread)
     if not (normalised_eigenvalues(standard) > 0).all():
         raise InfeasibleError("no physically possible bodies have the identified base parameters", remedy=REMEDY)
     return standard
@@ -167,7 +169,7 @@ def semidefinite_bodies(program: ConicProgram, spread: Array, size: int, margin:
     """
     for link in range(len(spread)):
         basis = np.zeros((size, 4, 4))
-        place = slice(SIZE * link, SIZE * (link + 1))
+        place = slice(BODY_PARAMETERS * link, BODY_PARAMETERS * (link + 1))
         # A congruence by mass and reach makes the units of the matrix one, and keeps its signs.
         scale = np.array([1.0, 1.0, 1.0, spread[link, 1] / spread[link, 0]]) / np.sqrt(spread[link, 4])
         basis[place] = BASIS * spread[link][:, None, None] * scale[:, None] * scale

@@ -8,9 +8,6 @@ from estimation.models.model import Model
 from robots.common.plain import two_digits
 from robots.terms.position_torque import PositionTorque
 
-# Random poses of the recorded range, and the share of the largest torque from which a joint is listed.
-POSES, LISTED = 500, 0.1
-
 
 def unstated_terms(model: Model, stated: set[str]) -> list[str]:
     """Names the parameters that a file does not hold; of torques by position with their size in the recorded range.
@@ -29,14 +26,15 @@ def _sizes(model: Model, term: str) -> str:
     if term != PositionTorque.name or recorded is None:
         return ""
     low, high = (np.asarray(bound, dtype=float) for bound in recorded["position"])
-    q = np.random.default_rng(0).uniform(low, high, (POSES, model.robot.n))
+    q = np.random.default_rng(0).uniform(low, high, (500, model.robot.n))
     values = np.where([column.term == term for column in model.parameters], model.values, 0.0)
     still = np.zeros_like(q)
     largest = np.abs(model.torque_model.torque(q, still, still, values, columns=model.columns)).max(axis=0)
+    # A joint is listed from a tenth of the largest torque on.
     sizes = [
         f"{two_digits(size)} {model.robot.limits.unit(joint, 'torque')} at joint {joint + 1}"
         for joint, size in enumerate(largest.tolist())
-        if size > LISTED * float(largest.max())
+        if size > 0.1 * float(largest.max())
     ]
     return (
         f" (up to {', '.join(sizes)}; the other parameters were fitted beside them and may err without: identify with "

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from estimation.exports.feasible import NEAREST, nearest_feasible
-from estimation.exports.friction import LinearFriction, linear_friction
+from estimation.exports.friction import NAMED_DIFFERENCE, LinearFriction, linear_friction
 from estimation.exports.remainders import remainder
 from estimation.exports.standard import REMEDY, standard_parameters
 from estimation.exports.unstated import unstated_terms
@@ -31,8 +31,7 @@ Element = ElementTree.Element
 
 EYE = np.eye(4)
 # Limits that are not known: a URDF states both, velocity and effort, in finite numbers.
-UNKNOWN = 1e9
-ROUGH = 0.02  # of the friction: a larger difference from the identified curve is named in the file
+UNKNOWN_LIMIT = 1e9
 
 
 def export_urdf(model: Model, path: str | Path, *, robot: Robot | None = None, force: bool = False) -> None:
@@ -95,7 +94,7 @@ def build_urdf(model: Model, robot: Robot | None = None) -> Urdf:
     kept: list[str] = []
     root = _updated(source, known, inertia, kept) if from_file else _chain(known, inertia)
     if not from_file and not np.isfinite([known.limits.velocity, known.limits.torque]).all():
-        kept.append(f"limits of velocity and effort that are not known are {UNKNOWN:g}")
+        kept.append(f"limits of velocity and effort that are not known are {UNKNOWN_LIMIT:g}")
     if friction is not None:
         _state_friction(root, known, friction)
     remarks = (*_remarks(model, friction, moved), *kept)
@@ -124,7 +123,7 @@ def _remarks(model: Model, friction: LinearFriction | None, moved: float) -> lis
         rough = [
             f"{friction.error[i]:.2g} {model.robot.limits.unit(i, 'torque')} at joint {name}"
             for i, name in enumerate(model.robot.joint_names)
-            if friction.error[i] > ROUGH * friction.largest[i]
+            if friction.error[i] > NAMED_DIFFERENCE * friction.largest[i]
         ]
         if rough:
             text = "damping and friction approximate the identified friction curve; largest difference up to the"
@@ -232,7 +231,7 @@ def joint_element(joint: Joint, parent: str, child: str, bounds: Sequence[float]
     limit = {"lower": lower, "upper": upper} if limited else {}
     # A reader needs both, or neither: a missing one makes the file invalid.
     if limited or np.isfinite([velocity, effort]).any():
-        limit |= {"velocity": min(velocity, UNKNOWN), "effort": min(effort, UNKNOWN)}
+        limit |= {"velocity": min(velocity, UNKNOWN_LIMIT), "effort": min(effort, UNKNOWN_LIMIT)}
         ElementTree.SubElement(element, "limit", {name: repr(value) for name, value in limit.items()})
     return element
 

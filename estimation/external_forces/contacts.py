@@ -19,9 +19,6 @@ from robots.geometry.chain import Chain
 
 Array = NDArray[np.float64]
 
-# Samples that stand for a longer contact where its first and last moment are sought.
-MOST_ROWS = 400
-
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Contact(Record):
@@ -170,7 +167,8 @@ def _window(
     low, high = max(first - around, 1), min(last + around // 3, len(signals.t))
     weights = np.linalg.solve(covariance, observed.residual[peak])
     series = signals.external[low:high] @ weights
-    step = max(1, len(series) // MOST_ROWS)
+    # Samples that stand for a longer contact where its first and last moment are sought.
+    step = max(1, len(series) // 400)
     sums = np.concatenate([[0.0], np.cumsum(series)])[::step]
     lengths = np.arange(len(sums))
     length = lengths[None, :] - lengths[:, None]

@@ -25,14 +25,8 @@ from estimation.predictions.prediction import Prediction, predict
 from robots.common.errors import InputError, NotIdentifiableError
 from robots.common.progress import SILENT, Progress
 from robots.signals import Log
-from robots.terms.friction import SLOWEST
+from robots.terms.friction import STANDING_SPEED
 from robots.terms.situations.flange_body import require_flange
-
-SHARPNESS = 5.0
-"""Least cut-off of the positions' smoothing over the observer's bandwidth, so that it smears nothing that passes.
-
-Noise of the positions above the bandwidth does not pass the observer, so that a higher cut-off costs nothing.
-"""
 
 Predictor = Callable[[Model, Log], Prediction]
 
@@ -74,7 +68,9 @@ def estimate_forces(
     bandwidth, velocity = how.bandwidth, how.velocity
     if calibration is not None:
         bandwidth, velocity = calibration.bandwidth, calibration.velocity
-    model = smoothed_at_least(model, SHARPNESS * bandwidth)
+    # Least cut-off of the positions' smoothing over the observer's bandwidth, so that it smears nothing that passes.
+    # Noise of the positions above the bandwidth does not pass the observer, so that a higher cut-off costs nothing.
+    model = smoothed_at_least(model, 5.0 * bandwidth)
     run, bar = predictor or predict, progress or SILENT
     bar.start("external forces", float(len(healthy) + 1))
     warnings: list[str] = []
@@ -161,11 +157,6 @@ def forces_of(
 
 Array = NDArray[np.float64]
 
-# The band is to hold 95 % of a healthy log's errors. Where it holds less than half, something acts most of the time.
-HALF = 0.5
-# A joint that moves in a smaller share of the samples does not test the model.
-FEW = 0.1
-
 
 def check_fit(signals: Signals, band: Array | None, name: str) -> str | None:
     """Compares a log's torque with the model's prediction of it, with the level of friction as it is followed.
@@ -187,14 +178,18 @@ def check_fit(signals: Signals, band: Array | None, name: str) -> str | None:
         return None
     outside, ratio = np.zeros((2, signals.torque.shape[1]))
     for j in range(len(outside)):
-        moving = np.abs(signals.dq[:, j]) > SLOWEST
-        if moving.mean() < FEW:
+        moving = np.abs(signals.dq[:, j]) > STANDING_SPEED
+        # A joint that moves in a smaller share of the samples does not test the model.
+        if moving.mean() < 0.1:
             continue
         error = signals.direct[moving, j]
         outside[j] = np.mean(np.abs(error) > band[moving, j])
         ratio[j] = np.sqrt(np.mean(error**2)) / max(float(signals.torque[moving, j].std()), np.finfo(float).tiny)
-    joint = int(np.argmax(np.where(outside > HALF, ratio, 0.0)))
-    if not outside[joint] > HALF:
+    # The band is to hold 95 % of a healthy log's errors. Where it holds less than half, something acts most of the
+    # time.
+    least_outside = 0.5
+    joint = int(np.argmax(np.where(outside > least_outside, ratio, 0.0)))
+    if not outside[joint] > least_outside:
         return None
     if ratio[joint] > 1.0:
         raise NotIdentifiableError(

@@ -12,11 +12,6 @@ from robots.geometry.chain import Chain
 
 Array = NDArray[np.float64]
 
-# Share of a healthy robot's samples below the level from which a joint reacts.
-CONFIDENCE = 0.99
-# Singular values of a Jacobian below this share of the largest are rounding.
-RANK = 1e-6
-
 
 @dataclass(frozen=True, kw_only=True)
 class Place:
@@ -76,10 +71,12 @@ def fit_localiser(chain: Chain, q: Array, residual: Array, covariance: Array, ja
     """Takes the levels from samples of a healthy robot, arrays (N, ...) as `Localiser.locate` has them."""
     joints = residual**2 / np.einsum("tjj->tj", covariance)
     distances = link_misfits(chain, q, residual, covariance)
+    # Share of a healthy robot's samples below the level from which a joint reacts.
+    confidence = 0.99
     return Localiser(
-        joint=np.quantile(joints, CONFIDENCE, axis=0),
-        link=np.quantile(distances, CONFIDENCE, axis=0),
-        tool=float(np.quantile(misfit(residual, covariance, jacobian[:, :3]), CONFIDENCE)),
+        joint=np.quantile(joints, confidence, axis=0),
+        link=np.quantile(distances, confidence, axis=0),
+        tool=float(np.quantile(misfit(residual, covariance, jacobian[:, :3]), confidence)),
     )
 
 
@@ -103,6 +100,7 @@ def link_misfits(chain: Chain, q: Array, residual: Array, covariance: Array) -> 
                 jacobian[:, 3:, j] = axes[:, j]
         _, s, vt = np.linalg.svd(jacobian, full_matrices=False)
         # Orthonormal rows of the range, so that nearly singular places do not count as regular.
-        rows = np.where(s[..., None] > RANK * s[..., :1, None], vt, 0.0)
+        # Singular values of a Jacobian below this share of the largest are rounding.
+        rows = np.where(s[..., None] > 1e-6 * s[..., :1, None], vt, 0.0)
         result[:, link] = misfit(residual, covariance, rows)
     return result

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 
 # Below this share of the largest eigenvalue of the information a direction leaves the joints without torque.
-UNOBSERVABLE = 1e-8
+UNOBSERVABLE_SHARE = 1e-8
 
 
 def tool_load(residual: Array, covariance: Array, jacobian: Array) -> tuple[Array, Array]:
@@ -30,14 +30,14 @@ def tool_load(residual: Array, covariance: Array, jacobian: Array) -> tuple[Arra
     # One unit for force and moment: each component by its own information.
     scale = np.sqrt(np.maximum(np.einsum("...kk->...k", information), np.finfo(float).tiny))
     values, vectors = np.linalg.eigh(information / scale[..., :, None] / scale[..., None, :])
-    known = values > UNOBSERVABLE * values[..., -1:]
+    known = values > UNOBSERVABLE_SHARE * values[..., -1:]
     inverse = np.where(known, 1.0 / np.where(known, values, 1.0), 0.0)
     spread = (
         (vectors * inverse[..., None, :]) @ np.swapaxes(vectors, -1, -2) / scale[..., :, None] / scale[..., None, :]
     )
     right = np.einsum("...nk,...n->...k", weighted, residual)
     load = np.einsum("...kl,...l->...k", spread, right)
-    lost = (vectors**2 * ~known[..., None, :]).sum(axis=-1) > UNOBSERVABLE
+    lost = (vectors**2 * ~known[..., None, :]).sum(axis=-1) > UNOBSERVABLE_SHARE
     diagonal = np.arange(spread.shape[-1])
     spread[..., diagonal, diagonal] = np.where(lost, np.inf, spread[..., diagonal, diagonal])
     return load, spread

@@ -13,9 +13,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from estimation.identifications.estimate import Estimate
-from estimation.linear_algebra.scaled import lengths
+from estimation.linear_algebra.scaled import LEAST_RIDGE, lengths
 from estimation.preprocessing import Harmonics
-from estimation.regressions.joint_regressor import JointRegressor, chunks
+from estimation.regressions.joint_regressor import JointRegressor
 from estimation.regressions.moments import Moments
 from estimation.regressions.preparation import Prepared, Rows
 from estimation.uncertainty.blocks import circular_block_counts
@@ -23,18 +23,13 @@ from robots.base_parameters import find_base_parameters
 from robots.common.errors import InputError, NotIdentifiableError
 from robots.common.parallel import one_blas_thread, threaded
 from robots.common.records import Record
+from robots.common.stretches import chunks
 
 if TYPE_CHECKING:
     import pandas as pd
 
 Array = NDArray[np.float64]
 
-# Fewer blocks than this say too little of a spread.
-LEAST_BLOCKS = 8
-# A log without a period is cut into so many cells, and blocks are so many consecutive ones.
-CELLS, MOVING = 120, 4
-# Keeps a resample invertible that has lost a direction.
-FAINT = 1e-12
 # Quantiles one standard deviation from the middle of a normal distribution: a resample that has lost a direction does
 # not distort them.
 SPREAD = (0.158655, 0.841345)
@@ -146,7 +141,9 @@ def _pieces(
     prepared: Sequence[Prepared], rows: Sequence[Rows], estimate: Estimate
 ) -> tuple[str, list[tuple[Rows, slice]], int]:
     """What is drawn: its kind, its rows, and how many consecutive pieces make a block."""
-    if len(rows) >= LEAST_BLOCKS:
+    # Fewer blocks than this say too little of a spread.
+    least = 8
+    if len(rows) >= least:
         return "logs", [(part, slice(0, len(part.motion))) for part in rows], 1
     smoother = estimate.choice.smoother
     periods = [smoother.period if isinstance(smoother, Harmonics) else log.period for log in prepared]
@@ -158,14 +155,17 @@ def _pieces(
             # Smoothing takes the ends; what is left of the last period goes with it: each row counts once.
             bounds = [*np.searchsorted(t, t[0] + period * np.arange(whole)).tolist(), len(t)]
             cut += [(part, slice(first, stop)) for first, stop in pairwise(bounds)]
-    if all(periods) and len(cut) >= LEAST_BLOCKS:
+    if all(periods) and len(cut) >= least:
         return "periods", cut, 1
     total = sum(len(part.motion) for part in rows)
-    size = -(-total // CELLS)
+    # A log without a period is cut into so many cells.
+    size = -(-total // 120)
     cells = [(part, at) for part in rows for at in chunks(len(part.motion), size)]
-    if len(cells) < LEAST_BLOCKS * MOVING:
+    # Blocks of a log without a period are so many consecutive cells.
+    moving = 4
+    if len(cells) < least * moving:
         raise NotIdentifiableError("too few rows for a bootstrap", remedy="record a longer log")
-    return "blocks", cells, MOVING
+    return "blocks", cells, moving
 
 
 def _moments(regressor: JointRegressor, part: Rows, piece: slice) -> Moments:
@@ -182,7 +182,8 @@ def _refits(gram: Array, cross: Array, moving: int, resamples: int, rng: np.rand
     """Solutions (R, b) of sums of drawn blocks, each of `moving` consecutive pieces, in a circle."""
     scale = lengths(gram.sum(axis=0))
     gram, cross = gram / scale[:, None] / scale, cross / scale
-    faint = FAINT * np.eye(len(scale))
+    # A resample may have lost a direction.
+    faint = LEAST_RIDGE * np.eye(len(scale))
     values = np.empty((resamples, len(scale)))
     for k, counts in enumerate(circular_block_counts(len(gram), moving, resamples, rng)):
         values[k] = np.linalg.solve(np.tensordot(counts, gram, axes=1) + faint, counts @ cross) / scale

@@ -19,9 +19,6 @@ from robots.base_parameters import BaseParameters
 
 Array = NDArray[np.float64]
 
-# Decrease of the error on other motions (mean log) that a torque by position must bring.
-POSITION_GAIN = 0.03
-
 __all__ = ["VELOCITY_SCALES", "Candidates", "Choice", "choose"]
 
 
@@ -95,7 +92,8 @@ def choose(
     plain = trial = comparison.trial(averaged)
     if position is not False and len(comparison.plain) < base.size:
         other = comparison.trial(averaged, position=True)
-        if position or transfer.cost(averaged, other) < transfer.cost(averaged, trial) - POSITION_GAIN:
+        # Decrease of the error on other motions (mean log) that a torque by position must bring.
+        if position or transfer.cost(averaged, other) < transfer.cost(averaged, trial) - 0.03:
             trial, position = other, True
     held_out = comparison.left_out(logged, trial)
     return Choice(

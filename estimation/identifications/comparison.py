@@ -13,11 +13,12 @@ from estimation.estimators import Estimator
 from estimation.identifications.trials import Candidates, Trial
 from estimation.preprocessing import Harmonics, LowPass, Smoother, SmoothingSpline
 from estimation.regressions.blocks import Blocks, Sides, side_products
-from estimation.regressions.default_prior import MEMORY, default_prior, weighed_prior
+from estimation.regressions.default_prior import MODEL_ERROR_MEMORY, default_prior, weighed_prior
 from estimation.regressions.joint_regressor import JointRegressor, summed
 from estimation.regressions.parameter_priors import GaussianPrior
 from estimation.regressions.preparation import Prepared, Rows, rows_of
 from estimation.regressions.standard_parameters import column_levels
+from estimation.uncertainty.averages import AVERAGING_TIME
 from robots.base_parameters import BaseParameters
 from robots.terms import PositionTorque
 
@@ -26,23 +27,8 @@ Array = NDArray[np.float64]
 # tanh(dq / v0): the first is the sign in practice, and stays unless the data ask for a wider one.
 VELOCITY_SCALES = (0.001, 0.002, 0.005, 0.01, 0.02, 0.05, 0.1)
 WIDER = np.array(VELOCITY_SCALES[1:])
-# Share of its residual that a wider sign must save a joint. Cross-validation would prefer wide ones even where the
-# truth is a sign, and bias the friction by many standard errors.
-SAVING = 0.03
-# How much worse, in mean log error, a lower cut-off may be and still be taken.
-CUTOFF_SLACK = 0.0005
-# Required gain of another smoother over the low-pass.
-SMOOTHER_GAIN = 0.005
-# More harmonics than a motion of an arm has cost the square of their number.
-MOST_HARMONICS = 120
-# A left-out error below this share of a constant's is rounding.
-EXACT = 1e-9
 # More rows than this do not choose better, only slower: evenly spread stretches then stand for the log.
-MOST_ROWS, STRETCHES = 24_000, 10
-# Both sides are averaged over so much time [s], which leaves the noise above 25 Hz out of the comparison, ...
-AVERAGED = 0.02
-# ... as long as so many averages remain.
-LEAST_AVERAGES = 400
+COMPARED_ROWS, COMPARED_STRETCHES = 24_000, 10
 
 
 class Comparison:
@@ -63,17 +49,20 @@ class Comparison:
         tau = np.concatenate([log.tau for log in logs]) if len(logs) > 1 else logs[0].tau
         deviation = tau.std(axis=0) if spread is None else spread
         self.spread = np.maximum(deviation, 1e-9 * np.maximum(1.0, np.abs(tau).max(axis=0)))
-        self.sampled = count > MOST_ROWS or spread is not None
+        self.sampled = count > COMPARED_ROWS or spread is not None
         self.logs: list[Prepared] = []
         self.names = [log.log.name or f"log {index}" for index, log in enumerate(logs, start=1)]
         self.source: list[int] = []  # of each stretch, which log it is part of
         for index, log in enumerate(logs):
-            number = max(1, round(STRETCHES * len(log.log) / count)) if self.sampled else 1
-            self.logs += log.stretches(number, -(-min(len(log.log), round(MOST_ROWS / count * len(log.log))) // number))
+            number = max(1, round(COMPARED_STRETCHES * len(log.log) / count)) if self.sampled else 1
+            self.logs += log.stretches(
+                number, -(-min(len(log.log), round(COMPARED_ROWS / count * len(log.log))) // number)
+            )
             self.source += [index] * (len(self.logs) - len(self.source))
         self.period = float(np.median([log.positions.period for log in self.logs]))
         kept = sum(len(log.log) for log in self.logs)
-        self.averaged = max(1, min(round(AVERAGED / self.period), kept // LEAST_AVERAGES))
+        # So many averages remain at least.
+        self.averaged = max(1, min(round(AVERAGING_TIME / self.period), kept // 400))
         self.plain = np.flatnonzero([column.term != PositionTorque.name for column in base.columns])
 
     def smoother(self) -> tuple[Smoother, LowPass]:
@@ -83,12 +72,14 @@ class Comparison:
         # All of them: an elastic drive makes a second minimum far above the first.
         tried = [(cutoff, self.trial(self.blocks(LowPass(cutoff))).cost) for cutoff in usable]
         lowest = min(cost for _, cost in tried)
-        cutoff, cost = min((t for t in tried if t[1] <= lowest + CUTOFF_SLACK), key=lambda t: t[0])
+        # How much worse, in mean log error, a lower cut-off may be and still be taken.
+        cutoff, cost = min((t for t in tried if t[1] <= lowest + 0.0005), key=lambda t: t[0])
         low_pass = LowPass(cutoff)
         chosen: Smoother = low_pass
         for other in self._others(cutoff):
             found = self.trial(self.blocks(other)).cost
-            if found < cost - SMOOTHER_GAIN:
+            # Required gain of another smoother over the low-pass.
+            if found < cost - 0.005:
                 chosen, cost = other, found
         return chosen, low_pass
 
@@ -97,17 +88,18 @@ class Comparison:
         columns = np.arange(self.base.size) if position else self.plain
         moments = blocks.fitted.columns(columns.tolist()).total
         prior = self._prior(blocks).columns(columns)
-        rows = max(1.0, MEMORY / (self.period * self.averaged))
+        rows = max(1.0, MODEL_ERROR_MEMORY / (self.period * self.averaged))
         ridge, prior = weighed_prior(self.estimator.solve, moments, prior, rows)
         trial = Trial(ridge, prior, tuple(columns.tolist()), self._scales(blocks, columns, ridge, prior), np.zeros(0))
-        return replace(trial, logs=np.log(np.maximum(self.left_out(blocks, trial) / self.spread, EXACT)))
+        # A left-out error below this share of a constant's is rounding.
+        return replace(trial, logs=np.log(np.maximum(self.left_out(blocks, trial) / self.spread, 1e-9)))
 
     def blocks(self, smoother: Smoother, averaged: int | None = None) -> Sides:
         """Normal equations of each block, the sign columns of the wider scales appended after the base columns.
 
         Args:
             smoother: of the positions.
-            averaged: so many rows are averaged at a time; by default those of `AVERAGED`.
+            averaged: so many rows are averaged at a time; by default those of 20 ms.
         """
         size = averaged or self.averaged
         pieces = [(part, piece) for part in self.rows(smoother) for piece in self.pieces(part)]
@@ -178,9 +170,8 @@ class Comparison:
             # One period for all: logs that repeat differently, or not at all, have none in common.
             if len(known) == len(periods) and np.ptp(known) < 1e-3 * min(known):
                 period = float(np.mean(known))
-                orders = sorted(
-                    {min(max(1, round(factor * cutoff * period)), MOST_HARMONICS) for factor in (0.5, 1.0, 2.0)}
-                )
+                # More harmonics than a motion of an arm has cost the square of their number.
+                orders = sorted({min(max(1, round(factor * cutoff * period)), 120) for factor in (0.5, 1.0, 2.0)})
                 others += [Harmonics(period, order) for order in orders if order / period < 0.4 / self.period]
         return others
 
@@ -211,7 +202,9 @@ class Comparison:
         total = blocks.fitted.total
         choices = np.array([self.widened(columns, [k] * len(total.count)) for k in range(len(VELOCITY_SCALES))])
         errors = np.array([total.residual(values) for values in blocks.fitted.fitted(choices, ridge, prior)])
-        worth = errors.min(axis=0) < (1 - SAVING) ** 2 * errors[0]
+        # Share of its residual that a wider sign must save a joint. Cross-validation would prefer wide ones even where
+        # the truth is a sign, and bias the friction by many standard errors.
+        worth = errors.min(axis=0) < (1 - 0.03) ** 2 * errors[0]
         return tuple(int(k) if yes else 0 for k, yes in zip(errors.argmin(axis=0), worth, strict=True))
 
     def widened(self, columns: Sequence[int] | NDArray[np.intp], scales: Sequence[int]) -> NDArray[np.intp]:

@@ -16,10 +16,6 @@ from robots.regressor import default_model
 from robots.robot import Robot
 from robots.signals import Log
 
-CUTOFF = 5.0
-# Coulomb friction fades below this speed [rad/s or m/s].
-SHARP = 1e-3
-
 
 @one_blas_thread()
 def identify_drive_gains(
@@ -27,7 +23,7 @@ def identify_drive_gains(
     runs: Sequence[tuple[Log, ArrayLike | None]],
     *,
     friction: str = "polynomial",
-    cutoff: float = CUTOFF,
+    cutoff: float = 5.0,
 ) -> DriveGains:
     """Identifies the torque per ampere of each joint, from currents under a known payload (Gautier and Briot 2014).
 
@@ -46,7 +42,8 @@ def identify_drive_gains(
         NotIdentifiableError: runs that leave a gain open.
     """
     require_plain([log for log, _ in runs], "the fit of drive gains")
-    base = find_base_parameters(default_model(robot, friction=friction, velocity_scale=SHARP))
+    # Coulomb friction fades below this speed [rad/s or m/s].
+    base = find_base_parameters(default_model(robot, friction=friction, velocity_scale=1e-3))
     found = []
     for log, payload in runs:
         if log.current is None:

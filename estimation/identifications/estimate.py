@@ -25,8 +25,6 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 
 MODEL = "model.json"
-# Above this ratio of robust to white-noise standard errors the summary warns.
-COLOURED = 2.0
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -181,7 +179,8 @@ class Estimate(Result):
                 f"At their bounds: {', '.join(bounds)}. Their standard errors come from a fit without bounds and are "
                 f"rather too large."
             )
-        if self.colour > COLOURED:
+        # Above this ratio of robust to white-noise standard errors the summary warns.
+        if self.colour > 2.0:
             found.append(
                 f"Residuals are correlated in time; the standard errors allow for it ({self.colour:.1f} times those "
                 f"of white noise)."

@@ -14,21 +14,19 @@ from numpy.typing import NDArray
 from estimation.estimators import Estimator, RegressionData, Solution
 from estimation.identifications.choices import Choice
 from estimation.regressions.braking_friction import with_braking_friction
-from estimation.regressions.joint_regressor import CHUNK, JointRegressor, chunks
+from estimation.regressions.joint_regressor import JointRegressor
 from estimation.regressions.moments import Moments
 from estimation.regressions.preparation import Prepared, Rows
 from estimation.uncertainty import Part, Played, batch_factors, covariance, with_repetitions
+from estimation.uncertainty.averages import AVERAGING_TIME
 from robots.base_parameters import BaseParameters
 from robots.common.parallel import threaded
+from robots.common.stretches import ROWS_AT_A_TIME, chunks
 
 Array = NDArray[np.float64]
 
 # In a longer log, evenly spread parts represent the noise's correlation and the sandwich's inner matrix.
-MOST_ROWS, STRETCHES = 100_000, 24
-# For the sandwich the rows of a long log are averaged over so much time [s], ...
-AVERAGED = 0.02
-# ... as long as so many averages remain.
-LEAST_AVERAGES = 10_000
+SANDWICH_ROWS, SANDWICH_STRETCHES = 100_000, 24
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -93,7 +91,7 @@ def fit(base: BaseParameters, logs: Sequence[Prepared], estimator: Estimator, ch
     # One array for all parts, which the estimate keeps: of millions of rows a copy counts.
     torque = np.empty((sum(len(part.motion) for part in rows), rows[0].tau.shape[1]))
     predicted = np.split(torque, np.cumsum([len(part.motion) for part in rows])[:-1])
-    long = len(torque) > MOST_ROWS
+    long = len(torque) > SANDWICH_ROWS
     passes = [second_pass(regressor, part, solution, into, long) for part, into in zip(rows, predicted, strict=True)]
     scores = np.concatenate([found.scores for found in passes])
     fitted = [Fitted(part, torque, None) for part, torque in zip(rows, predicted, strict=True)]
@@ -104,7 +102,7 @@ def fit(base: BaseParameters, logs: Sequence[Prepared], estimator: Estimator, ch
         # An M-estimator's scores are its weights times its errors (Huber 1967).
         fitted = [Fitted(*some) for some in zip(rows, predicted, factors, strict=True)]
         scores = _scores(regressor, fitted, solution.weights) if long else scores
-    averaged = round(AVERAGED / float(np.median([log.positions.period for log in logs])))
+    averaged = round(AVERAGING_TIME / float(np.median([log.positions.period for log in logs])))
     periods = [log.period for log in logs] if whole and len(rows) == len(logs) else None
     full, white, prior_share = covariances(
         regressor, fitted, scores, moments, solution, choice.ridge, averaged, seed, periods=periods
@@ -226,7 +224,8 @@ def covariances(
     total = rows or sum(len(some.torque) for some in fitted)
     seen = sum(part.rows for part in parts)
     share = seen / total
-    averaged = min(averaged, seen // LEAST_AVERAGES)
+    # So many averages remain at least.
+    averaged = min(averaged, seen // 10_000)
     full = covariance(parts, weights, inverse, seed, share=share, averaged=averaged)
     if share < 1:
         factors = batch_factors(scores, inverse, full)
@@ -249,9 +248,9 @@ def _parts(regressor: JointRegressor, fitted: Sequence[Fitted]) -> list[Part]:
     for some in fitted:
         count = len(some.torque)
         places = [(0, count)]
-        if total > MOST_ROWS:
-            number = max(1, round(STRETCHES * count / total))
-            length = min(count, max(CHUNK, MOST_ROWS // STRETCHES))
+        if total > SANDWICH_ROWS:
+            number = max(1, round(SANDWICH_STRETCHES * count / total))
+            length = min(count, max(ROWS_AT_A_TIME, SANDWICH_ROWS // SANDWICH_STRETCHES))
             places = [(begin, begin + length) for begin in np.linspace(0, count - length, number).astype(int).tolist()]
         parts += [_part(regressor, some, *place) for place in places]
     return parts

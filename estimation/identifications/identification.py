@@ -27,12 +27,9 @@ from robots.common.progress import SILENT, Progress
 from robots.robot import Robot
 from robots.signals import Log
 from robots.terms import BendingFriction, FrictionTerm
-from robots.terms.friction import USUAL
+from robots.terms.friction import USUAL_SPEED_SHARE
 
 Array = NDArray[np.float64]
-
-# Speeds are measured over so much time [s].
-SPAN = 0.02
 
 
 @one_blas_thread()
@@ -124,8 +121,11 @@ def usual_speeds(logs: Sequence[Prepared]) -> Array:
     found = []
     for log in logs:
         grid = log.positions
-        span = min(max(1, round(SPAN / grid.period)), len(grid.q) - 1)
-        found.append(np.quantile(np.abs(grid.q[span:] - grid.q[:-span]), USUAL, axis=0) / (span * grid.period))
+        # Speeds are measured over so much time [s].
+        span = min(max(1, round(0.02 / grid.period)), len(grid.q) - 1)
+        found.append(
+            np.quantile(np.abs(grid.q[span:] - grid.q[:-span]), USUAL_SPEED_SHARE, axis=0) / (span * grid.period)
+        )
     return np.asarray(np.max(found, axis=0))
 
 

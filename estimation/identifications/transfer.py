@@ -15,25 +15,15 @@ from estimation.preprocessing import Smoother
 from estimation.regressions.blocks import Blocks, Sides
 from estimation.regressions.moments import Moments
 from estimation.regressions.preparation import Rows
-from estimation.uncertainty.quantiles import BAND, NORMAL_95
+from estimation.uncertainty.quantiles import BAND_SHARE, NORMAL_95
 
 Array = NDArray[np.float64]
 Which = NDArray[np.bool_]
 
-# Joints with the widest ranges: of each, the lower half of the range predicts the upper, and the upper the lower.
-WIDEST = 3
 # Factors on the parameters' standard errors from which the band of other motions takes the first that suffices.
 GROWTHS = (1.0, 1.5, 2.0, 3.0, 4.0, 6.0, 8.0, 12.0, 16.0, 24.0, 32.0)
-# Share of the splits' errors that this band is to hold. A new motion may lie farther away than one half of the log from
-# the other: with 95 % here, `benchmarks/transfer.py` finds 91 % there at the median, with this 96 %.
-HELD = 0.98
-# Quantile that counts as the largest of the recorded rows.
-LARGEST = 0.999
-# A log's error that grows by this factor beside other logs contradicts them. Errors below this share of the torque are
-# not compared.
-CONTRADICTS, SMALLEST_ERROR = 4.0, 0.01
-# Rows that stand for the log where errors are looked at row by row.
-MOST_ROWS = 3000
+# Errors of a log beside other logs are compared from this share of the torque on.
+LEAST_COMPARED_ERROR = 0.01
 
 
 @dataclass(frozen=True)
@@ -80,7 +70,7 @@ class Contradiction:
     @property
     def growth(self) -> float:
         """Factor by which the error grows."""
-        return self.together / max(self.alone, SMALLEST_ERROR)
+        return self.together / max(self.alone, LEAST_COMPARED_ERROR)
 
 
 class Transfer:
@@ -104,7 +94,9 @@ class Transfer:
         slow = _lower_half(np.array([(np.abs(speed) / usual).mean() for speed in dq]))
         yield Split(slow, ~slow)
         everywhere = np.concatenate(q)
-        for joint in np.argsort(-np.ptp(everywhere, axis=0))[:WIDEST]:
+        # Of the three joints with the widest ranges, the lower half of the range predicts the upper, and the upper the
+        # lower.
+        for joint in np.argsort(-np.ptp(everywhere, axis=0))[:3]:
             low = _lower_half(np.array([place[:, joint].mean() for place in q]))
             yield Split(low, ~low)
             yield Split(~low, low)
@@ -144,9 +136,10 @@ class Transfer:
             rows = np.maximum(own.count, 1)
             errors = [np.sqrt(own.residual(values) / rows) for values in (solver.solve(own), together)]
             alone, beside = (error / self.comparison.spread for error in errors)
-            grows = np.where(own.count > 0, beside / np.maximum(alone, SMALLEST_ERROR), 0.0)
+            grows = np.where(own.count > 0, beside / np.maximum(alone, LEAST_COMPARED_ERROR), 0.0)
             joint = int(np.argmax(grows))
-            if grows[joint] > CONTRADICTS:
+            # A log's error that grows fourfold beside other logs contradicts them.
+            if grows[joint] > 4.0:
                 name = self.comparison.names[log]
                 found.append(Contradiction(name, joint + 1, float(alone[joint]), float(beside[joint])))
         return max(found, key=lambda item: item.growth, default=None)
@@ -167,21 +160,26 @@ class Transfer:
             for joint, (Y, used, tau) in enumerate(rows):
                 error = np.abs(tau - Y @ values[used])
                 known = seen & np.isfinite(error)
-                level = np.quantile(error[known], BAND) if known.any() else 0.0
+                level = np.quantile(error[known], BAND_SHARE) if known.any() else 0.0
                 width = np.hypot(level, NORMAL_95 * np.outer(GROWTHS, _deviation(Y[unseen], covariance, used)))
                 known = np.isfinite(error[unseen])
                 held[:, joint] += (error[unseen] <= width)[:, known].mean(axis=1) if known.any() else 1.0
         share = held / max(judged, 1)
-        first = np.where((share >= HELD).any(axis=0), (share >= HELD).argmax(axis=0), len(GROWTHS) - 1)
+        # Share of the splits' errors that this band is to hold. A new motion may lie farther away than one half of the
+        # log from the other: with 95 % here, `benchmarks/transfer.py` finds 91 % there at the median, with this 96 %.
+        coverage = 0.98
+        first = np.where((share >= coverage).any(axis=0), (share >= coverage).argmax(axis=0), len(GROWTHS) - 1)
         growth = np.array(GROWTHS)[first] if judged else np.ones(joints)
         covariance = solver.covariance(fitted.total)
         open_ = [_deviation(Y, covariance, used) for Y, used, _ in rows]
-        return Band(growth, covariance, np.array([np.quantile(part, LARGEST) for part in open_]))
+        # Quantile that counts as the largest of the recorded rows.
+        return Band(growth, covariance, np.array([np.quantile(part, 0.999) for part in open_]))
 
     def _thinned(self, trial: Trial) -> tuple[list[tuple[Array, NDArray[np.intp], Array]], NDArray[np.intp]]:
         """Some rows: per joint its columns (m, p_j), their places and its torque; and the rows' blocks (m,)."""
         total = sum(piece.stop - piece.start for _, piece in self._pieces)
-        step = max(1, total // MOST_ROWS)
+        # Rows that stand for the log where errors are looked at row by row.
+        step = max(1, total // 3000)
         regressor = self.comparison.regressor
         place = np.full(regressor.base.size, -1)
         place[list(trial.columns)] = np.arange(len(trial.columns))

@@ -15,14 +15,10 @@ from robots.common.errors import NotIdentifiableError
 Array = NDArray[np.float64]
 
 # A parameter is determined when its standard error is below this share of it ...
-RELATIVE = 0.5
+DETERMINED_ERROR = 0.5
 # ... or when the torque that its standard error makes is below this share of every joint's torque: it is then known
 # to be too small to matter.
-NEGLIGIBLE = 0.02
-# A joint whose left-out torque is predicted hardly better than by a constant is not identified.
-HOPELESS = 0.95
-# A torque that varies by less than this share of its size, or of 1 N m, is constant but for rounding.
-ROUNDING = 1e-9
+NEGLIGIBLE_TORQUE = 0.02
 
 
 def require_predictable(moves: NDArray[np.bool_], lowest: Array, highest: Array, choice: Choice) -> NDArray[np.bool_]:
@@ -37,8 +33,10 @@ def require_predictable(moves: NDArray[np.bool_], lowest: Array, highest: Array,
     Raises:
         NotIdentifiableError: none.
     """
-    varies = highest - lowest > ROUNDING * np.maximum(1.0, np.maximum(highest, -lowest))
-    follows = choice.held_out < HOPELESS * choice.spread
+    # A torque that varies by less than this share of its size, or of 1 N m, is constant but for rounding.
+    varies = highest - lowest > 1e-9 * np.maximum(1.0, np.maximum(highest, -lowest))
+    # A joint whose left-out torque is predicted hardly better than by a constant is not identified.
+    follows = choice.held_out < 0.95 * choice.spread
     if (moves & varies & follows).any():
         return np.asarray(moves & varies & follows)
     if not varies.any():
@@ -59,7 +57,7 @@ def determined_parameters(found: Fit, joints: Sequence[JointFit]) -> NDArray[np.
     excited = np.einsum("jpp->jp", moments.gram) / np.maximum(moments.count, 1)[:, None]  # mean square of each column
     torque = np.array([joint.torque_rms for joint in joints])
     share = (errors * np.sqrt(excited) / np.maximum(torque, np.finfo(float).tiny)[:, None]).max(axis=0)
-    known = (errors <= RELATIVE * np.abs(values)) | (share <= NEGLIGIBLE)
+    known = (errors <= DETERMINED_ERROR * np.abs(values)) | (share <= NEGLIGIBLE_TORQUE)
     own = np.array([column.term != "rigid_body" for column in columns])
     lost = np.array([not joints[column.joint - 1].identified for column in columns])
     return known & (excited.sum(axis=0) > 0) & ~(own & lost)

@@ -10,9 +10,6 @@ from robots.common.errors import InfeasibleError, SolverError
 
 Array = NDArray[np.float64]
 
-# A weak prior on undetermined directions is far below the data's cost, but must still be resolved.
-TOLERANCE = 1e-10
-
 
 class ConicProgram:
     """min x'Px/2 + q'x with affine images of x in cones.
@@ -83,7 +80,8 @@ class ConicProgram:
         settings = clarabel.DefaultSettings()
         settings.verbose = False
         settings.max_threads = 1
-        settings.tol_gap_abs = settings.tol_gap_rel = settings.tol_feas = TOLERANCE
+        # A weak prior on undetermined directions is far below the data's cost, but must still be resolved.
+        settings.tol_gap_abs = settings.tol_gap_rel = settings.tol_feas = 1e-10
         upper = sparse.triu(sparse.csc_matrix(scale * quadratic)).tocsc()
         solution = clarabel.DefaultSolver(upper, scale * linear, matrix, offset, cones, settings).solve()
         status = str(solution.status)

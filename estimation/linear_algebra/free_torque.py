@@ -15,9 +15,6 @@ Array = NDArray[np.float64]
 Real = TypeVar("Real", np.float32, np.float64)
 Piece = tuple[int, Array]
 
-# Functions that are equal within the band, of one part or of its neighbours, count once.
-DISTINCT = 1e-4
-
 
 @dataclass(frozen=True, eq=False)
 class FreeTorque:
@@ -63,7 +60,8 @@ def span_of(pieces: Sequence[Piece], rows: int) -> FreeTorque:
         known = solve_triangular(_window(lines, first), cross, lower=True) if len(cross) else cross
         gram = unit.T @ unit
         left, turned = np.linalg.eigh(gram - known.T @ known)
-        distinct = left > DISTINCT * np.linalg.eigvalsh(gram)[-1]
+        # Functions that are equal within the band, of one part or of its neighbours, count once.
+        distinct = left > 1e-4 * np.linalg.eigvalsh(gram)[-1]
         if not distinct.any():
             continue
         turned, known = turned[:, distinct], known @ turned[:, distinct]

@@ -12,7 +12,7 @@ from robots.consistency import BASIS
 
 Array = NDArray[np.float64]
 
-VARIABLES = 14
+LOG_DETERMINANT_VARIABLES = 14
 """Further variables that the log determinant of one body takes."""
 
 
@@ -27,7 +27,7 @@ def add_log_determinant(
         program: the program; it gets the constraints.
         linear: of the objective (size,); it gets the weight.
         columns: the variables that are the body's inertial parameters (10,).
-        start: the first of `VARIABLES` variables that nothing else uses.
+        start: the first of `LOG_DETERMINANT_VARIABLES` variables that nothing else uses.
         weight: positive.
     """
     basis = np.zeros((program.size, 8, 8))

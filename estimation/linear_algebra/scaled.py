@@ -9,6 +9,9 @@ from estimation.linear_algebra.positive import solve_nearly_positive
 
 Array = NDArray[np.float64]
 
+# Ridge for columns of unit length that keeps any matrix invertible, far below what data say.
+LEAST_RIDGE = 1e-12
+
 
 def lengths(matrix: Array) -> Array:
     """Gives the roots of the diagonals (..., p) of Gram matrices (..., p, p), 1 for a column that is zero."""

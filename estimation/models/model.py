@@ -108,6 +108,11 @@ class Model(Record, format="robot-oed model", shares=("robot",)):
         return np.where(self.determined, np.sqrt(np.diag(self.covariance)), np.inf)
 
     @property
+    def cutoff(self) -> float:
+        """Cut-off of the smoothing of its logs [Hz]; 10 Hz where the model states none."""
+        return float(self.provenance.get("cutoff_hz", 10.0))
+
+    @property
     def keeps_heat(self) -> bool:
         """Whether what came before a motion acts in it still."""
         return any(extension.source.persistence is Persistence.HEAT for extension in self.extensions)

@@ -16,11 +16,6 @@ Array = NDArray[np.float64]
 # More points than this are averaged in groups before the search.
 MOST_POINTS = 1500
 FEWEST_POINTS = 12
-# Differences for the noise are taken over so many correlation times, and over a sixth of a history at most: those that
-# lie across two or three changes are then the fewer.
-DISTANCE = 0.5
-# Below this noise a change has no meaning for friction.
-LEAST_NOISE = 1e-6
 
 
 class ChangePoint(NamedTuple):
@@ -64,7 +59,8 @@ def find_change_points(history: dict[str, Array]) -> tuple[ChangePoint, ...] | N
         t, y = t[: count * group : group], y[: count * group].reshape(count, group).mean(axis=1)
         step = float(np.median(np.diff(t)))
         correlation = float(np.exp(-step / CORRELATION_TIME))
-        noise = max(_noise(y, step), LEAST_NOISE)
+        # Below this noise a change has no meaning for friction.
+        noise = max(_noise(y, step), 1e-6)
         penalty = 2 * np.log(count) * (1 + correlation) / (1 - correlation)
         # The linear kernel's cost is that of the mean; this search is compiled.
         search = ruptures.KernelCPD(kernel="linear", min_size=3)
@@ -84,7 +80,9 @@ def _noise(y: Array, step: float) -> float:
     Differences over a distance have twice the variance, less what they have in common by the correlation; the median
     of their sizes forgets the few that lie across a change.
     """
-    distance = min(max(1, round(DISTANCE * CORRELATION_TIME / step)), len(y) // 6)
+    # Differences for the noise are taken over so many correlation times, and over a sixth of a history at most: those
+    # that lie across two or three changes are then the fewer.
+    distance = min(max(1, round(0.5 * CORRELATION_TIME / step)), len(y) // 6)
     differences = y[distance:] - y[:-distance]
     own = 2 * (1 - np.exp(-distance * step / CORRELATION_TIME))
     return float(robust_deviation(differences) / np.sqrt(own))

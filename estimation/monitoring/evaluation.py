@@ -19,25 +19,12 @@ from estimation.monitoring.observations import observed_values
 from estimation.monitoring.settings import MonitorSettings
 from estimation.monitoring.windows.baseline import Baseline
 from estimation.monitoring.windows.heat import HeatState
-from estimation.monitoring.windows.projection import HIGHEST_ORDER, Colour, Window, project
+from estimation.monitoring.windows.projection import WINDOW_NOISE_ORDER, Colour, Window, project
 from estimation.monitoring.windows.window_rows import WindowRows, rows_of_window
 from robots.common.records import Record, read
 from robots.terms.base import force_unit
 
 Array = NDArray[np.float64]
-
-# Windows whose residual gives the colour of the noise.
-COLOUR_WINDOWS = 30
-# A friction factor with a larger relative standard error is not used in its window.
-UNSURE = 0.25
-# Windows between tests for steps, where no pause comes before.
-STEP_TESTS = 30
-# Windows in a row with a short force, from which the force is a lasting one.
-LASTING = 3
-# Longest time [s] that a short force goes on after its middle.
-LONGEST = 1.0
-# A short force with more than this share of its chi-square in one of the next three windows is none.
-AGAIN = 0.25
 
 
 class Evaluation(Record):
@@ -92,7 +79,7 @@ class Evaluation(Record):
         self.findings = []
         self.event = None
         self.forces = []
-        self.colour_sum = np.zeros((self.n, HIGHEST_ORDER + 1))
+        self.colour_sum = np.zeros((self.n, WINDOW_NOISE_ORDER + 1))
         self.colour_rows = np.zeros(self.n)
         self.colour_count = np.zeros(self.n)
         self.bursts_in_row = 0
@@ -144,18 +131,22 @@ class Evaluation(Record):
         factors = np.where(self._known(window), window.values[: self.n], self._expected())
         burst = self.bursts.update(window.burst)
         self.bursts_in_row = self.bursts_in_row + 1 if burst else 0
-        short = burst and self.bursts_in_row < LASTING
+        # Windows in a row with a short force, from which the force is a lasting one.
+        short = burst and self.bursts_in_row < 3
         # What a force at the end of the last window leaves in this one belongs to that force.
-        ends = any(start - force[1] < LONGEST for force in self.forces)
+        # Longest time [s] that a short force goes on after its middle.
+        ends = any(start - force[1] < 1.0 for force in self.forces)
         self._observe(window, len(logs) - 1, skip=short or ends)
         # What comes again in the next cycles is an error of the model on this motion.
-        self.forces = [force for force in self.forces if window.burst < AGAIN * force[4]]
+        # A short force with more than this share of its chi-square in one of the next three windows is none.
+        self.forces = [force for force in self.forces if window.burst < 0.25 * force[4]]
         # A motion on which the model errs more fills the window with error. A short force stands above it.
         if short and float(np.sum((window.burst_joints / window.burst_scatter) ** 2)) > self.noise_threshold:
             self._note_force(window, len(logs) - 1)
         self.heat.advance(cold * factors, (end - start) / 2, found.ambient)
         self.end = end
-        if self.event is None and (last or len(self.history.rows) % STEP_TESTS == 0):
+        # Windows between tests for steps, where no pause comes before.
+        if self.event is None and (last or len(self.history.rows) % 30 == 0):
             self._test_steps(len(logs) - 1)
         self._settle(logs)
 
@@ -194,7 +185,8 @@ class Evaluation(Record):
             usual_speed=usual,
             edges=(start, end),
         )
-        new = window.moves & (self.colour_count < COLOUR_WINDOWS)
+        # Windows whose residual gives the colour of the noise.
+        new = window.moves & (self.colour_count < 30)
         self.colour_sum += np.where(new[:, None], window.colour, 0.0)
         self.colour_rows += np.where(new, window.rows, 0.0)
         self.colour_count += new
@@ -204,7 +196,8 @@ class Evaluation(Record):
         """Joints (n,) whose friction factor the window determines."""
         factor = window.values[: self.n]
         error = np.sqrt(np.diag(window.covariance))[: self.n]
-        return np.asarray(window.determined[: self.n] & (factor > 0.05) & (error < UNSURE * np.abs(factor)))
+        # A friction factor with a larger relative standard error is not used in its window.
+        return np.asarray(window.determined[: self.n] & (factor > 0.05) & (error < 0.25 * np.abs(factor)))
 
     def _observe(self, window: Window, log: int, *, skip: bool) -> None:
         """Gives each quantity its value in the window."""

@@ -10,6 +10,7 @@ import numpy as np
 
 from estimation.uncertainty.quantiles import NORMAL_95
 from robots.common.records import Record
+from robots.common.tables.times import SECONDS_PER_DAY, YEAR_2000
 
 Kind = Literal["damage", "friction_decrease", "payload", "contact", "heat", "offset", "misfit", "unknown"]
 Severity = Literal["info", "watch", "act"]
@@ -38,9 +39,6 @@ SEVERITIES: dict[str, Severity] = {
 }
 LIGHTS = {"info": "green", "watch": "amber", "act": "red"}
 ORDER = ("info", "watch", "act")
-# A clock that counts from 1970 is past this time [s]: the year 2000.
-ABSOLUTE = 946_684_800.0
-DAY = 86_400.0
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -161,10 +159,10 @@ class Finding(Record):
 
 def when(time: float, origin: float) -> str:
     """Writes a time: a date where the clock has one, else the day and the time since the first log."""
-    if time >= ABSOLUTE:
+    if time >= YEAR_2000:
         return f"{datetime.fromtimestamp(time, UTC):%Y-%m-%d %H:%M:%S}"
     since = time - origin
-    day, rest = divmod(max(since, 0.0), DAY)
+    day, rest = divmod(max(since, 0.0), SECONDS_PER_DAY)
     return f"day {int(day) + 1}, {int(rest // 3600):02d}:{int(rest % 3600 // 60):02d}:{int(rest % 60):02d}"
 
 

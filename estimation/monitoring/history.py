@@ -7,8 +7,6 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 
-MOST = 6000
-
 
 class History:
     """Rows over time; old ones are averaged in pairs, so that a year needs no more room than a week.
@@ -29,8 +27,9 @@ class History:
     ) -> None:
         """Adds a window; see the class for the arguments, (n,) each."""
         self.rows.append([start, end, float(log), *friction, *error, *heat, *rest, misfit])
-        if len(self.rows) > MOST:
-            half = MOST // 2
+        most = 6000
+        if len(self.rows) > most:
+            half = most // 2
             old = np.array(self.rows[:half])
             merged = (old[::2] + old[1::2]) / 2
             merged[:, 0], merged[:, 1], merged[:, 2] = old[::2, 0], old[1::2, 1], old[1::2, 2]

@@ -7,18 +7,13 @@ from numpy.typing import NDArray
 
 from estimation.monitoring.control_charts.charts import Chart
 from estimation.monitoring.control_charts.level_filter import LevelFilter
-from estimation.monitoring.control_charts.quantities import SHARE, Group, Quantity
+from estimation.monitoring.control_charts.quantities import DIRECTION_SHARE, Group, Quantity
 from estimation.monitoring.settings import MonitorSettings
 from estimation.monitoring.windows.baseline import Baseline
 from estimation.monitoring.windows.heat import HeatState
 from estimation.monitoring.windows.projection import Window
 
 Array = NDArray[np.float64]
-
-# A model without a stated residual: share of the torque.
-USUAL_RESIDUAL = 0.05
-# Prior standard deviations of the log of a residual RMS: of its model error, and of its level.
-RESIDUAL_SCATTER, RESIDUAL_SPREAD = 0.3, 1.0
 
 
 def initial_quantities(
@@ -40,7 +35,8 @@ def initial_quantities(
         run_length: windows between false alarms of each test.
     """
     n, found = baseline.robot.n, list[Quantity]()
-    residual = np.where(np.isfinite(baseline.residual), baseline.residual, USUAL_RESIDUAL * window.torque_rms)
+    # A model without a stated residual errs by 5 % of the torque.
+    residual = np.where(np.isfinite(baseline.residual), baseline.residual, 0.05 * window.torque_rms)
     residual = np.maximum(residual, 1e-6 * max(float(window.torque_rms.max()), 1e-9))
 
     def add(group: Group, index: int, mean: Array, spread: Array, scatter: float) -> None:
@@ -51,16 +47,17 @@ def initial_quantities(
 
     mean, spread = heat.prior
     for j in range(n):
-        add("friction", j, mean, spread, min(SHARE * residual[j] / max(window.friction_rms[j], 1e-9), 0.3))
+        add("friction", j, mean, spread, min(DIRECTION_SHARE * residual[j] / max(window.friction_rms[j], 1e-9), 0.3))
     zero, one = np.zeros(1), np.ones(1)
     for j in range(n):
-        add("offset", j, zero, residual[j] * one, SHARE * residual[j])
+        add("offset", j, zero, residual[j] * one, DIRECTION_SHARE * residual[j])
     level = float(np.sqrt(np.mean(residual**2)))
     for k in range(baseline.payload_count):
         size = level / max(float(np.sqrt(np.mean(payload[:, :, k] ** 2))), 1e-9)
-        add("payload", k, zero, size * one, SHARE * size)
+        add("payload", k, zero, size * one, DIRECTION_SHARE * size)
     common = max(float(heat.common_spread[0]), 1e-9)
-    add("common", 0, zero, common * one, SHARE * common)
+    add("common", 0, zero, common * one, DIRECTION_SHARE * common)
     for j in range(n):
-        add("residual", j, np.log(residual[j]) * one, RESIDUAL_SPREAD * one, RESIDUAL_SCATTER)
+        # Prior standard deviations of the log of a residual RMS: of its level, and of its model error.
+        add("residual", j, np.log(residual[j]) * one, 1.0 * one, 0.3)
     return found

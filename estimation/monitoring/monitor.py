@@ -17,7 +17,7 @@ from estimation.monitoring.findings import Finding
 from estimation.monitoring.log_row import LogRow
 from estimation.monitoring.settings import MonitorSettings
 from estimation.monitoring.windows.baseline import Baseline, baseline_of, read_baseline
-from estimation.monitoring.windows.projection import SLOWEST
+from estimation.monitoring.windows.projection import SLIDING_SPEED_SHARE
 from estimation.monitoring.windows.stream_windows import StreamWindows
 from estimation.monitoring.windows.window_rows import settling
 from robots.common.errors import InputError
@@ -59,7 +59,7 @@ class Monitor(Record, format="robot-oed monitor", whole=True):
         self.baseline = baseline
         self.settings = settings or MonitorSettings()
         n = baseline.robot.n
-        slowest = SLOWEST * np.where(np.isfinite(baseline.speeds), baseline.speeds, 0.0)
+        slowest = SLIDING_SPEED_SHARE * np.where(np.isfinite(baseline.speeds), baseline.speeds, 0.0)
         self._windows = StreamWindows(self.settings.window, settling(baseline.cutoff), 2 + 3 * n, slowest)
         self._evaluation: Evaluation | None = None
         self.logs: list[str] = []

@@ -16,11 +16,6 @@ from estimation.uncertainty.quantiles import NORMAL_95, chi2_limit
 
 Array = NDArray[np.float64]
 
-# Probability that any quantity without an alarm of its own is named beside one that has changed.
-BESIDE = 0.01
-# A step within so many windows of the first one has the same date.
-NEAR = 2
-
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Change:
@@ -66,7 +61,8 @@ def changes_at(quantities: Sequence[Quantity], sources: Sequence[Quantity], begi
         The changes; none where the alarm is not confirmed.
     """
     fits = [(q, q.steps()) for q in quantities if len(q.samples) > 1]
-    critical, limit = chi2_limit(BESIDE, tests=max(len(fits), 1)), start_limit(len(quantities))
+    # Probability that any quantity without an alarm of its own is named beside one that has changed.
+    critical, limit = chi2_limit(0.01, tests=max(len(fits), 1)), start_limit(len(quantities))
 
     def changed(q: Quantity, fit: StepFit, k: int) -> bool:
         if k == 0 and q.is_whole(begin):
@@ -81,6 +77,8 @@ def changes_at(quantities: Sequence[Quantity], sources: Sequence[Quantity], begi
     date = quantity.samples[k].start
     carried = any(q.group == "payload" for q, _, _ in own)
     found = []
+    # A step within so many windows of the first one has the same date.
+    near = 2
     for q, fit in fits:
         alarmed = next((k for other, _, k in own if other is q), None)
         starts = np.array([s.start for s in q.samples])
@@ -88,7 +86,7 @@ def changes_at(quantities: Sequence[Quantity], sources: Sequence[Quantity], begi
             place = int(np.searchsorted(starts, date - 1e-6))
             if place >= len(starts):
                 continue
-            alarmed = fit.best(max(place - NEAR, 0), min(place + NEAR, len(starts) - 1))
+            alarmed = fit.best(max(place - near, 0), min(place + near, len(starts) - 1))
         # A body has mass and moments together: those of a mass that changed count, however small.
         if (carried and q.group == "payload") or changed(q, fit, alarmed):
             found.append(_change(q, fit, alarmed, begin))

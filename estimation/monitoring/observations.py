@@ -14,10 +14,6 @@ from estimation.monitoring.windows.projection import Window
 
 Array = NDArray[np.float64]
 
-# Standard deviation of the log of a residual RMS between windows of other motions, beside that of its noise.
-RESIDUAL_NOISE = 0.1
-DUTY_ROUNDS = 4
-
 
 @dataclass(frozen=True, eq=False)
 class Value:
@@ -97,7 +93,8 @@ def observed_values(
     if unknown[0] > 0 and known.any():
         values.append(Value(place, float(whole[0]), float(covariance[0, 0]), one))
     for j in np.flatnonzero(window.moves).tolist():
-        noise_of_rms = RESIDUAL_NOISE**2 + window.residual_variance(j)
+        # Standard deviation of the log of a residual RMS between windows of other motions, beside that of its noise.
+        noise_of_rms = 0.1**2 + window.residual_variance(j)
         values.append(Value(place + 1 + j, float(np.log(window.residual_rms[j])), noise_of_rms, one))
     levels = np.array([q.level.coefficients[-1] for q in quantities[:n]])
     return values, Seen(known=known, friction=y, noise=noise, heat=explained - levels + sensitivity @ whole)
@@ -109,7 +106,7 @@ def _common(heat_state: HeatState, rest: Array, variances: Array) -> tuple[Array
     paused = any(heat_state.sensitivity(j)[1] != 0.0 for j in range(n))
     before = list(work.duties)
     # Sensitivities depend on the duty.
-    for _ in range(DUTY_ROUNDS if paused else 1):
+    for _ in range(4 if paused else 1):
         sensitivity = np.array([heat_state.sensitivity(j) for j in range(n)])
         total = variances + np.array([heat_state.unlogged(j) for j in range(n)]) ** 2
         whole, covariance = common_change(rest, total, sensitivity, heat_state.common_spread, None)
@@ -118,9 +115,7 @@ def _common(heat_state: HeatState, rest: Array, variances: Array) -> tuple[Array
     return sensitivity, total, whole, covariance
 
 
-# Deviations of a joint, in standard deviations, from which it counts less, and not at all.
-FAR, TOO_FAR = 2.0, 4.0
-ITERATIONS = 10
+COMMON_CHANGE_ROUNDS = 10
 
 
 def common_change(
@@ -128,8 +123,8 @@ def common_change(
 ) -> tuple[Array, Array]:
     """Estimates the unknowns that all joints share, such as an error of the ambient temperature.
 
-    Weighted least squares with a normal prior; joints that deviate from the others by more than `FAR` standard
-    deviations count less (Huber 1964), and by more than `TOO_FAR` not at all: a damaged joint must not move the others.
+    Weighted least squares with a normal prior; joints that deviate from the others by more than two standard deviations
+    count less (Huber 1964), and by more than four not at all: a damaged joint must not move the others.
 
     Args:
         deviations: of the logs of friction (n,); NaN where unknown.
@@ -152,9 +147,9 @@ def common_change(
     prior = np.diag(spread[live] ** -2.0)
     values = _start(d, S, v, prior)
     inverse = np.linalg.inv(prior)
-    for _ in range(ITERATIONS):
+    for _ in range(COMMON_CHANGE_ROUNDS):
         distance = np.abs(d - S @ values) / np.sqrt(v)
-        weight = np.where(distance < TOO_FAR, np.minimum(1.0, FAR / np.maximum(distance, FAR)) ** 2, 0.0) / v
+        weight = np.where(distance < 4.0, np.minimum(1.0, 2.0 / np.maximum(distance, 2.0)) ** 2, 0.0) / v
         inverse = np.linalg.inv(prior + (S * weight[:, None]).T @ S)
         values = inverse @ (S.T @ (weight * d))
     found[live] = values
@@ -169,7 +164,7 @@ def _start(d: Array, S: Array, v: Array, prior: Array) -> Array:
         return np.array([np.median(d[seen] / S[seen, 0])])
     # Least absolute deviations.
     values: Array = np.zeros(S.shape[1])
-    for _ in range(2 * ITERATIONS):
+    for _ in range(2 * COMMON_CHANGE_ROUNDS):
         weight = 1.0 / (np.sqrt(v) * np.maximum(np.abs(d - S @ values), 0.1 * np.sqrt(v)))
         values = np.asarray(np.linalg.solve(prior + (S * weight[:, None]).T @ S, S.T @ (weight * d)), dtype=np.float64)
     return np.asarray(values)

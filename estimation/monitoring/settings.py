@@ -10,7 +10,7 @@ from robots.common.errors import InputError
 
 Heat = Literal["auto", "model", "temperature", "common", "none"]
 # A longer time between windows [s] is a pause, in which the robot may work unseen.
-PAUSE = 30.0
+PAUSE_SECONDS = 30.0
 HEATS = ("auto", "model", "temperature", "common", "none")
 
 

@@ -13,14 +13,14 @@ from numpy.typing import ArrayLike, NDArray
 from robots.common.errors import InputError
 from robots.common.records import read, read_json
 from robots.consistency import normalised_eigenvalues
-from robots.geometry.inertia import SIZE, check_body, inertial_parameters, symmetric
+from robots.geometry.inertia import BODY_PARAMETERS, check_body, inertial_parameters, symmetric
 from robots.terms.situations.flange_body import point_mass
 from robots.terms.situations.sensitivities import moved_body
 
 Array = NDArray[np.float64]
 
 FORMAT = "robot-oed payload"
-FORMAT_VERSION = 1
+PAYLOAD_VERSION = 1
 DAMAGED = "identify the payload again with oed payload"
 EXAMPLE = "a payload.json, or KG,X,Y,Z: mass [kg] and centre of mass in the flange frame [m], such as 1.5,0,0,0.08"
 
@@ -148,7 +148,7 @@ def read_payload_file(path: str | Path) -> dict[str, Any]:
     file = file / "payload.json" if file.is_dir() else file
     if not file.exists():
         raise InputError(f"the payload {path}: no such file", allowed=EXAMPLE)
-    return read_json(file, FORMAT, FORMAT_VERSION, remedy=f"give {EXAMPLE}")
+    return read_json(file, FORMAT, PAYLOAD_VERSION, remedy=f"give {EXAMPLE}")
 
 
 def body_from_dict(data: dict[str, Any], file: str | Path) -> Body:
@@ -158,8 +158,10 @@ def body_from_dict(data: dict[str, Any], file: str | Path) -> Body:
         InputError: numbers that are missing, or that no body has.
     """
     parameters = read(Array, data.get("parameters"), "parameters", file=file, remedy=DAMAGED)
-    if parameters.shape != (SIZE,) or not np.isfinite(parameters).all():
-        raise InputError(f"parameters of shape {parameters.shape}", file=file, allowed=f"{SIZE} finite numbers")
+    if parameters.shape != (BODY_PARAMETERS,) or not np.isfinite(parameters).all():
+        raise InputError(
+            f"parameters of shape {parameters.shape}", file=file, allowed=f"{BODY_PARAMETERS} finite numbers"
+        )
     if not parameters.any():
         # No payload was found.
         return Body(parameters)

@@ -18,24 +18,8 @@ from robots.terms.situations.sensitivities import moved_body
 
 Array = NDArray[np.float64]
 
-# The mass is determined if its 95 % interval reaches no farther than this share of it to either side, ...
-MASS_SHARE = 0.5
-# ... a coordinate of the centre if its interval reaches no farther than this [m], ...
-CENTRE = 0.1
-# ... and a moment or product of inertia if its interval reaches no farther than this share of the mean moment.
-INERTIA_SHARE = 0.5
-# Standard errors below zero from which a mass is negative beyond doubt.
-SURE = 5.0
-# A wrist joint that moves less than this [rad] is named, of so many last joints.
-LITTLE, WRIST = 0.8, 3
-# A component of gravity's direction in the flange frame that varies by less than this (standard deviation) is named.
-STEADY = 0.2
-# Poses that are looked at.
-POSES = 300
 # Quantities without which a payload is refused, unless no motion of the robot shows them.
 SHOWABLE = ("mass", *(f"centre_{axis}" for axis in AXES))
-# A parameter is in the torques of a robot if its unit vector lies in the space of those that are, but for this part.
-SHOWN = 1e-6
 
 LONGER = (
     "record a longer log, more acceleration, or a heavier payload; beside a log without the payload, the arm must be "
@@ -47,9 +31,12 @@ def determined(found: Sequence[Quantity]) -> tuple[bool, ...]:
     """Finds which quantities of a payload a log determines by itself."""
     values = {item.name: item.value for item in found}
     moment = (values["Ixx"] + values["Iyy"] + values["Izz"]) / 3
-    # That there is no payload is known to the interval of the mass.
-    share = MASS_SHARE * abs(values["mass"]) if values["mass"] else np.inf
-    limits = {"kg": share, "m": CENTRE, "kg m2": INERTIA_SHARE * moment}
+    # The mass is determined if its 95 % interval reaches no farther than half of it to either side. That there is no
+    # payload is known to the interval of the mass.
+    share = 0.5 * abs(values["mass"]) if values["mass"] else np.inf
+    # A coordinate of the centre is determined if its interval reaches no farther than 0.1 m, and a moment or product of
+    # inertia if its interval reaches no farther than half of the mean moment.
+    limits = {"kg": share, "m": 0.1, "kg m2": 0.5 * moment}
     return tuple(bool(item.half_width <= limits[item.unit]) for item in found)
 
 
@@ -65,7 +52,8 @@ def is_nothing(free: float, error: float, mount: Mount, q: ArrayLike, gravity: A
         q: positions (N, n) of the log with the payload [rad or m].
         gravity: in the base frame (3,) [m/s2]; None as described.
     """
-    if not -SURE * error <= free <= NORMAL_95 * error:
+    # From five standard errors below zero on, a mass is negative beyond doubt.
+    if not -5.0 * error <= free <= NORMAL_95 * error:
         return False
     # Without the motion that shows it, a mass is open and not absent.
     return "mass" not in never_shown(mount, gravity) and not missing_motion(mount, q, gravity)
@@ -131,7 +119,9 @@ def never_shown(mount: Mount, gravity: Array | None) -> frozenset[str]:
     grouping = payload_part(model, mount.link).grouping[:, list(mount.columns(model))] @ moved_body(mount.pose)
     space = np.linalg.qr(grouping.T)[0]
     parts = np.linalg.norm(space[:4], axis=1)  # of the unit vectors of mass and first moments
-    return frozenset(name for name, part in zip(SHOWABLE, parts, strict=True) if part < 1 - SHOWN)
+    # A parameter is in the torques of a robot if its unit vector lies in the space of those that are, but for this
+    # part.
+    return frozenset(name for name, part in zip(SHOWABLE, parts, strict=True) if part < 1 - 1e-6)
 
 
 def missing_motion(mount: Mount, q: ArrayLike, gravity: Array | None) -> str:
@@ -145,16 +135,21 @@ def missing_motion(mount: Mount, q: ArrayLike, gravity: Array | None) -> str:
         gravity: in the base frame (3,) [m/s2]; None as described.
     """
     positions = np.asarray(q, dtype=float)
-    positions = positions[:: max(1, len(positions) // POSES)]
+    # Poses that are looked at.
+    poses_looked_at = 300
+    positions = positions[:: max(1, len(positions) // poses_looked_at)]
     ranges = np.ptp(positions, axis=0)
     robot = mount.robot
-    anywhere = np.random.default_rng(0).uniform(-np.pi, np.pi, (POSES, robot.n))
+    anywhere = np.random.default_rng(0).uniform(-np.pi, np.pi, (poses_looked_at, robot.n))
     turned, possible = (_gravity_spread(mount, poses, gravity) for poses in (positions, anywhere))
-    steady = [axis for k, axis in enumerate(AXES) if turned[k] < STEADY <= possible[k]]
+    # A component of gravity's direction in the flange frame that varies by less than this (standard deviation) is
+    # named.
+    steady = [axis for k, axis in enumerate(AXES) if turned[k] < 0.2 <= possible[k]]
+    # A joint of the wrist, the last three, is named if it moves by less than 0.8 rad.
     wrist = [
         joint
-        for joint in range(max(0, mount.joints - WRIST), mount.joints)
-        if robot.chain.kinds[joint] == "revolute" and ranges[joint] < LITTLE
+        for joint in range(max(0, mount.joints - 3), mount.joints)
+        if robot.chain.kinds[joint] == "revolute" and ranges[joint] < 0.8
     ]
     if not steady and not wrist:
         return ""

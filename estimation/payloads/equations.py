@@ -16,15 +16,13 @@ from estimation.payloads.mounts import Mount
 from estimation.payloads.paths import PathMatch
 from estimation.regressions.preparation import Rows
 from estimation.uncertainty import Played
-from robots.geometry.inertia import SIZE
+from robots.common.stretches import chunks
+from robots.geometry.inertia import BODY_PARAMETERS
 from robots.regressor import TorqueModel
 from robots.signals import Motion
 from robots.terms.situations.sensitivities import moved_body
 
 Array = NDArray[np.float64]
-
-# Rows whose regressor is held at a time.
-CHUNK = 4096
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,7 +51,7 @@ class Arm:
     @property
     def size(self) -> int:
         """The number of unknowns: the arm's and the payload's."""
-        return len(self.columns) + SIZE
+        return len(self.columns) + BODY_PARAMETERS
 
     def torque(self, motion: Motion, gravity: Array | None) -> Array:
         """Evaluates the torque of b0 (N, n) [N m or N]."""
@@ -66,9 +64,9 @@ class Arm:
         state = motion.q[at], motion.dq[at], motion.ddq[at]
         if not carries:
             Y = model.regressor(*state, columns=self.columns)
-            return np.concatenate([Y, np.zeros((*Y.shape[:2], SIZE))], axis=2)
+            return np.concatenate([Y, np.zeros((*Y.shape[:2], BODY_PARAMETERS))], axis=2)
         Y = model.regressor(*state, columns=(*self.columns, *self.mount.columns(model)))
-        Y[:, :, -SIZE:] = Y[:, :, -SIZE:] @ moved_body(self.mount.pose)
+        Y[:, :, -BODY_PARAMETERS:] = Y[:, :, -BODY_PARAMETERS:] @ moved_body(self.mount.pose)
         return Y
 
 
@@ -109,8 +107,7 @@ class Equations:
 
     def chunks(self) -> Iterator[slice]:
         """Cuts the rows into pieces."""
-        for start in range(0, self.rows, CHUNK):
-            yield slice(start, min(start + CHUNK, self.rows))
+        return chunks(self.rows)
 
 
 class PairedEquations(Equations):

@@ -12,17 +12,10 @@ from estimation.linear_algebra.scaled import floored_inverse
 from estimation.payloads.equations import Arm, Equations
 from estimation.regressions.moments import Moments
 from estimation.uncertainty import Part, covariance, with_repetitions
-from robots.geometry.inertia import SIZE
+from estimation.uncertainty.averages import AVERAGING_TIME
+from robots.geometry.inertia import BODY_PARAMETERS
 
 Array = NDArray[np.float64]
-
-# Rounds by which weights and residuals suit each other.
-ROUNDS = 4
-# A payload's parameters are known to so many kg, kg m and kg m2 before any log, times the mass that the torques could
-# hold at this lever [m]. What a log leaves open keeps this spread, and is reported as not determined.
-OPEN, LEVER, GRAVITY = 30.0, 0.1, 9.81
-# As in the identification: time over which rows are averaged for the covariance [s], and the averages that remain.
-AVERAGED, LEAST_AVERAGES = 0.02, 10_000
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -63,7 +56,8 @@ def fit_payload(arm: Arm, equations: Sequence[Equations], *, period: float, seed
     known, scatter, target = _prior(arm, moments)
     weights = moments.level(np.zeros(arm.size)) ** -2
     values = np.zeros(arm.size)
-    for _ in range(ROUNDS):
+    # Weights and residuals adapt to each other in these rounds.
+    for _ in range(4):
         inverse = floored_inverse(np.tensordot(weights, moments.gram, axes=1) + known)
         values = inverse @ (weights @ moments.cross + known @ target)
         weights = moments.level(values) ** -2
@@ -72,14 +66,15 @@ def fit_payload(arm: Arm, equations: Sequence[Equations], *, period: float, seed
     used = [np.flatnonzero(np.diag(gram) > 0) for gram in moments.gram]
     rows = sum(some.rows for some in equations)
     errors = [Part(some.rows, some.regressor, some.mask, _residual(some, values), used) for some in equations]
-    averaged = min(round(AVERAGED / period), rows // LEAST_AVERAGES)
+    # As in the identification: 10,000 averages remain at least.
+    averaged = min(round(AVERAGING_TIME / period), rows // 10_000)
     full = covariance(errors, weights, inverse, seed, averaged=averaged)
     full = with_repetitions(full, errors, [some.played for some in equations], weights, inverse, seed, averaged)
     full = full + inverse @ scatter @ inverse
     arm_alone = _without(moments, weights, known, target)
     return PayloadFit(
-        values=values[-SIZE:],
-        covariance=full[-SIZE:, -SIZE:],
+        values=values[-BODY_PARAMETERS:],
+        covariance=full[-BODY_PARAMETERS:, -BODY_PARAMETERS:],
         residual=moments.level(values),
         without=moments.level(arm_alone),
         rows=rows,
@@ -97,7 +92,9 @@ def _prior(arm: Arm, moments: Moments) -> tuple[Array, Array, Array]:
     """Weight (p, p) of what is known before, its scatter in the same units (p, p), and what it says (p,)."""
     b, size = len(arm.columns), arm.size
     torque = float(np.sqrt((moments.square / np.maximum(moments.count, 1)).max()))
-    spread = OPEN * max(torque / (GRAVITY * LEVER), 1.0)
+    # A payload's parameters are known to 30 kg, kg m and kg m2 before any log, times the mass that the torques could
+    # hold at a lever of 0.1 m. What a log leaves open keeps this spread, and is reported as not determined.
+    spread = 30.0 * max(torque / (9.81 * 0.1), 1.0)
     known, scatter, target = np.zeros((size, size)), np.zeros((size, size)), np.zeros(size)
     known[:b, :b] = arm.weight * arm.precision
     scatter[:b, :b] = arm.weight**2 * arm.precision
@@ -116,7 +113,7 @@ def _residual(equations: Equations, values: Array) -> Array:
 
 def _without(moments: Moments, weights: Array, known: Array, target: Array) -> Array:
     """The parameters (p,) that fit best if there is no payload."""
-    b = len(target) - SIZE
+    b = len(target) - BODY_PARAMETERS
     gram, cross = np.tensordot(weights, moments.gram, axes=1) + known, weights @ moments.cross + known @ target
     values = np.zeros(len(target))
     values[:b] = floored_inverse(gram[:b, :b]) @ cross[:b]

@@ -33,13 +33,8 @@ from robots.signals import Log
 
 Array = NDArray[np.float64]
 
-CUTOFF = 5.0
-# Friction of a model may have changed since by temperature: by this share of each coefficient (standard deviation).
-FRICTION_DRIFT = 0.3
-# Torque errors this many times those of the log without payload are in doubt; this many times, they are no payload's.
-DOUBTFUL, FOREIGN = 2.0, 6.0
-# Stands for a mass [kg] that came out as zero.
-SMALLEST_MASS = 1e-6
+# Torque errors this many times those of the log without payload are in doubt.
+DOUBTFUL_ERROR_RATIO = 2.0
 NOTHING = PhysicalBody(parameters=np.zeros(10), nearest=np.zeros(10), distance=0.0)
 
 
@@ -101,7 +96,7 @@ def identify_payload(
     for log in loaded:
         if log.gravity is not None:
             require_known(known.torque_model, known.columns, known.gravities, log.gravity)
-    cutoff = float(known.provenance.get("cutoff_hz", CUTOFF))
+    cutoff = float(known.provenance.get("cutoff_hz", 5.0))
     arm = _arm_of_logs(estimate, mount) if estimate is not None and free else _arm_of_model(known, mount)
     prepared, carried = _prepared(make_ready(machine, loaded), reference, known)
     sources = [
@@ -146,7 +141,8 @@ def _arm_of_logs(estimate: Estimate, mount: Mount) -> Arm:
 def _arm_of_model(model: Model, mount: Mount) -> Arm:
     """The arm's parameters by a model, its covariance widened by a drift of friction."""
     friction = np.array([column.friction for column in model.parameters])
-    covariance = model.covariance + np.diag(np.where(friction, FRICTION_DRIFT * model.values, 0.0) ** 2)
+    # Friction of a model may have changed since by temperature: by this share of each coefficient (standard deviation).
+    covariance = model.covariance + np.diag(np.where(friction, 0.3 * model.values, 0.0) ** 2)
     return Arm(
         model=model.torque_model,
         columns=model.columns,
@@ -193,7 +189,8 @@ def _result(
     # Of paired logs the first n channels are the differences.
     residual, without = found.residual[: robot.n], found.without[: robot.n]
     ratio = _error_ratio(model, rms, residual)
-    if ratio > FOREIGN:
+    # Torque errors six times those of the log without payload are no payload's.
+    if ratio > 6.0:
         raise NotIdentifiableError(
             f"no payload explains the torque: the errors are {ratio:.2g} times those without payload",
             remedy="check that the logs are of one robot, and that nothing touches the payload",
@@ -233,7 +230,8 @@ def _body(found: PayloadFit) -> PhysicalBody:
     """The body of a fit; without a positive mass there is none, and the smallest mass takes its place in messages."""
     if found.values[0] > 0:
         return physical_body(found.values, found.covariance)
-    values = np.concatenate([[max(-found.values[0], SMALLEST_MASS)], found.values[1:]])
+    # Stands for a mass [kg] that came out as zero.
+    values = np.concatenate([[max(-found.values[0], 1e-6)], found.values[1:]])
     return PhysicalBody(parameters=values, nearest=values, distance=0.0)
 
 
@@ -241,7 +239,7 @@ def _elsewhere(mount: Mount, model: Model, rms: Array, residual: Array) -> list[
     """Says that logs differ without a payload on the mount, as by a body on another link."""
     ratios = _error_ratios(model, rms, residual)
     joint = int(np.argmax(ratios))
-    if ratios[joint] <= DOUBTFUL:
+    if ratios[joint] <= DOUBTFUL_ERROR_RATIO:
         return []
     return [
         f"The logs differ by something else: the torque error of joint {joint + 1} is {ratios[joint]:.2g} times that "
@@ -285,7 +283,7 @@ def _warnings(body: PhysicalBody, ratio: float, match: PathMatch | None) -> list
             "nearest). The result is the nearest body that can exist. Check for contacts, cables, loose parts, or "
             "friction that grows with the load."
         )
-    if ratio > DOUBTFUL:
+    if ratio > DOUBTFUL_ERROR_RATIO:
         found.append(
             f"The torque errors are {ratio:.2g} times those without payload. Check that the payload is rigid and "
             "touches nothing, and that friction did not change."

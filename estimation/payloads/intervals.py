@@ -16,8 +16,6 @@ Array = NDArray[np.float64]
 AXES = "xyz"
 MOMENTS = ("Ixx", "Ixy", "Ixz", "Iyy", "Iyz", "Izz")
 _UPPER = np.triu_indices(3)
-# Step of the differences by which the inertia about the centre of mass is differentiated, over the mass.
-STEP = 1e-6
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -128,7 +126,8 @@ def _jacobian(parameters: Array) -> Array:
     columns = []
     for k in range(len(parameters)):
         step = np.zeros(len(parameters))
-        step[k] = STEP * parameters[0]
+        # Step of the differences by which the inertia about the centre of mass is differentiated, over the mass.
+        step[k] = 1e-6 * parameters[0]
         ahead, behind = (central_inertia(parameters + sign * step)[_UPPER] for sign in (1, -1))
         columns.append((ahead - behind) / (2 * step[k]))
     return np.array(columns).T

@@ -13,15 +13,8 @@ from estimation.uncertainty.correlations import squared_differences
 Array = NDArray[np.float64]
 Indices = NDArray[np.intp]
 
-# Logs are aligned on a grid not finer than this [s], with this share of the shorter log in common.
-COARSE, LEAST_OVERLAP = 0.02, 0.5
-# Shifts whose distance is this close to the best, in units of the motion's variance, are alike; the longest overlap
-# among them counts. A periodic motion has many.
-ALIKE = 1e-4
-# Logs are of one path where no joint's RMS distance exceeds this share of its range, or this angle [rad or m].
-SAME_SHARE, SAME = 0.02, 0.01
-# Rows that are paired are at most so many periods apart.
-APART = 0.75
+# Aligned logs have this share of the shorter one in common.
+LEAST_OVERLAP = 0.5
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,8 +50,11 @@ def match_paths(t1: Array, q1: Array, t2: Array, q2: Array) -> PathMatch:
     Returns:
         The match; its `same` is False where the paths differ.
     """
-    grid = max(float(np.median(np.diff(t1))), float(np.median(np.diff(t2))), COARSE)
-    scale = np.maximum(np.maximum(np.ptp(q1, axis=0), np.ptp(q2, axis=0)), SAME)
+    # Logs are aligned on a grid of 0.02 s or coarser.
+    grid = max(float(np.median(np.diff(t1))), float(np.median(np.diff(t2))), 0.02)
+    # Joints of two logs that are this close have the same position [rad or m].
+    same_position = 0.01
+    scale = np.maximum(np.maximum(np.ptp(q1, axis=0), np.ptp(q2, axis=0)), same_position)
     coarse = [_on_grid(t, q / scale, grid) for t, q in ((t1, q1), (t2, q2))]
     shift = t2[0] - t1[0] + grid * _coarse_shift(*coarse)
 
@@ -81,7 +77,8 @@ def match_paths(t1: Array, q1: Array, t2: Array, q2: Array) -> PathMatch:
     rms = np.sqrt((apart**2).mean(axis=0))
     span = np.maximum(np.ptp(q1[first], axis=0), np.ptp(q2[second], axis=0))
     enough = len(first) >= LEAST_OVERLAP * min(len(t1), len(t2))
-    same = bool(enough and (rms <= np.maximum(SAME_SHARE * span, SAME)).all())
+    # Logs are of one path where no joint's RMS distance exceeds 2 % of its range, or 0.01 rad or m.
+    same = bool(enough and (rms <= np.maximum(0.02 * span, same_position)).all())
     return PathMatch(shift, first, second, rms, np.abs(apart).max(axis=0), same)
 
 
@@ -98,7 +95,9 @@ def _coarse_shift(a: Array, b: Array) -> int:
     shifts = np.arange(least - len(a), len(b) - least + 1)
     rows = np.minimum(len(b), len(a) + shifts) - np.maximum(shifts, 0)
     mean = np.maximum(squared_differences(b, a, shifts).sum(axis=1), 0.0)
-    alike = mean <= mean.min() + ALIKE * float((a**2).sum(axis=1).mean())
+    # Shifts whose distance is this close to the best, in units of the motion's variance, are alike; the longest overlap
+    # among them counts. A periodic motion has many.
+    alike = mean <= mean.min() + 1e-4 * float((a**2).sum(axis=1).mean())
     return int(shifts[np.argmax(np.where(alike, rows, -1))])
 
 
@@ -112,5 +111,6 @@ def _pairs(times: Array, others: Array) -> tuple[Indices, Indices]:
         return first, second
     right = np.clip(np.searchsorted(others, times), 1, len(others) - 1)
     nearest = np.where(times - others[right - 1] <= others[right] - times, right - 1, right)
-    near = np.abs(others[nearest] - times) <= APART * float(np.median(np.diff(others)))
+    # Rows that are paired are at most so many periods apart.
+    near = np.abs(others[nearest] - times) <= 0.75 * float(np.median(np.diff(others)))
     return np.flatnonzero(near).astype(np.intp), nearest[near].astype(np.intp)

@@ -8,22 +8,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from estimation.linear_algebra.conic import ConicProgram
-from estimation.linear_algebra.log_determinant import VARIABLES, add_log_determinant
+from estimation.linear_algebra.log_determinant import LOG_DETERMINANT_VARIABLES, add_log_determinant
 from estimation.linear_algebra.scaled import floored_inverse
 from estimation.uncertainty.quantiles import chi2_limit
 from robots.consistency import BASIS, normalised_eigenvalues, pseudo_inertia
-from robots.geometry.inertia import SIZE, inertial_parameters
+from robots.geometry.inertia import BODY_PARAMETERS, inertial_parameters
 
 Array = NDArray[np.float64]
-
-# Smallest eigenvalue of a pseudo-inertia, in units in which the reference body has a unit mass and a unit size.
-EPSILON = 1e-6
-# Mean density of tools and workpieces with their hollows [kg/m3]: the size of a body whose shape is unknown.
-DENSITY = 700.0
-# Weight of the distance to that body: a unit is what its own parameters scatter by.
-WEIGHT = 1.0
-# The probability with which least squares of a real payload lie farther from all bodies.
-UNLIKELY = 1e-3
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -43,7 +34,8 @@ class PhysicalBody:
     @property
     def contradicted(self) -> bool:
         """Whether least squares lie farther from all bodies than chance explains."""
-        return self.distance > chi2_limit(UNLIKELY, SIZE)
+        # The probability with which least squares of a real payload lie farther from all bodies.
+        return self.distance > chi2_limit(1e-3, BODY_PARAMETERS)
 
 
 def physical_body(values: Array, covariance: Array) -> PhysicalBody:
@@ -64,26 +56,30 @@ def physical_body(values: Array, covariance: Array) -> PhysicalBody:
     quadratic = precision * scale[:, None] * scale
     wanted = -quadratic @ (values / scale)
 
-    program = ConicProgram(SIZE)
-    program.semidefinite(BASIS, -EPSILON * np.eye(4))
+    program = ConicProgram(BODY_PARAMETERS)
+    # Smallest eigenvalue of a pseudo-inertia, in units in which the reference body has a unit mass and a unit size.
+    margin = 1e-6
+    program.semidefinite(BASIS, -margin * np.eye(4))
     nearest = values
-    if not (normalised_eigenvalues(values) > EPSILON).all():
+    if not (normalised_eigenvalues(values) > margin).all():
         nearest = scale * program.solve(quadratic, wanted, "payload")
     off = nearest - values
 
-    full = ConicProgram(SIZE + VARIABLES)
+    full = ConicProgram(BODY_PARAMETERS + LOG_DETERMINANT_VARIABLES)
     weighted, linear = np.zeros((full.size, full.size)), np.zeros(full.size)
-    weighted[:SIZE, :SIZE], linear[:SIZE] = quadratic, wanted
-    linear[:SIZE] += WEIGHT * np.tensordot(BASIS, np.linalg.inv(pseudo_inertia(reference / scale)), axes=2)
-    add_log_determinant(full, linear, range(SIZE), SIZE, WEIGHT)
-    plausible = scale * full.solve(weighted, linear, "payload")[:SIZE]
+    weighted[:BODY_PARAMETERS, :BODY_PARAMETERS], linear[:BODY_PARAMETERS] = quadratic, wanted
+    # The distance to that body counts as much as what its own parameters scatter by.
+    linear[:BODY_PARAMETERS] += np.tensordot(BASIS, np.linalg.inv(pseudo_inertia(reference / scale)), axes=2)
+    add_log_determinant(full, linear, range(BODY_PARAMETERS), BODY_PARAMETERS, 1.0)
+    plausible = scale * full.solve(weighted, linear, "payload")[:BODY_PARAMETERS]
     return PhysicalBody(parameters=plausible, nearest=nearest, distance=float(off @ precision @ off))
 
 
 def ball(values: Array) -> Array:
     """Gives the parameters (10,) of a ball of usual density with the mass and centre of mass of parameters (10,)."""
     mass = float(values[0])
-    radius = (3 * mass / (4 * np.pi * DENSITY)) ** (1 / 3)
+    # Mean density of tools and workpieces with their hollows [kg/m3]: the size of a body whose shape is unknown.
+    radius = (3 * mass / (4 * np.pi * 700.0)) ** (1 / 3)
     return inertial_parameters(mass, values[1:4] / mass, 0.4 * mass * radius**2 * np.eye(3), np.eye(4))
 
 

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from estimation.payloads.body import DAMAGED, FORMAT, FORMAT_VERSION, Body, body_from_dict, read_payload_file
+from estimation.payloads.body import DAMAGED, FORMAT, PAYLOAD_VERSION, Body, body_from_dict, read_payload_file
 from estimation.payloads.determination import determined
 from estimation.payloads.intervals import Quantity, quantities
 from robots.common.plain import two_digits
@@ -53,7 +53,7 @@ class JointEvidence:
 
 
 @dataclass(frozen=True, kw_only=True)
-class PayloadEstimate(Result, format=FORMAT, version=FORMAT_VERSION):
+class PayloadEstimate(Result, format=FORMAT, version=PAYLOAD_VERSION):
     """A payload, rigidly on the flange or on another link.
 
     Attributes:

@@ -7,16 +7,14 @@ from numpy.typing import NDArray
 
 from estimation.comparisons.common_parameters import friction_table
 from estimation.models.model import Model
-from estimation.regressions.joint_regressor import chunks
 from estimation.uncertainty.quantiles import NORMAL_95
 from robots.common.plain import two_digits
+from robots.common.stretches import chunks
 from robots.signals import Motion
 from robots.terms.base import length_unit
 
 Array = NDArray[np.float64]
 
-# A speed, acceleration or range larger than the recorded one by this factor is said.
-BEYOND = 1.1
 # Shares of the fitted speeds at which friction is slow, and holds a joint at rest.
 SLOW = np.array([0.05, 0.1, 0.2])
 
@@ -102,15 +100,17 @@ def beyond_the_recorded(model: Model, motion: Motion) -> tuple[str, ...]:
     if recorded is None:
         return ()
     lowest, highest = (np.asarray(bound, dtype=float) for bound in recorded["position"])
+    # A speed, acceleration or range larger than the recorded one by this factor is reported.
+    beyond = 1.1
     for joint, name in enumerate(model.robot.joint_names):
         texts = [
             f"{two_digits(ratio)} times the recorded {what}"
             for what, key, signal in (("speed", "velocity", motion.dq), ("acceleration", "acceleration", motion.ddq))
-            if (ratio := _ratio(signal[:, joint], recorded[key][0][joint])) > BEYOND
+            if (ratio := _ratio(signal[:, joint], recorded[key][0][joint])) > beyond
         ]
         q = motion.q[:, joint]
         outside = max(float(lowest[joint] - q.min()), float(q.max() - highest[joint]))
-        if outside > (BEYOND - 1) * float(highest[joint] - lowest[joint]):
+        if outside > (beyond - 1) * float(highest[joint] - lowest[joint]):
             texts.append(f"{outside:.2g} {length_unit(model.robot, joint)} outside the recorded range")
         if texts:
             found.append(f"joint {joint + 1} ({name}): {', '.join(texts)}")

@@ -15,8 +15,6 @@ from robots.common.errors import AssumedValueWarning
 from robots.robot import Robot
 from robots.signals import Log
 
-# Cut-off [Hz] of a model that states none.
-CUTOFF = 10.0
 JOINED = ("t", "q", "tau", "current", "ambient", "temperature")
 
 
@@ -67,7 +65,7 @@ def smoothed_at_least(model: Model, cutoff: float) -> Model:
     The fit takes the lowest cut-off that its motions allow. Motions with stops need a higher one: a low-pass rings at a
     stop, and the sign of the friction follows the ringing.
     """
-    if float(model.provenance.get("cutoff_hz", CUTOFF)) >= cutoff:
+    if model.cutoff >= cutoff:
         return model
     return replace(model, provenance={**model.provenance, "cutoff_hz": cutoff})
 

@@ -24,9 +24,6 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
-# In a single log, the last part is held out: one contiguous part, never shuffled samples.
-SEEN = 0.7
-
 
 @dataclass(frozen=True, kw_only=True)
 class MethodRow:
@@ -122,7 +119,8 @@ def compare_methods(
     elif len(seen) > 1:
         seen, unseen = seen[:-1], seen[-1:]
     else:
-        middle = int(SEEN * len(seen[0]))
+        # In a single log, the last part is held out: one contiguous part, never shuffled samples.
+        middle = int(0.7 * len(seen[0]))
         seen, unseen = [seen[0].rows(slice(0, middle))], [seen[0].rows(slice(middle, None))]
     names = list(methods or ESTIMATORS)
     unknown = [name for name in names if name not in ESTIMATORS]

@@ -34,10 +34,6 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 
 
-# Share of the torques within the band below which a joint is said to be outside.
-MOSTLY = 0.5
-
-
 @dataclass(frozen=True, kw_only=True)
 class Prediction(Result):
     """Torques of a motion.
@@ -202,7 +198,8 @@ class Prediction(Result):
                 f"  worse than a constant on {joints_in_words(worse.tolist())}: check that the log is of this robot, "
                 "and what its torque columns hold (oed check)"
             )
-        outside = np.flatnonzero((self.band_coverage < MOSTLY) & ~(self.relative_spread > 1.0)) + 1
+        # Share of the torques within the band below which a joint is said to be outside.
+        outside = np.flatnonzero((self.band_coverage < 0.5) & ~(self.relative_spread > 1.0)) + 1
         if len(outside):
             lines.append(
                 f"  most torques of {joints_in_words(outside.tolist())} are outside the band: this log shows what the "
@@ -292,7 +289,7 @@ def predict(
         raise InputError(
             f"{log.n} joints", file=log.metadata.get("file"), allowed=f"{robot.n}, as in the model of {robot.name}"
         )
-    cutoff = float(model.provenance.get("cutoff_hz", 10.0))
+    cutoff = model.cutoff
     log = as_joint_torque(robot, log) if log.tau is not None or log.current is not None else log
     note_meaning(model, log)
     gate, parts = checked_motion(robot, log) if check else (None, [log])

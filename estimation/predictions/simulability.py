@@ -21,16 +21,11 @@ from robots.base_parameters import BaseParameters, find_base_parameters
 from robots.common.errors import InfeasibleError, InputError, SolverError
 from robots.common.records import Record
 from robots.consistency import BASIS, pseudo_inertia
-from robots.geometry.inertia import SIZE
-from robots.plants.closed_loop import LEAST_INERTIA
+from robots.geometry.inertia import BODY_PARAMETERS
+from robots.plants.closed_loop import LEAST_INERTIA_SHARE
 from robots.signals import Log, Motion
 
 Array = NDArray[np.float64]
-
-POSES = 200
-"""Poses of each motion that are looked at."""
-ALONG = 0.2
-"""Joints that move by less than this share of the fastest one are not named."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -83,7 +78,8 @@ class UnfitDirection(Record):
     def joints(self) -> tuple[int, ...]:
         """The joints that move, from 1, the fastest first."""
         speed = np.abs(self.direction)
-        return tuple(int(j) + 1 for j in np.argsort(-speed) if speed[j] >= ALONG * speed.max())
+        # Joints that move by less than this share of the fastest one are not named.
+        return tuple(int(j) + 1 for j in np.argsort(-speed) if speed[j] >= 0.2 * speed.max())
 
     def summary(self) -> str:
         """Names body, direction and remedy in a few sentences."""
@@ -127,13 +123,15 @@ def find_unfit_direction(model: Model, motions: Motion | Sequence[Motion]) -> Un
     base = find_base_parameters(model.torque_model, gravities=model.gravities)
     if base.independent != model.columns:
         raise InputError("the model's parameters are not the robot's base parameters", remedy="identify it again")
-    if all(_definite(inertia_matrices(base, model.values, motion, POSES)) for motion in listed):
+    # Poses of each motion that are looked at.
+    count = 200
+    if all(_definite(inertia_matrices(base, model.values, motion, count)) for motion in listed):
         return None
     nearest, change = nearest_simulable(model)
     worst: tuple[float, Array, Array] | None = None
     for motion in listed:
-        at = np.linspace(0, len(motion) - 1, min(len(motion), POSES)).astype(int)
-        own, sound = (inertia_matrices(base, values, motion, POSES) for values in (model.values, nearest.values))
+        at = np.linspace(0, len(motion) - 1, min(len(motion), count)).astype(int)
+        own, sound = (inertia_matrices(base, values, motion, count) for values in (model.values, nearest.values))
         scale = 1.0 / np.sqrt(np.maximum(np.diagonal(sound, axis1=1, axis2=2), np.finfo(float).tiny))
         sizes, ways = np.linalg.eigh(own * scale[:, :, None] * scale[:, None, :])
         row = int(sizes[:, 0].argmin())
@@ -199,8 +197,6 @@ def unfit_of(model: Model, logs: Sequence[Log]) -> UnfitDirection | None:
         return None
 
 
-MARGIN = 1e-6
-"""Smallest eigenvalue of a pseudo-inertia, in units of the link's own mass and reach."""
 INERTIAL = ("rigid_body", "rotor_inertia")
 
 
@@ -240,8 +236,8 @@ def nearest_simulable(model: Model) -> tuple[Model, float]:
     def constrain(program: ConicProgram) -> None:
         _keep_bodies(program, described, spread)
         if len(joints):
-            place = np.arange(SIZE * robot.n, len(unit))
-            program.nonnegative(np.eye(program.size)[place], -LEAST_INERTIA * rotor[joints] / rotor_spread)
+            place = np.arange(BODY_PARAMETERS * robot.n, len(unit))
+            program.nonnegative(np.eye(program.size)[place], -LEAST_INERTIA_SHARE * rotor[joints] / rotor_spread)
 
     start = np.concatenate([(described / spread).reshape(-1), rotor[joints] / rotor_spread])
     return nearest_within_errors(model, own, scaled, model.values[own], start, constrain, "a model that simulates")
@@ -254,8 +250,9 @@ def _keep_bodies(program: ConicProgram, described: Array, spread: Array) -> None
         # A congruence by mass and reach makes the units of the matrix one, and keeps its signs.
         scale = np.array([1.0, 1.0, 1.0, spread[link, 1] / spread[link, 0]]) / np.sqrt(spread[link, 4])
         weigh = scale[:, None] * scale
-        basis[SIZE * link : SIZE * (link + 1)] = BASIS * spread[link][:, None, None] * weigh
+        basis[BODY_PARAMETERS * link : BODY_PARAMETERS * (link + 1)] = BASIS * spread[link][:, None, None] * weigh
         least = pseudo_inertia(own) * weigh
         if np.linalg.eigvalsh(least)[0] < 0.0:
             least = np.zeros((4, 4))
-        program.semidefinite(basis, -LEAST_INERTIA * least - MARGIN * np.eye(4))
+        # Smallest eigenvalue of a pseudo-inertia, in units of the link's own mass and reach.
+        program.semidefinite(basis, -LEAST_INERTIA_SHARE * least - 1e-6 * np.eye(4))

@@ -10,11 +10,10 @@ from scipy.linalg import cho_factor, cho_solve
 
 from estimation.preprocessing.base import Smoother
 from estimation.preprocessing.resampling import Resampled
+from robots.common.stretches import chunks
 from robots.signals import Motion
 
 Array = NDArray[np.float64]
-
-CHUNK = 16_384
 
 
 @dataclass(frozen=True)
@@ -45,14 +44,14 @@ class Harmonics(Smoother):
         t, q = positions.fresh_t, positions.fresh_q
         size = 2 * self.order + 1
         gram, cross = np.zeros((size, size)), np.zeros((size, q.shape[1]))
-        for rows in _chunks(len(t)):
+        for rows in chunks(len(t)):
             basis = self._basis(t[rows] - t[0])[0]
             gram += basis.T @ basis
             cross += basis.T @ q[rows]
         coefficients = cho_solve(cho_factor(gram), cross)
         at = positions.original
         signals = np.empty((3, len(at), q.shape[1]))
-        for rows in _chunks(len(at)):
+        for rows in chunks(len(at)):
             for signal, basis in zip(signals, self._basis(at[rows] - t[0], derivatives=2), strict=True):
                 signal[rows] = basis @ coefficients
         return Motion(at, *signals)
@@ -73,7 +72,3 @@ class Harmonics(Smoother):
         one, zero = np.ones((len(t), 1)), np.zeros((len(t), 1))
         stages = [np.hstack([one, s, c]), np.hstack([zero, w * c, -w * s]), np.hstack([zero, -(w**2) * s, -(w**2) * c])]
         return stages[: derivatives + 1]
-
-
-def _chunks(rows: int) -> list[slice]:
-    return [slice(start, start + CHUNK) for start in range(0, rows, CHUNK)]

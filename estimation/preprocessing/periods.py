@@ -12,15 +12,7 @@ from robots.common.stretches import spans
 
 Array = NDArray[np.float64]
 
-# Two passes of one motion differ by less than this share of the joint's standard deviation.
-ALIKE = 0.02
-# Mean square distance, over twice the variance, that the motion must reach before it returns.
-AWAY = 0.25
-# Share of the log that must repeat.
-MOST = 0.6
-# Number of rows of the first, coarse comparison of lags.
-COARSE = 6000
-SHORTEST = 0.5  # [s] shortest period
+SHORTEST_MOTION_PERIOD = 0.5  # [s] shortest period
 
 
 @dataclass(frozen=True)
@@ -57,10 +49,11 @@ def find_cycle(q: Array, step: float) -> Cycle | None:
     """
     spread = q.std(axis=0)
     moving = spread > 1e-3 * max(float(spread.max()), 1e-9)
-    if not moving.any() or len(q) * step < 2 * SHORTEST:
+    if not moving.any() or len(q) * step < 2 * SHORTEST_MOTION_PERIOD:
         return None
     x = (q[:, moving] - q[:, moving].mean(axis=0)) / spread[moving]
-    stride = max(1, len(x) // COARSE)
+    # Number of rows of the first, coarse comparison of lags.
+    stride = max(1, len(x) // 6000)
     for lag in _candidate_lags(x[::stride], stride * step):
         cycle = _examine(x, lag * stride, stride, step)
         if cycle is not None:
@@ -72,11 +65,13 @@ def _candidate_lags(x: Array, step: float) -> list[int]:
     """Returns the lags at which the motion returns after it moved away, the shortest first."""
     # For lags up to just over half the length.
     difference = 0.5 * squared_differences(x, x, np.arange(len(x) // 2 + 2)).mean(axis=1)
-    shortest, longest = max(2, round(SHORTEST / step)), len(x) // 2 + 1
+    shortest, longest = max(2, round(SHORTEST_MOTION_PERIOD / step)), len(x) // 2 + 1
     away = np.maximum.accumulate(difference)
     lags = np.arange(1, len(difference) - 1)
     dips = (difference[1:-1] <= difference[:-2]) & (difference[1:-1] < difference[2:])
-    found = lags[dips & (difference[1:-1] < AWAY) & (away[1:-1] > AWAY)]
+    # Mean square distance, over twice the variance, that the motion must reach before it returns.
+    far = 0.25
+    found = lags[dips & (difference[1:-1] < far) & (away[1:-1] > far)]
     found = found[(found >= shortest) & (found <= longest)]
     return [int(lag) for lag in found[:20]]
 
@@ -86,9 +81,11 @@ def _examine(x: Array, lag: int, reach: int, step: float) -> Cycle | None:
     fine = np.arange(max(1, lag - 2 * reach), min(len(x) - 2, lag + 2 * reach) + 1)
     costs = np.array([_mismatch(x, int(candidate), 8) for candidate in fine])
     best = int(fine[costs.argmin()])
-    alike = np.abs(x[best:] - x[:-best]).max(axis=1) < ALIKE + _slack(x, step)
+    # Two passes of one motion differ by less than this share of the joint's standard deviation.
+    alike = np.abs(x[best:] - x[:-best]).max(axis=1) < 0.02 + _slack(x, step)
     start, stop = _longest(alike)
-    if stop - start < 0.8 * best or (stop - start + best) < MOST * len(x):
+    # Share of the log that must repeat.
+    if stop - start < 0.8 * best or (stop - start + best) < 0.6 * len(x):
         return None
     part = x[start : stop + best]
     periods = max(1, (len(part) - 1) // best)

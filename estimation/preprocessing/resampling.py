@@ -13,15 +13,6 @@ from robots.common.stretches import spans
 
 Array = NDArray[np.float64]
 
-# A longer hold is a rest, or a crawl below the encoder's step, and no repeated message.
-LONGEST_HOLD = 3
-# A repeated value is stale when the arm has moved on by more than the encoder could hide.
-STALE_STEPS = 2.0
-# Relative jitter of the time stamps above which straight lines between samples would leave kinks.
-EVEN = 0.02
-# Rows nearer than the first share of a period are one; steps above so many periods are holes.
-CROWD, HOLE = 0.1, 8.0
-
 
 @dataclass(frozen=True)
 class Resampled:
@@ -64,7 +55,8 @@ def resample(t: Array, q: Array) -> Resampled:
     if len(kept_t) < 20:
         raise InputError(f"{len(kept_t)} rows", allowed="20 or more", remedy="record a longer log")
     steps = np.diff(t)
-    even = np.ptp(steps) <= EVEN * np.median(steps)
+    # Relative jitter of the time stamps above which straight lines between samples would leave kinks.
+    even = np.ptp(steps) <= 0.02 * np.median(steps)
     # The mean of even steps: large times round each step, and a grid by the median would drift off the samples.
     period = float(np.mean(steps) if even else np.median(steps))
     grid = t[0] + period * np.arange(int(np.floor((t[-1] - t[0]) / period + 1e-6)) + 1)
@@ -89,9 +81,11 @@ def between_rows(t: Array, q: Array, at: Array, period: float) -> Array:
         at: times (M,) [s] within them.
         period: usual step of time [s].
     """
-    t, q = _merged(t, q, CROWD * period)
+    # Rows nearer than a tenth of a period are one, ...
+    t, q = _merged(t, q, 0.1 * period)
     values = np.asarray(CubicSpline(t, q)(at))
-    holes = np.flatnonzero(np.diff(t) > HOLE * period)
+    # ... and steps above eight periods are holes.
+    holes = np.flatnonzero(np.diff(t) > 8.0 * period)
     inside = np.isin(np.searchsorted(t, at, side="right") - 1, holes)
     if inside.any():
         # Positions that differ by denormal numbers have slopes whose harmonic mean overflows on its way to zero.
@@ -131,12 +125,14 @@ def stale_rows(t: Array, q: Array) -> NDArray[np.bool_]:
     if not repeated.any():
         return repeated
     line = np.column_stack([np.interp(t, t[~repeated], column[~repeated]) for column in q.T])
-    off = (np.abs(q - line) > STALE_STEPS * np.maximum(_step(q), 1e-9)) & _passing(q, repeated)
+    # A repeated value is stale when the arm has moved on by more than the encoder could hide.
+    off = (np.abs(q - line) > 2.0 * np.maximum(_step(q), 1e-9)) & _passing(q, repeated)
     # Length of the run of repeats that each row belongs to.
     length = np.zeros(len(t), dtype=int)
     for start, stop in spans(repeated):
         length[start:stop] = stop - start
-    return repeated & (length <= LONGEST_HOLD) & off.any(axis=1)
+    # A longer hold is a rest, or a crawl below the encoder's step, and no repeated message.
+    return repeated & (length <= 3) & off.any(axis=1)
 
 
 def _passing(q: Array, repeated: NDArray[np.bool_]) -> NDArray[np.bool_]:

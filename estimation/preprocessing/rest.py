@@ -8,9 +8,6 @@ from scipy.ndimage import maximum_filter1d, minimum_filter1d
 
 Array = NDArray[np.float64]
 
-# A joint stands while it travels less than this share of what it would at its RMS speed, for at least this time [s].
-REST_SPEED, REST_TIME = 0.03, 0.15
-
 
 def rows_at_rest(t: Array, q: Array, speed: Array | None = None) -> NDArray[np.bool_]:
     """Finds the rows (N, n) in which each joint stands for a while.
@@ -25,7 +22,9 @@ def rows_at_rest(t: Array, q: Array, speed: Array | None = None) -> NDArray[np.b
     found = np.zeros(q.shape, dtype=bool)
     if len(t) < 2:
         return found
-    width = max(2, round(REST_TIME / float(np.median(np.diff(t))))) + 1
+    # A rest lasts this time [s] at least.
+    rest_time = 0.15
+    width = max(2, round(rest_time / float(np.median(np.diff(t))))) + 1
     if width > len(t):
         return found
     if speed is None:
@@ -34,6 +33,7 @@ def rows_at_rest(t: Array, q: Array, speed: Array | None = None) -> NDArray[np.b
     back = (width - 1) // 2
     travel = maximum_filter1d(q, width, axis=0, origin=back) - minimum_filter1d(q, width, axis=0, origin=back)
     travel[: width - 1] = np.inf
-    still = travel < REST_SPEED * REST_TIME * speed
+    # A joint is at rest while it travels less than 3 % of what it would at its RMS speed.
+    still = travel < 0.03 * rest_time * speed
     found = maximum_filter1d(still.astype(np.int8), width, axis=0, origin=back - (width - 1)) > 0
     return found & ~found.all(axis=0)

@@ -16,9 +16,7 @@ from robots.signals import Motion
 
 Array = NDArray[np.float64]
 
-ORDER = 3
-# Rows at each end by whose own differences the derivatives there are found.
-FREE_ENDS = 7
+BUTTERWORTH_ORDER = 3
 
 
 def smooth(positions: Resampled, by: float | Smoother) -> Motion:
@@ -67,7 +65,7 @@ def transient(duration: float, cutoff: float) -> float:
 
 def own_cutoff(cutoff: float) -> float:
     """Frequency [Hz] at which one pass of two is 3 dB down, where both together are at `cutoff`."""
-    return cutoff / (np.sqrt(2) - 1) ** (1 / (2 * ORDER))
+    return cutoff / (np.sqrt(2) - 1) ** (1 / (2 * BUTTERWORTH_ORDER))
 
 
 @lru_cache(maxsize=64)
@@ -87,9 +85,9 @@ def low_pass(x: Array, period: float, cutoff: float) -> Array:
     nyquist = 0.5 / period
     if own >= 0.95 * nyquist:
         return x
-    sections = butterworth(ORDER, own / nyquist)
+    sections = butterworth(BUTTERWORTH_ORDER, own / nyquist)
     # Four periods of the cut-off: by then the filter has forgotten how the padding began, to a part in 10^7.
-    padding = int(min(len(x) - 1, max(3 * (2 * ORDER + 1), round(4 / (cutoff * period)))))
+    padding = int(min(len(x) - 1, max(3 * (2 * BUTTERWORTH_ORDER + 1), round(4 / (cutoff * period)))))
     return np.asarray(sosfiltfilt(sections, x, axis=0, padtype="odd", padlen=padding))
 
 
@@ -104,11 +102,13 @@ def differentiate(x: Array, period: float) -> tuple[Array, Array]:
         First and second derivative (N, n).
     """
     first, second = np.empty_like(x), np.empty_like(x)
-    ends = (slice(None), slice(None)) if len(x) < 2 * FREE_ENDS else (slice(FREE_ENDS), slice(-FREE_ENDS, None))
+    # Rows at each end by whose own differences the derivatives there are found.
+    free = 7
+    ends = (slice(None), slice(None)) if len(x) < 2 * free else (slice(free), slice(-free, None))
     for end in ends:
         first[end] = np.gradient(x[end], period, axis=0, edge_order=2)
         second[end] = np.gradient(first[end], period, axis=0, edge_order=2)
-    if len(x) < 2 * FREE_ENDS:
+    if len(x) < 2 * free:
         return first, second
     # Written out in place: of millions of rows each temporary is as large as the log.
     pairs = ((x[4:-2], x[2:-4]), (x[5:-1], x[1:-5]), (x[6:], x[:-6]))

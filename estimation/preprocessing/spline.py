@@ -16,12 +16,6 @@ from robots.signals import Motion
 
 Array = NDArray[np.float64]
 
-DEGREE = 5
-# Third differences are sinc^3 of derivatives, the B-spline sinc^6: squared, and one over the other.
-DIFFERENCES = 6
-# Knots per period of the cut-off: finer ones change nothing, the penalty having smoothed what they could follow.
-KNOTS = 8.0
-
 
 @dataclass(frozen=True)
 class SmoothingSpline(Smoother):
@@ -44,25 +38,29 @@ class SmoothingSpline(Smoother):
         t, q = positions.fresh_t, positions.fresh_q
         start, duration = t[0], t[-1] - t[0]
         own = own_cutoff(self.cutoff)
-        pieces = int(np.clip(np.ceil(duration * KNOTS * self.cutoff), 1, max(1, len(t) - DEGREE)))
+        # Knots per period of the cut-off: finer ones change nothing, the penalty having smoothed what they could
+        # follow.
+        degree = 5
+        pieces = int(np.clip(np.ceil(duration * 8.0 * self.cutoff), 1, max(1, len(t) - degree)))
         width = duration / pieces
         # Time in knots, from the first sample: large clock values would cost digits.
-        knots = np.arange(-DEGREE, pieces + DEGREE + 1, dtype=float)
-        basis = BSpline.design_matrix(np.clip((t - start) / width, 0.0, pieces), knots, DEGREE)
+        knots = np.arange(-degree, pieces + degree + 1, dtype=float)
+        basis = BSpline.design_matrix(np.clip((t - start) / width, 0.0, pieces), knots, degree)
         normal = (basis.T @ basis).todia()
-        size = pieces + DEGREE
-        banded = np.zeros((DEGREE + 1, size))
+        size = pieces + degree
+        banded = np.zeros((degree + 1, size))
         for offset, diagonal in zip(normal.offsets.tolist(), normal.data, strict=True):
-            if 0 <= offset <= DEGREE:
-                banded[DEGREE - offset, offset:] = diagonal[offset:size]
+            if 0 <= offset <= degree:
+                banded[degree - offset, offset:] = diagonal[offset:size]
         rate = (len(t) - 1) / duration
         # Differences of coefficients stand for derivatives of the spline: so that both agree at the cut-off.
-        agreement = np.sinc(own * width) ** DIFFERENCES
+        # Third differences are sinc^3 of derivatives, the B-spline sinc^6: squared, and one over the other.
+        agreement = np.sinc(own * width) ** 6
         weight = agreement * rate * (2 * np.pi * own) ** -6 * width**-5
         for offset, diagonal in enumerate(_third_differences(size)):
-            banded[DEGREE - offset, offset:] += weight * diagonal
+            banded[degree - offset, offset:] += weight * diagonal
         coefficients = solveh_banded(banded, np.asarray(basis.T @ q))
-        spline = BSpline(knots, coefficients, DEGREE)
+        spline = BSpline(knots, coefficients, degree)
         at = np.clip((positions.original - start) / width, 0.0, pieces)
         derivatives = (spline(at, nu=order) / width**order for order in (0, 1, 2))
         return Motion(positions.original, *derivatives)

@@ -13,9 +13,6 @@ from robots.terms import BendingFriction
 
 Array = NDArray[np.float64]
 
-# A violation below this share of a curve's largest value is rounding.
-ROUNDING = 1e-9
-
 
 def with_braking_friction(base: BaseParameters, moments: Moments, values: Array, weights: Array, ridge: float) -> Array:
     """Moves a fit of `BendingFriction` to the nearest one whose friction brakes; any other fit stays as it is.
@@ -38,7 +35,8 @@ def with_braking_friction(base: BaseParameters, moments: Moments, values: Array,
     columns = np.array([column.friction for column in base.model.columns])
     rows = nonnegative_rows(base.model, speed)
     rows = rows[(rows[:, columns] != 0).any(axis=1)][:, list(base.independent)]
-    if (rows @ values >= -ROUNDING * (np.abs(rows) @ np.abs(values))).all():
+    # A violation below this share of a curve's largest value is rounding.
+    if (rows @ values >= -1e-9 * (np.abs(rows) @ np.abs(values))).all():
         return values
     # min (x - values)' A (x - values) with rows x >= 0 has x = values + inv(A) rows' m, and its multipliers m >= 0
     # solve a non-negative least-squares problem (Lawson & Hanson 1974, chapter 23).

@@ -12,7 +12,7 @@ from robots.base_parameters import BaseParameters
 from robots.signals import Motion
 
 # Keeps the inverse finite where the data leave directions open: standard errors are those without regularisation.
-FAINT = 1e-13
+COVARIANCE_RIDGE = 1e-13
 
 
 @dataclass(frozen=True)
@@ -47,7 +47,7 @@ def robust_covariance(
         The sandwich of `estimation.uncertainty`.
     """
     if inverse is None:
-        inverse = scaled.inverse(gram, FAINT)
+        inverse = scaled.inverse(gram, COVARIANCE_RIDGE)
     parts = [Part(e.rows, e.regressor, e.mask, e.residual * e.mask) for e in equations]
     return covariance(parts, weights, (inverse + inverse.T) / 2)
 

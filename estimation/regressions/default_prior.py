@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from estimation.regressions.moments import Moments
 from estimation.regressions.parameter_priors import (
-    SILENT,
+    SILENT_COLUMN,
     GaussianPrior,
     inflate_conflicting_prior,
     link_spreads,
@@ -23,18 +23,8 @@ from robots.terms.rigid_body import SYMBOLS
 
 Array = NDArray[np.float64]
 
-# Torque that friction, rotor or offset of a joint usually makes, and that an unknown function of its position does, as
-# shares of the torque's standard deviation. `benchmarks/transfer.py` is flat about both: half and twice the value
-# change the median error by 3 %.
-OWN_SHARE, POSITION_SHARE = 0.2, 0.07
-# Torque of a joint without torque, as a share of the largest joint's.
-SMALLEST_TORQUE = 1e-3
 # What a model lacks is alike for about so long [s] of a motion: rows closer than that do not inform twice.
-MEMORY = 0.1
-# Standard deviations of the prior from which the data are said to contradict it.
-CONFLICT = 4.0
-# Weight of a prior that hardly counts, and rounds by which the weight and the residual suit each other.
-FREE, ROUNDS = 1e-6, 2
+MODEL_ERROR_MEMORY = 0.1
 
 
 def default_prior(base: BaseParameters, spread: Array, level: Array) -> GaussianPrior:
@@ -50,7 +40,8 @@ def default_prior(base: BaseParameters, spread: Array, level: Array) -> Gaussian
         level: RMS of each standard column on the joint of its own (p,).
     """
     model = base.model
-    torque = np.maximum(spread, max(SMALLEST_TORQUE * float(spread.max()), np.finfo(float).tiny))
+    # Torque of a joint without torque, as a share of the largest joint's.
+    torque = np.maximum(spread, max(1e-3 * float(spread.max()), np.finfo(float).tiny))
     bodies, _ = reference_bodies(model.robot, mass_from_torque(model.robot, float(torque.max())))
     links = link_spreads(bodies)
     scatter = joint_scatter(model, torque, level)
@@ -71,9 +62,12 @@ def joint_scatter(model: TorqueModel, spread: Array, level: Array) -> Array:
     scatter = np.zeros(model.size)
     for i, column in enumerate(model.columns):
         if column.term != "rigid_body":
-            share = POSITION_SHARE if column.term == PositionTorque.name else OWN_SHARE
+            # Torque that friction, rotor or offset of a joint usually makes, and that an unknown function of its
+            # position does, as shares of the torque's standard deviation. `benchmarks/transfer.py` is flat about both:
+            # half and twice the value change the median error by 3 %.
+            share = 0.07 if column.term == PositionTorque.name else 0.2
             # A column that never acts stays at its description by any spread.
-            scatter[i] = share * spread[column.joint - 1] / (level[i] if level[i] > SILENT else 1.0)
+            scatter[i] = share * spread[column.joint - 1] / (level[i] if level[i] > SILENT_COLUMN else 1.0)
     return scatter
 
 
@@ -92,11 +86,15 @@ def weighed_prior(
         The ridge by which the prior counts for what it is, see `Moments.solve`, and the weakened prior.
     """
     # Contradictions show against the noise that the data alone leave: beside a wrong prior all of it would be noise.
-    precision = moments.level(solve(moments.pulled(prior), FREE)[0]) ** -2
+    # Weight of a prior that hardly counts.
+    hardly = 1e-6
+    precision = moments.level(solve(moments.pulled(prior), hardly)[0]) ** -2
     information = np.tensordot(precision, moments.gram, axes=1) / rows
-    held = inflate_conflicting_prior(prior, information, precision @ moments.cross / rows, sigmas=CONFLICT)
-    ridge = FREE
-    for _ in range(ROUNDS):
+    # Standard deviations of the prior from which the data are said to contradict it.
+    held = inflate_conflicting_prior(prior, information, precision @ moments.cross / rows, sigmas=4.0)
+    ridge = hardly
+    # The weight and the residual adapt to each other.
+    for _ in range(2):
         precision = moments.level(solve(moments.pulled(held), ridge)[0]) ** -2
         ridge = rows / max(float(precision @ moments.square), np.finfo(float).tiny)
     return ridge, held

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property, lru_cache, reduce
 
@@ -16,8 +15,6 @@ from robots.batch import BatchFunction, batch_function
 from robots.regressor import TorqueModel
 
 Array = NDArray[np.float64]
-
-CHUNK = 2048
 
 
 @dataclass(frozen=True)
@@ -123,9 +120,3 @@ def summed(rows: Array, groups: NDArray[np.intp]) -> tuple[NDArray[np.intp], Arr
         return groups, rows
     starts = np.flatnonzero(np.diff(groups, prepend=-1))
     return groups[starts], np.add.reduceat(rows, starts)
-
-
-def chunks(rows: int, size: int = CHUNK) -> Iterator[slice]:
-    """Cuts so many rows into slices."""
-    for start in range(0, rows, size):
-        yield slice(start, min(start + size, rows))

@@ -8,13 +8,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from estimation.linear_algebra.positive import solve_nearly_positive, solve_positive
-from estimation.linear_algebra.scaled import lengths
+from estimation.linear_algebra.scaled import LEAST_RIDGE, lengths
 from estimation.regressions.parameter_priors import GaussianPrior
 
 Array = NDArray[np.float64]
-
-# Keeps a matrix invertible that no ridge helps.
-FAINT = 1e-12
 
 
 @dataclass(frozen=True)
@@ -91,7 +88,7 @@ class Moments:
         """Inverts the matrix (p, p) by which `solve` finds the parameters."""
         matrix, extra = self._weighted(weights), ridge
         if self.pull is not None:
-            matrix, extra = matrix + ridge * float(weights @ self.square) * self.pull.precision, FAINT
+            matrix, extra = matrix + ridge * float(weights @ self.square) * self.pull.precision, LEAST_RIDGE
         scale, unit = lengths(matrix), np.eye(len(matrix))
         inverse = solve_positive(matrix / scale[:, None] / scale + extra * unit, unit)
         return np.asarray(inverse / scale[:, None] / scale)
@@ -137,6 +134,6 @@ def solve_all(gram: Array, cross: Array, square: Array, ridge: float, pull: Gaus
         strength = ridge * square[:, None]
         matrix += strength[:, :, None] * (factor[:, :, None] * pull.precision)
         matrix *= factor[:, None, :]
-        matrix[:, diagonal, diagonal] += FAINT
-        right += strength * (pull.precision @ pull.target) * factor + FAINT * scale * pull.target
+        matrix[:, diagonal, diagonal] += LEAST_RIDGE
+        right += strength * (pull.precision @ pull.target) * factor + LEAST_RIDGE * scale * pull.target
     return np.array([solve_nearly_positive(*system) for system in zip(matrix, right, strict=True)]) * factor

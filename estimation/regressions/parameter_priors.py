@@ -8,26 +8,17 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import solve_triangular
 
-from estimation.linear_algebra.scaled import lengths
+from estimation.linear_algebra.scaled import LEAST_RIDGE, lengths
 from robots.base_parameters import BaseParameters
 from robots.terms import Column
 from robots.terms.rigid_body import SYMBOLS
 
 Array = NDArray[np.float64]
 
-# A link may be wrong by its own size: its mass, its mass times its reach, its mass times its reach squared.
-SMALLEST_LINK = 0.05
-SMALLEST_REACH = 0.3
 # Friction, rotor and offset of a joint may make so many times its torque: descriptions rarely state them.
-OWN = 3.0
-# The same of friction beyond Coulomb and viscous friction: its parts are alike where rows at low speed do not count.
-BENT = 0.2
+OWN_TORQUE_RATIO = 3.0
 # A column below this RMS does not act.
-SILENT = 1e-9
-# Standard deviations from which a contradiction weakens the description's prior, and iterations of that weakening.
-CONFLICT_SIGMAS, CONFLICT_ROUNDS = 2.0, 20
-# Keeps the precision finite where a description has links of no size.
-FAINT = 1e-12
+SILENT_COLUMN = 1e-9
 
 
 @dataclass(frozen=True)
@@ -77,26 +68,28 @@ def prior_from_description(base: BaseParameters, bodies: Array, torque: Array, l
             spread[i] = links[joint, SYMBOLS.index(column.symbol)]
         elif i in own:
             # A column that never acts is held at its description by any spread.
-            spread[i] = usual_share(column) * torque[joint] / (level[own[i]] if level[own[i]] > SILENT else 1.0)
+            spread[i] = usual_share(column) * torque[joint] / (level[own[i]] if level[own[i]] > SILENT_COLUMN else 1.0)
     return prior_of_spreads(base, spread, model.nominal)
 
 
 def usual_share(column: Column) -> float:
     """Gives the torque that friction, rotor or offset of a joint may make, over that of the joint."""
-    return BENT if column.friction and column.symbol not in ("f1", "f2") else OWN
+    # The parts of friction beyond Coulomb and viscous friction are alike where rows at low speed do not count.
+    return 0.2 if column.friction and column.symbol not in ("f1", "f2") else OWN_TORQUE_RATIO
 
 
 def prior_of_spreads(base: BaseParameters, spread: Array, target: Array) -> GaussianPrior:
     """Builds a prior of base parameters from spreads (p,) of the standard parameters about a target (p,)."""
     covariance = (base.grouping * spread**2) @ base.grouping.T
     scale = lengths(covariance)
-    normalised = covariance / scale[:, None] / scale + FAINT * np.eye(len(scale))
+    # A description may have links of no size.
+    normalised = covariance / scale[:, None] / scale + LEAST_RIDGE * np.eye(len(scale))
     precision = np.linalg.inv(normalised) / scale[:, None] / scale
     return GaussianPrior(precision, base.from_standard(target))
 
 
 def inflate_conflicting_prior(
-    pull: GaussianPrior, gram: Array, cross: Array, strength: float = 1.0, sigmas: float = CONFLICT_SIGMAS
+    pull: GaussianPrior, gram: Array, cross: Array, strength: float = 1.0, sigmas: float = 2.0
 ) -> GaussianPrior:
     """Weakens the prior where the data contradict it: errors by a missing rotor or tool may exceed a parameter's size.
 
@@ -121,7 +114,7 @@ def inflate_conflicting_prior(
     information = np.maximum(information, 0.0)
     aim = ways.T @ inverse @ (cross - gram @ pull.target)
     weights = np.ones(len(information))
-    for _ in range(CONFLICT_ROUNDS):
+    for _ in range(20):
         off = aim / (information + strength * weights)
         weights = 1.0 / np.maximum(1.0, (off / sigmas) ** 2)
     turned = root @ ways
@@ -138,9 +131,10 @@ def link_spreads(inertia: Array) -> Array:
     Returns:
         (n, 10), positive.
     """
-    mass = np.maximum(inertia[:, 0], SMALLEST_LINK * inertia[:, 0].max())
+    # A link may be wrong by its own size: its mass, its mass times its reach, its mass times its reach squared.
+    mass = np.maximum(inertia[:, 0], 0.05 * inertia[:, 0].max())
     second = np.maximum(inertia[:, [4, 7, 9]].sum(axis=1) / 2, 0.0) / mass
-    reach = np.sqrt(np.maximum(second, (SMALLEST_REACH**2) * second.max()))
+    reach = np.sqrt(np.maximum(second, (0.3**2) * second.max()))
     return np.asarray(mass[:, None] * reach[:, None] ** np.array([0, 1, 1, 1, 2, 2, 2, 2, 2, 2]))
 
 

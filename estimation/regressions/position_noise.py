@@ -13,15 +13,7 @@ from estimation.regressions.moments import Array
 from estimation.regressions.regression_data import RegressionData
 
 # Differences of this order leave nothing of a motion that is sampled well, and of white noise a known multiple.
-ORDER = 4
-GAIN = 70.0  # sum of the squared binomial coefficients of order 4
-# Steps of time that differ by no more than this share of them count as even; a log with fewer even windows than this is
-# put on a grid first.
-EVEN, ENOUGH = 0.02, 0.1
-# The share of squares that counts, and what their mean is of all of a normal variable's.
-TRIMMED, TRIMMED_SHARE = 0.95, 0.7588
-# Noise is drawn on so many rows at most, in so many columns.
-MOST_ROWS, COLUMNS = 20_000, 8
+DIFFERENCE_ORDER = 4
 
 
 def white_position_noise(t: Array, q: Array) -> Array:
@@ -34,15 +26,19 @@ def white_position_noise(t: Array, q: Array) -> Array:
         t: times (N,) [s].
         q: positions (N, n).
     """
-    if len(t) <= ORDER:
+    if len(t) <= DIFFERENCE_ORDER:
         return np.zeros(q.shape[1])
-    steps = np.lib.stride_tricks.sliding_window_view(np.diff(t), ORDER)
-    even = np.ptp(steps, axis=1) <= EVEN * np.median(steps)
-    if even.mean() < ENOUGH:
+    steps = np.lib.stride_tricks.sliding_window_view(np.diff(t), DIFFERENCE_ORDER)
+    # Steps of time that differ by no more than 2 % count as even; a log with fewer than 10 % even windows is put on a
+    # grid first.
+    even = np.ptp(steps, axis=1) <= 0.02 * np.median(steps)
+    if even.mean() < 0.1:
         return white_position_noise(*_on_grid(t, q))
-    squares = np.sort(np.diff(q, n=ORDER, axis=0)[even] ** 2, axis=0)
-    kept = squares[: max(1, round(TRIMMED * len(squares)))]
-    return np.asarray(np.sqrt(kept.mean(axis=0) / (TRIMMED_SHARE * GAIN)))
+    squares = np.sort(np.diff(q, n=DIFFERENCE_ORDER, axis=0)[even] ** 2, axis=0)
+    kept = squares[: max(1, round(0.95 * len(squares)))]
+    # Without its largest 5 %, the mean square of a normal variable is 0.7588 of the whole; the squared binomial
+    # coefficients of order 4 sum to 70.
+    return np.asarray(np.sqrt(kept.mean(axis=0) / (0.7588 * 70.0)))
 
 
 def _on_grid(t: Array, q: Array) -> tuple[Array, Array]:
@@ -60,8 +56,8 @@ def passed_noise(smoother: Smoother, positions: Resampled, seed: int = 0) -> Arr
         positions: whose times count; their values don't.
         seed: of the noise.
     """
-    rows = min(len(positions.t), MOST_ROWS)
-    noise = np.random.default_rng(seed).standard_normal((rows, COLUMNS))
+    rows = min(len(positions.t), 20_000)
+    noise = np.random.default_rng(seed).standard_normal((rows, 8))
     t = positions.t[:rows]
     motion = smoother.smooth(replace(positions, t=t, q=noise, original=t))
     edge = smoother.edge(motion.duration)

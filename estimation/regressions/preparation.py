@@ -20,16 +20,14 @@ from robots.signals import Log, Motion
 Array = NDArray[np.float64]
 
 # Below this share of a joint's RMS speed its friction is not known to have a sign: those rows are left out of its fit.
-SLOW = 0.008
-# A joint with less RMS speed than this [rad/s or m/s] stands: what is left is rounding, not to be taken for motion.
-STANDING = 1e-9
-# One whose range in a log is below this share of its range elsewhere stands there, but for a tremble by some steps of
-# its encoder.
-TREMBLE = 3e-4
+SIGN_SPEED_SHARE = 0.008
+# A joint whose range in a log is below this share of its range elsewhere is at rest there, but for a tremble by some
+# steps of its encoder.
+TREMBLE_SHARE = 3e-4
 # A longer log is smoothed piece by piece, so that its intermediate signals never stand in memory together. Pieces
 # overlap by so many periods of the cut-off: the filter has forgotten their ends by then, to a part in 10^7.
-PIECE = 200_000
-OVERLAP = 4.0
+SMOOTHED_ROWS = 200_000
+OVERLAP_PERIODS = 4.0
 
 
 @dataclass(frozen=True)
@@ -116,10 +114,10 @@ class Prepared:
         """Smooths the log as `rows` does, a long one in pieces that follow each other."""
         smoother = _smoother(by)
         count = len(self.log)
-        if count <= PIECE or not isinstance(smoother, LowPass):
+        if count <= SMOOTHED_ROWS or not isinstance(smoother, LowPass):
             return [self.rows(smoother)]
-        bounds = np.linspace(0, count, -(-count // PIECE) + 1).astype(int)
-        margin = round(OVERLAP / (smoother.cutoff * self.positions.period))
+        bounds = np.linspace(0, count, -(-count // SMOOTHED_ROWS) + 1).astype(int)
+        margin = round(OVERLAP_PERIODS / (smoother.cutoff * self.positions.period))
         edge = smoother.edge(self.log.duration)
         t = self.log.t
 
@@ -173,10 +171,12 @@ class Prepared:
         """
         none = np.zeros(len(speed), dtype=bool)
         still, held, silent = (none if joints is None else joints for joints in (self.still, self.held, self.silent))
-        moves = (speed >= STANDING) & ~still
+        # A joint with less RMS speed than this [rad/s or m/s] stands: what is left is rounding, not to be taken for
+        # motion.
+        moves = (speed >= 1e-9) & ~still
         if not moves.all():
             motion = Motion(motion.t, motion.q, motion.dq * moves, motion.ddq * moves)
-        fast = np.abs(motion.dq) >= SLOW * speed
+        fast = np.abs(motion.dq) >= SIGN_SPEED_SHARE * speed
         first = int(np.searchsorted(self.log.t, motion.t[0]))
         logged = slice(first, first + len(motion))
         rest = rows_at_rest(self.log.t[logged], self.log.q[logged], speed) & moves | held
@@ -229,7 +229,7 @@ def still_joints(positions: Sequence[Array], travel: Array | float = 0.0) -> NDA
         travel: their ranges (n,) in logs besides.
     """
     ranges = np.array([np.ptp(q, axis=0) for q in positions])
-    still: NDArray[np.bool_] = ranges < TREMBLE * np.maximum(ranges.max(axis=0), travel)
+    still: NDArray[np.bool_] = ranges < TREMBLE_SHARE * np.maximum(ranges.max(axis=0), travel)
     return still
 
 

@@ -14,12 +14,11 @@ from numpy.typing import NDArray
 from estimation.preprocessing.base import Smoother
 from estimation.regressions.moments import Moments
 from robots.base_parameters import BaseParameters
+from robots.common.stretches import chunks
 from robots.robot import Robot
 from robots.signals import Log, Motion
 
 Array = NDArray[np.float64]
-
-CHUNK = 4096
 
 
 class FittedRows(Protocol):
@@ -75,16 +74,15 @@ class RegressionData:
         """The robot."""
         return self.base.model.robot
 
-    def chunks(self, size: int = CHUNK) -> Iterator[Chunk]:
+    def chunks(self) -> Iterator[Chunk]:
         """Goes through the rows of all parts, in order, without ever holding the whole regressor."""
         for part in self.parts:
-            yield from self.chunks_of(part, size)
+            yield from self.chunks_of(part)
 
-    def chunks_of(self, part: FittedRows, size: int = CHUNK) -> Iterator[Chunk]:
+    def chunks_of(self, part: FittedRows) -> Iterator[Chunk]:
         """Goes through the rows of one part."""
         motion = part.motion
-        for start in range(0, len(motion), size):
-            rows = slice(start, start + size)
+        for rows in chunks(len(motion)):
             Y = self.base.regressor(motion.q[rows], motion.dq[rows], motion.ddq[rows], gravity=part.gravity)
             yield Chunk(Y, part.tau[rows], part.mask[rows])
 

@@ -12,25 +12,15 @@ from estimation.regressions.moments import Moments
 from estimation.regressions.regression_data import RegressionData
 from robots.base_parameters import BaseParameters
 from robots.consistency import inertial_from_pseudo, pseudo_inertia
-from robots.geometry.inertia import SIZE
+from robots.geometry.inertia import BODY_PARAMETERS
 from robots.geometry.usual_arms import usual_body
 from robots.regressor import TorqueModel
 from robots.robot import Robot
 
 Array = NDArray[np.float64]
 
-# Eigenvalues of a described pseudo-inertia below this share of its trace are lifted: thin rods and point masses, and
-# files that breach the triangle inequality, would pull towards bodies that cannot exist.
-THIN = 0.02
-GRAVITY = 9.81
-# A column whose share of those that span it cancels to this part of their squares does not act.
-SPANNED = 1e-12
-# Placeholders: all links of a description that together weigh less than this share of what the torques suggest, and a
-# link below this share of the heaviest one.
-PLACEHOLDERS, PLACEHOLDER = 0.1, 1e-3
 # Speeds, as shares of the largest, at which friction must not drive the joint, and from which on it must not fall.
 SPEEDS = np.linspace(0.0, 1.0, 13)
-RISING = 0.5
 
 
 @dataclass(frozen=True)
@@ -81,14 +71,15 @@ def column_levels(base: BaseParameters, moments: Moments) -> Array:
         joint, part = column.joint - 1, base.grouping[:, k]
         square = float(part @ moments.gram[joint] @ part)
         largest = float((part**2) @ np.diag(moments.gram[joint]))
-        levels[k] = np.sqrt(square / max(moments.count[joint], 1)) if square > SPANNED * largest else 0.0
+        # A column whose share of those that span it cancels to this part of their squares does not act.
+        levels[k] = np.sqrt(square / max(moments.count[joint], 1)) if square > 1e-12 * largest else 0.0
     return levels
 
 
 def body_columns(model: TorqueModel) -> NDArray[np.intp]:
     """Finds each link's ten parameters among the model's columns (n, 10), (0, 10) where it has no rigid body."""
     found = [k for k, column in enumerate(model.columns) if column.term == "rigid_body"]
-    return np.array(found, dtype=np.intp).reshape(-1, SIZE)
+    return np.array(found, dtype=np.intp).reshape(-1, BODY_PARAMETERS)
 
 
 def reference_bodies(robot: Robot, mass: float) -> tuple[Array, NDArray[np.bool_]]:
@@ -108,10 +99,12 @@ def reference_bodies(robot: Robot, mass: float) -> tuple[Array, NDArray[np.bool_
     ends = [joint.translation for joint in joints[1:]] + [robot.chain.tip[:3, 3]]
     lengths = np.array([float(np.linalg.norm(end)) for end in ends])
     arm = max(float(lengths.sum()), float(np.linalg.norm(joints[0].translation)), 0.1)
-    bodies = np.empty((robot.n, SIZE))
+    bodies = np.empty((robot.n, BODY_PARAMETERS))
     described = np.isfinite(inertia).all(axis=1) & (inertia[:, 0] > 0)
     masses = np.where(described, inertia[:, 0], 0.0)
-    described &= (masses > PLACEHOLDER * masses.max()) & (masses.sum() > PLACEHOLDERS * mass)
+    # Placeholders: all links of a description that together weigh less than a tenth of what the torques suggest, and a
+    # link below a thousandth of the heaviest one.
+    described &= (masses > 1e-3 * masses.max()) & (masses.sum() > 0.1 * mass)
     for link in range(robot.n):
         if described[link]:
             bodies[link] = _corrected_body(inertia[link], 0.01 * arm)
@@ -140,7 +133,7 @@ def nonnegative_rows(model: TorqueModel, speed: Array) -> Array:
     ]
     rows = [np.eye(model.size)[single]]
     curves = np.array([model.friction_at(share * speed) for share in SPEEDS])
-    rises = np.diff(curves, axis=0)[SPEEDS[:-1] >= RISING]
+    rises = np.diff(curves, axis=0)[SPEEDS[:-1] >= 0.5]
     for joint in range(1, model.robot.n + 1):
         own = np.array([column.friction and column.joint == joint for column in model.columns])
         if own.sum() > 2:
@@ -184,8 +177,11 @@ def _corrected_body(body: Array, shortest: float) -> Array:
     length = max(float(np.sqrt(max(np.trace(pseudo[:3, :3]), 0.0))), shortest)
     unit = np.array([length] * 3 + [1.0])
     values, vectors = np.linalg.eigh(pseudo / unit[:, None] / unit)
-    lifted = (vectors * np.maximum(values, THIN)) @ vectors.T
-    lifted[3, 3] = max(lifted[3, 3], THIN)
+    # Eigenvalues of a described pseudo-inertia below this share of its trace are lifted: thin rods and point masses,
+    # and files that breach the triangle inequality, would pull towards bodies that cannot exist.
+    thin = 0.02
+    lifted = (vectors * np.maximum(values, thin)) @ vectors.T
+    lifted[3, 3] = max(lifted[3, 3], thin)
     return inertial_from_pseudo(mass * lifted * unit[:, None] * unit)
 
 
@@ -194,7 +190,7 @@ def mass_from_torque(robot: Robot, torque: float) -> float:
     chain = robot.chain
     reach = sum(float(np.linalg.norm(joint.translation)) for joint in chain.joints[1:])
     reach = max(reach + float(np.linalg.norm(chain.tip[:3, 3])), 0.1)
-    return max(3.0 * torque / (GRAVITY * reach), np.finfo(float).tiny ** 0.5)
+    return max(3.0 * torque / (9.81 * reach), np.finfo(float).tiny ** 0.5)
 
 
 def _largest_torque(data: RegressionData) -> float:

@@ -20,10 +20,6 @@ from robots.terms import RigidBody
 
 Array = NDArray[np.float64]
 
-# Rows from which torque constants are estimated, share of the described torque that must remain without friction, rows
-# that count as one independent row, and the share to which a constant must be known.
-MOST, SHOWN, CORRELATED, PRECISE = 20_000, 0.02, 50.0, 0.2
-
 
 def as_joint_torque(robot: Robot, log: Log, meaning: str | None = None, *, estimate: bool = True) -> Log:
     """Converts a log whose torque columns mean something else.
@@ -172,19 +168,20 @@ def _estimated_constants(robot: Robot, logs: Sequence[tuple[Log, Array]]) -> Arr
     factor = np.divide(cross, square, out=np.zeros(robot.n), where=square > 0)
     for x, y, _ in parts:
         left += np.sum((y - factor * x) ** 2, axis=0)
-    shown = (square > SHOWN**2 * spread) & (cross != 0)
-    error = np.sqrt(
-        np.divide(left / np.maximum(rows, 1) * CORRELATED, square, out=np.full(robot.n, np.inf), where=shown)
-    )
+    # A fiftieth of the described torque must remain without friction.
+    shown = (square > 0.02**2 * spread) & (cross != 0)
+    # Fifty correlated rows count as one independent row.
+    error = np.sqrt(np.divide(left / np.maximum(rows, 1) * 50.0, square, out=np.full(robot.n, np.inf), where=shown))
     with np.errstate(divide="ignore"):
-        return np.where(shown & (error < PRECISE * np.abs(factor)), 1.0 / factor, np.nan)
+        return np.where(shown & (error < 0.2 * np.abs(factor)), 1.0 / factor, np.nan)
 
 
 def _own_part(robot: Robot, log: Log, current: Array) -> tuple[Array, Array, Array]:
     """Described torque and current without what friction and offset explain (N, n), and the torque's variance (n,)."""
     grid = resample(log.t, log.q)
     motion = smooth(grid, LowPass(min(6.0, 0.2 / float(np.median(np.diff(log.t))))))
-    kept = slice(None, None, max(1, len(motion) // MOST))
+    # Torque constants are estimated from so many rows.
+    kept = slice(None, None, max(1, len(motion) // 20_000))
     q, dq, ddq = motion.q[kept], motion.dq[kept], motion.ddq[kept]
     i = np.column_stack([np.interp(motion.t[kept], log.t, values) for values in current.T])
     rigid = _described(robot, log, "current")(q, dq, ddq) + np.asarray(robot.rotor_inertia) * ddq

@@ -11,10 +11,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from estimation.identifications.identification import identify
-from estimation.linear_algebra.scaled import solve_ridge
+from estimation.linear_algebra.scaled import LEAST_RIDGE, solve_ridge
 from estimation.logs.known_setup import HEAT, require_plain
 from estimation.models.model import Model
-from estimation.thermal.information import FAINT, inverse_of
+from estimation.thermal.information import inverse_of
 from estimation.thermal.results.campaign_estimate import CampaignEstimate
 from estimation.thermal.results.estimate import ThermalEstimate, searched_parameters, with_errors
 from estimation.thermal.runs.condensed import Condensed, JointSums, condense
@@ -32,7 +32,7 @@ from robots.signals import Log
 Array = NDArray[np.float64]
 
 # The fits of rigid body and heat take turns until no friction changes by more than this share.
-SETTLED, MOST_ROUNDS = 1e-4, 12
+SETTLED_FRICTION_CHANGE, MOST_ALTERNATIONS = 1e-4, 12
 
 
 @one_blas_thread()
@@ -81,7 +81,7 @@ def fit_campaign(
         raise InputError("no logs", allowed="one or more")
     require_plain(data, HEAT)
     bar = progress or SILENT
-    bar.start("fitting rigid body, friction and heat", float(MOST_ROUNDS + 2))
+    bar.start("fitting rigid body, friction and heat", float(MOST_ALTERNATIONS + 2))
     try:
         begin = identify(robot, data, seed=seed).model if model is None else model
         bar.update(1.0, "condensing")
@@ -112,8 +112,8 @@ class _AlternatingFit:
         self._solve_linear()
         without = self._residuals()
         fits: list[ThermalEstimate | None] = [None] * len(self.moves)
-        rounds, whole, changes = 0, float(MOST_ROUNDS), list[float]()
-        for rounds in range(1, MOST_ROUNDS + 1):
+        rounds, whole, changes = 0, float(MOST_ALTERNATIONS), list[float]()
+        for rounds in range(1, MOST_ALTERNATIONS + 1):
             starts = 3 if rounds == 1 else 1
             advance = partial(_advance, bar, rounds, max(whole, rounds))
             found = self._fit_all({**options, "starts": starts, "bounds": False}, advance)
@@ -123,12 +123,12 @@ class _AlternatingFit:
                 fits[j], self.factors[j] = fit, factor
             self._solve_linear()
             changes.append(change)
-            whole = expected_rounds(changes, SETTLED, MOST_ROUNDS)
-            if change < SETTLED:
+            whole = expected_rounds(changes, SETTLED_FRICTION_CHANGE, MOST_ALTERNATIONS)
+            if change < SETTLED_FRICTION_CHANGE:
                 break
         notes = (
             []
-            if change < SETTLED
+            if change < SETTLED_FRICTION_CHANGE
             else [f"The alternating fit stopped before it converged (last relative change {change:.1e})."]
         )
         for j, (fit, _) in self._fit_all({**options, "starts": 1}).items():
@@ -185,7 +185,7 @@ class _AlternatingFit:
                 part, right = sums.scaled(factor)
                 gram[np.ix_(sums.used, sums.used)] += weight * part
                 cross[sums.used] += weight * right
-            self.values = solve_ridge(gram, cross, FAINT)
+            self.values = solve_ridge(gram, cross, LEAST_RIDGE)
             self.weights = 1.0 / np.maximum(self._residuals(), 1e-9) ** 2
 
     def _residuals(self) -> Array:
@@ -293,7 +293,7 @@ class _AlternatingFit:
 
 
 def _advance(bar: Progress, rounds: int, whole: float, share: float) -> None:
-    bar.update(2.0 + MOST_ROUNDS * (rounds - 1 + share) / whole, f"round {rounds}")
+    bar.update(2.0 + MOST_ALTERNATIONS * (rounds - 1 + share) / whole, f"round {rounds}")
 
 
 def expected_rounds(changes: Sequence[float], settled: float, most: int) -> float:

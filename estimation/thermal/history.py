@@ -36,7 +36,7 @@ def start_temperatures(
         InputError: logs of another robot, that state a payload or gravity, overlap each other or go on past `until`.
     """
     state: list[Array | None] = [None] * model.model.robot.n
-    cutoff, now = float(model.model.provenance.get("cutoff_hz", 10.0)), None
+    cutoff, now = model.model.cutoff, None
     require_plain(before, HEAT)
     for log in sorted(before, key=lambda log: float(log.t[0])):
         motion = smooth(resample(log.t, log.q), cutoff)

@@ -5,14 +5,9 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from estimation.linear_algebra.scaled import solve_ridge
+from estimation.linear_algebra.scaled import LEAST_RIDGE, solve_ridge
 
 Array = NDArray[np.float64]
-
-# Least regularisation that keeps the inverse finite.
-FAINT = 1e-12
-# Information below which a parameter acts on no torque; its variance would overflow.
-SILENT = 1e-280
 
 
 def inverse_of(information: Array) -> Array:
@@ -24,8 +19,9 @@ def inverse_of(information: Array) -> Array:
     Returns:
         The covariance (p, p). A parameter about which the logs say nothing has an infinite variance.
     """
-    known = np.diag(information) > SILENT
+    # Information below which a parameter acts on no torque; its variance would overflow.
+    known = np.diag(information) > 1e-280
     inverse = np.diag(np.where(known, 0.0, np.inf))
     inside = np.ix_(known, known)
-    inverse[inside] = solve_ridge(information[inside], np.eye(int(known.sum())), FAINT)
+    inverse[inside] = solve_ridge(information[inside], np.eye(int(known.sum())), LEAST_RIDGE)
     return inverse

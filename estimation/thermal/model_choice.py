@@ -21,8 +21,6 @@ from robots.thermal import THERMAL_MODELS, ThermalModel
 Array = NDArray[np.float64]
 
 HELD_OUT = ("runs", "end")
-# A larger model must bring the held-out error down by this share to be preferred.
-WORTH = 0.03
 
 
 def choose_thermal(
@@ -105,7 +103,8 @@ def choose_thermal(
         assert trouble is not None
         raise trouble
     least = min(item.held_out for item in usable)
-    close = [item for item in usable if item.held_out <= (1.0 + WORTH) * least]
+    # A larger model must bring the held-out error down by this share to be preferred.
+    close = [item for item in usable if item.held_out <= 1.03 * least]
     best = min(close, key=lambda item: item.estimate.free if item.estimate else 0)
     return ThermalChoice(candidates=tuple(found), best=best.order, held_out=how)
 

@@ -120,10 +120,6 @@ def thermal_from_dict(model: Model, data: Mapping[str, Any]) -> ThermalTorqueMod
     return ThermalTorqueModel(model=model, thermal=joints)
 
 
-# Of so many rows the 95 % quantile is known to a percent.
-ROWS = 100_000
-
-
 def error_band(model: ThermalTorqueModel, condensed: Condensed, factors: Sequence[Array]) -> list[float]:
     """Measures the 95 % quantile of the torque's error on rows of all logs.
 
@@ -137,8 +133,9 @@ def error_band(model: ThermalTorqueModel, condensed: Condensed, factors: Sequenc
     Returns:
         Half-widths (n,) [N m or N].
     """
-    cutoff = float(model.model.provenance.get("cutoff_hz", 10.0))
-    stride = max(1, sum(len(log) for log in condensed.logs) // ROWS)
+    cutoff = model.model.cutoff
+    # Of so many rows the 95 % quantile is known to a percent.
+    stride = max(1, sum(len(log) for log in condensed.logs) // 100_000)
     errors = []
     for k, log in enumerate(condensed.logs):
         motion, tau = smooth(resample(log.t, log.q), cutoff), torque_of(model.model.robot, log)

@@ -13,7 +13,7 @@ from estimation.uncertainty.correlations import lagged_products
 
 Array = NDArray[np.float64]
 
-HIGHEST_ORDER = 40
+HIGHEST_NOISE_ORDER = 40
 
 
 @dataclass(frozen=True)
@@ -50,7 +50,7 @@ def whitened(series: Array, coefficients: Array) -> Array:
     return np.asarray(lfilter(taps(coefficients), [1.0], series, axis=0))
 
 
-def autocovariance(series: Array, counts: Array | float, lags: int = HIGHEST_ORDER) -> Array:
+def autocovariance(series: Array, counts: Array | float, lags: int = HIGHEST_NOISE_ORDER) -> Array:
     """Divides sums of products at lags 0..`lags` by numbers of rows.
 
     Args:

@@ -8,12 +8,14 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from robots.common.stretches import chunks
+
 Array = NDArray[np.float64]
 
-# Groups whose columns are held twice at a time.
-CHUNK = 2048
+# Rows are averaged over so much time [s], which leaves out the noise above 25 Hz.
+AVERAGING_TIME = 0.02
 # The deviations within groups are a small part, and every so many pieces of the rows are enough to estimate it.
-EVERY = 4
+DEVIATION_STRIDE = 4
 
 
 @dataclass(frozen=True, eq=False)
@@ -79,7 +81,7 @@ class Averages:
         looked = 0
         for piece, begin in enumerate(range(0, groups, step)):
             end = min(begin + step, groups)
-            inside = piece % EVERY == 0
+            inside = piece % DEVIATION_STRIDE == 0
             looked += (end - begin) * inside
             if sums is not None and totals and not inside:
                 for total, part in zip(totals, sums(begin * size, end * size, size), strict=True):
@@ -110,8 +112,7 @@ class Averages:
 
     def chunks(self) -> Iterator[slice]:
         """Cuts the groups into pieces."""
-        for start in range(0, self.rows, CHUNK):
-            yield slice(start, min(start + CHUNK, self.rows))
+        return chunks(self.rows)
 
     def lost(self, weights: Array, size: int) -> Array:
         """What the deviations within the groups add to the sandwich's meat (p, p).

@@ -11,9 +11,6 @@ from estimation.uncertainty.sandwich import at_least
 
 Array = NDArray[np.float64]
 
-BLOCKS = 30
-"""Blocks of equal length over all logs; their own scatter is known to an eighth."""
-
 
 def block_numbers(rows: int, count: int) -> NDArray[np.intp]:
     """Numbers rows (N,) by consecutive blocks of about equal size, from 0 to ``count - 1``."""
@@ -68,7 +65,8 @@ def widened_by_blocks(covariance: Array, matrix: Array, residual: Array) -> Arra
     Returns:
         The covariance (p, p), with the same correlations.
     """
-    edges = np.linspace(0, len(matrix), BLOCKS + 1).astype(int)
+    # The scatter of thirty blocks of equal length over all logs is known to an eighth.
+    edges = np.linspace(0, len(matrix), 31).astype(int)
     scores = np.array([residual[a:b] @ matrix[a:b] for a, b in pairwise(edges)])
     return at_least(covariance, clustered_errors(scores @ covariance) ** 2)
 

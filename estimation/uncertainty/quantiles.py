@@ -16,9 +16,9 @@ CHI2_95 = NORMAL_95**2
 """What chi-square of one degree of freedom exceeds with a probability of 5 %: 3.84."""
 NORMAL_MEDIAN = float(ndtri(0.75))
 """Median of the absolute value of a standard normal variable: 0.6745. Its square is the median of chi-square."""
-TAIL = 0.025
+TAIL_95 = 0.025
 """Probability on either side of a 95 % interval."""
-BAND = 0.95
+BAND_SHARE = 0.95
 """Share of the errors that a band is to hold."""
 
 
@@ -45,7 +45,7 @@ def chi2_limit(alpha: float, degrees: int = 1, tests: int = 1) -> float:
 
 def student_95(freedom: int) -> float:
     """Half-width of a two-sided 95 % interval of Student's t, in standard errors."""
-    return float(stdtrit(freedom, 1.0 - TAIL))
+    return float(stdtrit(freedom, 1.0 - TAIL_95))
 
 
 def robust_deviation(values: ArrayLike, axis: int | None = 0) -> Array:
@@ -59,11 +59,11 @@ def robust_deviation(values: ArrayLike, axis: int | None = 0) -> Array:
 
 
 def band_of(errors: Array) -> Array:
-    """Gives the half-widths (n,) that hold `BAND` of each joint's known absolute errors (N, n); NaN where none is."""
+    """Gives the half-widths (n,) that hold 95 % of each joint's known absolute errors (N, n); NaN where none is."""
     if not np.isnan(errors).any():
-        return np.asarray(np.quantile(errors, BAND, axis=0))
+        return np.asarray(np.quantile(errors, BAND_SHARE, axis=0))
     known = [column[~np.isnan(column)] for column in errors.T]
-    return np.array([np.quantile(column, BAND) if len(column) else np.nan for column in known])
+    return np.array([np.quantile(column, BAND_SHARE) if len(column) else np.nan for column in known])
 
 
 def share_interval(hits: int, tries: int) -> tuple[float, float]:
@@ -71,8 +71,8 @@ def share_interval(hits: int, tries: int) -> tuple[float, float]:
 
     Source: Clopper and Pearson 1934.
     """
-    lower = 0.0 if hits == 0 else float(betaincinv(hits, tries - hits + 1, TAIL))
-    return lower, 1.0 if hits == tries else float(betaincinv(hits + 1, tries - hits, 1.0 - TAIL))
+    lower = 0.0 if hits == 0 else float(betaincinv(hits, tries - hits + 1, TAIL_95))
+    return lower, 1.0 if hits == tries else float(betaincinv(hits + 1, tries - hits, 1.0 - TAIL_95))
 
 
 def count_interval(count: int) -> tuple[float, float]:
@@ -80,8 +80,8 @@ def count_interval(count: int) -> tuple[float, float]:
 
     Source: Garwood 1936.
     """
-    lower = float(chdtri(2 * count, 1.0 - TAIL)) / 2.0 if count else 0.0
-    return lower, float(chdtri(2 * count + 2, TAIL)) / 2.0
+    lower = float(chdtri(2 * count, 1.0 - TAIL_95)) / 2.0 if count else 0.0
+    return lower, float(chdtri(2 * count + 2, TAIL_95)) / 2.0
 
 
 def median_interval(values: Sequence[float]) -> tuple[float, float] | None:
@@ -92,5 +92,5 @@ def median_interval(values: Sequence[float]) -> tuple[float, float] | None:
     Source: David and Nagaraja, Order Statistics, 2003, section 7.1.
     """
     n = len(values)
-    below = int(np.count_nonzero(bdtr(np.arange(n), n, 0.5) <= TAIL)) if n else 0
+    below = int(np.count_nonzero(bdtr(np.arange(n), n, 0.5) <= TAIL_95)) if n else 0
     return (values[below - 1], values[n - below]) if below > 0 else None

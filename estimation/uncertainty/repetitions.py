@@ -15,14 +15,7 @@ from estimation.uncertainty.sandwich import Part, at_least, covariance
 Array = NDArray[np.float64]
 
 # Fewer rows a repetition do not show a noise's colour.
-LEAST_ROWS = 100
-# Smoothing takes the ends of a log of two periods.
-LEAST_PERIODS = 1.5
-# Steps of time that differ by more than this share make no uniform grid.
-UNEVEN = 0.5
-# Two logs play one motion if their positions differ by less than this share of each joint's standard deviation, over
-# this share of the shorter one. Half a sample of delay makes a fiftieth in a fast motion.
-ALIKE, OVERLAP = 0.05, 0.5
+FEWEST_REPEATED_ROWS = 100
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,7 +51,8 @@ class Played:
         """Period of the rows [s]; None where they are on no uniform grid."""
         steps = np.diff(self.t)
         step = float(np.median(steps)) if len(steps) else 0.0
-        return step if step > 0 and float(np.ptp(steps)) <= UNEVEN * step else None
+        # Steps of time that differ by more than this share make no uniform grid.
+        return step if step > 0 and float(np.ptp(steps)) <= 0.5 * step else None
 
 
 class Place(NamedTuple):
@@ -100,7 +94,8 @@ def _rows(log: Played) -> int:
     if log.period is None or log.step is None:
         return whole
     rows = round(log.period / log.step)
-    return rows if rows >= LEAST_ROWS and whole >= LEAST_PERIODS * rows else whole
+    # Smoothing takes the ends of a log of two periods.
+    return rows if rows >= FEWEST_REPEATED_ROWS and whole >= 1.5 * rows else whole
 
 
 def _places(leader: Played, log: Played, number: int, first: int, rows: int) -> list[Place]:
@@ -115,7 +110,8 @@ def _places(leader: Played, log: Played, number: int, first: int, rows: int) -> 
 
 def _shift(one: Played, other: Played) -> int | None:
     """The rows by which the motion of another log comes before that of the first; None if it is not the same."""
-    least = max(LEAST_ROWS, int(OVERLAP * min(len(one.q), len(other.q))))
+    # Logs of one motion have half of the shorter log in common.
+    least = max(FEWEST_REPEATED_ROWS, int(0.5 * min(len(one.q), len(other.q))))
     if not one.is_like(other) or min(len(one.q), len(other.q)) < least:
         return None
     spread = one.q.std(axis=0)
@@ -125,7 +121,9 @@ def _shift(one: Played, other: Played) -> int | None:
     shift = int(shifts[squared_differences(a, b, shifts).sum(axis=1).argmin()])
     begin, end = max(shift, 0), min(len(a), len(b) + shift)
     miss = np.sqrt(np.mean((a[begin:end] - b[begin - shift : end - shift]) ** 2, axis=0))
-    return shift if float(miss.max()) < ALIKE else None
+    # Two logs play one motion if their positions differ by less than 5 % of each joint's standard deviation. Half a
+    # sample of delay makes 2 % in a fast motion.
+    return shift if float(miss.max()) < 0.05 else None
 
 
 def folded(parts: Sequence[Part], rows: int, places: Sequence[Place]) -> Part:

@@ -10,20 +10,16 @@ from numpy.typing import NDArray
 from scipy.signal import lfilter
 
 from estimation.linear_algebra.scaled import lengths
-from estimation.uncertainty.autoregressive import HIGHEST_ORDER, Noise, autocovariance, fit_noise, taps
+from estimation.uncertainty.autoregressive import HIGHEST_NOISE_ORDER, Noise, autocovariance, fit_noise, taps
 from estimation.uncertainty.averages import Averages
+from robots.common.stretches import chunks
 
 Array = NDArray[np.float64]
 
-# Rows whose regressor is held at a time.
-CHUNK = 4096
 # Above so many rows the fit absorbs too little of the noise to matter.
 MOST_CORRECTED = 30_000
-DRAWS, ROUNDS = 8, 2
 # So many times Akaike's order: standard errors hang on the noise's density at rest, where that order stops short.
-ORDERS = 2
-# Fewer batches than this say too little of a standard error.
-LEAST_BATCHES = 100
+NOISE_ORDER_FACTOR = 2
 
 
 @dataclass(frozen=True)
@@ -60,8 +56,7 @@ class Part:
 
     def chunks(self) -> Iterator[slice]:
         """Cuts the rows into pieces."""
-        for start in range(0, self.rows, CHUNK):
-            yield slice(start, min(start + CHUNK, self.rows))
+        return chunks(self.rows)
 
 
 def covariance(
@@ -92,10 +87,10 @@ def covariance(
     lost = np.zeros_like(inverse)
     if long and averaged > 1:
         whole = [part for part in parts if part.rows >= averaged]
-        averages = [Averages.of(part.columns, part.mask, part.residual, averaged, CHUNK, part.sums) for part in whole]
+        averages = [Averages.of(part.columns, part.mask, part.residual, averaged, 4096, part.sums) for part in whole]
         lost = sum((part.lost(weights, len(inverse)) for part in averages), start=lost)
         seen = averages
-    plain = noise = _noise(seen, np.zeros((len(weights), HIGHEST_ORDER + 1)))
+    plain = noise = _noise(seen, np.zeros((len(weights), HIGHEST_NOISE_ORDER + 1)))
     if share == 1 and not long:
         noise = _corrected(parts, weights, inverse, plain, np.random.default_rng(seed))
     model, robust = ((meat + lost) / share for meat in _meats(seen, weights, noise, len(inverse)))
@@ -159,7 +154,8 @@ def batch_factors(scores: Array, inverse: Array, model: Array) -> Array:
     """
     batches = len(scores)
     ones = np.ones(scores.shape[1])
-    if batches < LEAST_BATCHES:
+    # Fewer batches than this say too little of a standard error.
+    if batches < 100:
         return ones
     by_batches = np.sqrt(np.einsum("pq,qr,pr->p", inverse, scores.T @ scores, inverse, optimize=True))
     by_model = np.sqrt(np.maximum(np.diag(model), np.finfo(float).tiny))
@@ -172,11 +168,11 @@ def _noise(parts: Sequence[Part | Averages], correction: Array) -> Noise:
     counts = sum(part.mask.sum(axis=0) for part in parts)
     residual = np.concatenate([part.residual for part in parts])
     own = np.stack([autocovariance(residual[:, j], counts[j]) for j in range(residual.shape[1])])
-    return fit_noise(residual, counts, own + correction, ORDERS)
+    return fit_noise(residual, counts, own + correction, NOISE_ORDER_FACTOR)
 
 
 def _corrected(parts: Sequence[Part], weights: Array, inverse: Array, noise: Noise, rng: np.random.Generator) -> Noise:
-    for _ in range(ROUNDS):
+    for _ in range(2):
         noise = _noise(parts, _lost(parts, weights, inverse, noise, rng))
     return noise
 
@@ -185,26 +181,27 @@ def _lost(parts: Sequence[Part], weights: Array, inverse: Array, noise: Noise, r
     """Autocovariance (n, lags + 1) that a fit takes out of noise of this model, by simulation."""
     joints = len(weights)
     counts = sum(part.mask.sum(axis=0) for part in parts)
-    drawn = [np.stack([noise.simulated(part.rows, rng) for _ in range(DRAWS)], axis=2) for part in parts]
-    cross = np.zeros((len(inverse), DRAWS))
+    draws_per_row = 8
+    drawn = [np.stack([noise.simulated(part.rows, rng) for _ in range(draws_per_row)], axis=2) for part in parts]
+    cross = np.zeros((len(inverse), draws_per_row))
     for part, draws in zip(parts, drawn, strict=True):
         for rows in part.chunks():
             Y = part.regressor(rows.start, rows.stop)
             weighted = draws[rows] * (part.mask[rows] * weights * part.repeats)[:, :, None]
-            cross += Y.reshape(-1, Y.shape[2]).T @ weighted.reshape(-1, DRAWS)
+            cross += Y.reshape(-1, Y.shape[2]).T @ weighted.reshape(-1, draws_per_row)
     fitted = inverse @ cross
-    lost = np.zeros((joints, HIGHEST_ORDER + 1))
+    lost = np.zeros((joints, HIGHEST_NOISE_ORDER + 1))
     for part, draws in zip(parts, drawn, strict=True):
         left = np.empty_like(draws)
         for rows in part.chunks():
             Y = part.regressor(rows.start, rows.stop)
-            left[rows] = draws[rows] - (Y.reshape(-1, Y.shape[2]) @ fitted).reshape(-1, joints, DRAWS)
+            left[rows] = draws[rows] - (Y.reshape(-1, Y.shape[2]) @ fitted).reshape(-1, joints, draws_per_row)
         for j in range(joints):
             mask = part.mask[:, j]
-            for k in range(DRAWS):
+            for k in range(draws_per_row):
                 before = autocovariance(draws[:, j, k] * mask, counts[j])
                 lost[j] += before - autocovariance(left[:, j, k] * mask, counts[j])
-    return lost / DRAWS
+    return lost / draws_per_row
 
 
 def _meats(parts: Sequence[Part | Averages], weights: Array, noise: Noise, size: int) -> tuple[Array, Array]:

@@ -16,7 +16,7 @@ from robots.common.files import existing_file
 from robots.common.records import Record
 from robots.common.tables.table_files import read_table
 
-FORMAT, CASE_FORMAT, VERSION = "oed-benchmark", "oed-benchmark-case", 1
+FORMAT, CASE_FORMAT, BENCHMARK_VERSION = "oed-benchmark", "oed-benchmark-case", 1
 MANIFEST, CASE, LOG, UNSEEN = "benchmark.json", "case.json", "log.csv", "unseen.csv"
 
 Array = NDArray[np.float64]
@@ -150,9 +150,12 @@ def read_json(file: Path, form: str, what: str) -> dict[str, Any]:
     if not isinstance(data, dict) or data.get("format") != form:
         found = data.get("format") if isinstance(data, dict) else type(data).__name__
         raise InputError(f"is not {what}: found the format {found!r}", file=file, column="format", allowed=form)
-    if data.get("format_version") != VERSION:
+    if data.get("format_version") != BENCHMARK_VERSION:
         raise InputError(
-            f"found version {data.get('format_version')!r}", file=file, column="format_version", allowed=str(VERSION)
+            f"found version {data.get('format_version')!r}",
+            file=file,
+            column="format_version",
+            allowed=str(BENCHMARK_VERSION),
         )
     return data
 

@@ -16,7 +16,7 @@ from typing import Any, BinaryIO
 import numpy as np
 from numpy.typing import NDArray
 
-from oed.benchmarks.folders import VERSION, Benchmark
+from oed.benchmarks.folders import BENCHMARK_VERSION, Benchmark
 from robots.common.errors import InputError
 from robots.common.files import existing_file
 
@@ -76,7 +76,7 @@ def seal(stream: BinaryIO, identity: str, cases: Mapping[str, tuple[dict[str, An
     with zipfile.ZipFile(content, "w", zipfile.ZIP_DEFLATED) as archive:
         data = {
             "format": SEALED_FORMAT,
-            "format_version": VERSION,
+            "format_version": BENCHMARK_VERSION,
             "benchmark": identity,
             "salt": secrets.token_hex(32),
             "cases": {name: truth for name, (truth, _) in cases.items()},

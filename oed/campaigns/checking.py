@@ -17,9 +17,6 @@ from robots.signals import Motion
 
 Array = NDArray[np.float64]
 
-COULOMB_SCALE = 1e-3
-"""Speed below which Coulomb friction fades [rad/s], as in the virtual robot."""
-
 
 class TorqueCheck:
     """Joint torques by a robot's own description.
@@ -36,7 +33,8 @@ class TorqueCheck:
         if not 0.0 <= margin < 1.0:
             raise InputError(f"a torque margin of {margin}", allowed="0 to below 1")
         self.margin, self._limit = margin, np.asarray(robot.limits.torque)
-        model = default_model(robot, velocity_scale=COULOMB_SCALE)
+        # Speed below which Coulomb friction fades [rad/s], as in the virtual robot.
+        model = default_model(robot, velocity_scale=1e-3)
         known = bool(model.described and np.isfinite(self._limit).any())
         self._model: TorqueModel | None = model if known else None
 

@@ -15,21 +15,6 @@ from robots.signals import Motion
 
 Array = NDArray[np.float64]
 
-CLEARANCE = 0.01
-"""Distance that sampled poses keep [m]; motions are then proved free at all times."""
-
-SAMPLES, ENOUGH = 8192, 4096
-"""Poses drawn in a box, a power of two to be even, and the number below which new ones are drawn."""
-
-TRIM = 0.025
-"""Part of the way from the end of a range to home by which it is trimmed at least."""
-
-MOST_CUTS = 200
-"""More cuts than this leave hardly any room."""
-
-STRETCH_STEPS = 181
-"""Positions of a joint at which a stretch is looked at."""
-
 
 class CollisionFreeRanges:
     """Finds room for motions of one robot.
@@ -40,7 +25,7 @@ class CollisionFreeRanges:
         clearance: that sampled poses keep [m].
     """
 
-    def __init__(self, model: CollisionModel, home: Array, clearance: float = CLEARANCE) -> None:
+    def __init__(self, model: CollisionModel, home: Array, clearance: float = 0.01) -> None:
         self._model, self._home = model, np.asarray(home, dtype=np.float64)
         own = float(model.clearance(self._home).min(initial=np.inf))
         self.possible = bool(model.pairs) and own > 0.0
@@ -72,14 +57,17 @@ class CollisionFreeRanges:
         """
         lower, upper = self._ranges(limits, fraction)
         rng = np.random.default_rng(seed)
-        grid = np.linspace(0.0, 1.0, round(1.0 / TRIM) + 1)[1:-1]
+        # Part of the way from the end of a range to home by which it is trimmed at least.
+        grid = np.linspace(0.0, 1.0, round(1.0 / 0.025) + 1)[1:-1]
         q, hits = self._draw(lower, upper, rng)
-        for _ in range(MOST_CUTS):
+        # More cuts than this leave hardly any room.
+        for _ in range(200):
             if not hits.any():
                 break
             inside = self._trimmed(q, hits, lower, upper, grid)
             q, hits = q[inside], hits[inside]
-            if len(q) < ENOUGH or not hits.any():
+            # New poses are drawn when fewer than half are left.
+            if len(q) < 4096 or not hits.any():
                 q, hits = self._draw(lower, upper, rng)
         return replace(limits, lower=lower, upper=upper)
 
@@ -90,7 +78,8 @@ class CollisionFreeRanges:
         return np.minimum(middle - half, self._home), np.maximum(middle + half, self._home)
 
     def _draw(self, lower: Array, upper: Array, rng: np.random.Generator) -> tuple[Array, NDArray[np.bool_]]:
-        unit = qmc.Sobol(lower.size, rng=rng).random(SAMPLES)
+        # A power of two, to be even.
+        unit = qmc.Sobol(lower.size, rng=rng).random(8192)
         # A third of the samples on each side's face: corners are where folded arms meet themselves.
         edge = rng.random(unit.shape)
         unit = np.where(edge < 1 / 6, 0.0, np.where(edge > 5 / 6, 1.0, unit))
@@ -134,8 +123,10 @@ class CollisionFreeRanges:
             The ends of the longest free stretch; of no length at the pose where nothing is free.
         """
         lower, upper = self._ranges(limits, 1.0)
-        positions = np.linspace(lower[joint - 1], upper[joint - 1], STRETCH_STEPS)
-        poses = np.tile(pose, (STRETCH_STEPS, 1))
+        # Positions of a joint at which a stretch is looked at.
+        steps = 181
+        positions = np.linspace(lower[joint - 1], upper[joint - 1], steps)
+        poses = np.tile(pose, (steps, 1))
         poses[:, joint - 1] = positions
         edges = np.flatnonzero(np.diff(np.concatenate([[0], self.clear(poses).astype(int), [0]])))
         if not edges.size:

@@ -16,7 +16,7 @@ from robots.thermal import friction_power as power_of
 
 Array = NDArray[np.float64]
 
-BIN = 5.0
+POWER_BIN = 5.0
 """Time over which the friction power is averaged [s]: short against the fastest time constant, some two minutes."""
 
 
@@ -46,7 +46,7 @@ def binned_power(robot: Robot, stage: Stage) -> tuple[Array, Array]:
         The lengths of the bins, (B,) [s], and the mean power in each, (B, n) [W]; their products sum to the heat.
     """
     power = friction_power(robot, stage.motion.dq)
-    bins = max(1, round(stage.duration / BIN))
+    bins = max(1, round(stage.duration / POWER_BIN))
     edges = np.linspace(0, len(power), bins + 1).astype(np.int64)
     counts = np.diff(edges)
     return counts * robot.period, np.add.reduceat(power, edges[:-1], axis=0) / counts[:, None]
@@ -102,7 +102,7 @@ def expected_temperatures(
         if slot.stage is not None:
             lengths, power = binned[slot.stage]
         else:
-            bins = max(1, round(slot.duration / BIN))
+            bins = max(1, round(slot.duration / POWER_BIN))
             lengths, power = np.full(bins, slot.duration / bins), np.zeros((bins, robot.n))
         steps.append(lengths)
         powers.append(power)

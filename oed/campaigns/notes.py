@@ -6,13 +6,10 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from oed.campaigns.planning import ALIGNED, Planner
+from oed.campaigns.planning import VERTICAL_ANGLE, Planner
 from oed.campaigns.stages import Stage
 from oed.experiments.safety_checks.freedom import collides, freedom_text
 from robots.thermal import KnownThermal
-
-SHOWN_REDUCTION = 0.99
-"""Part of what was asked below which a joint's warm-up range counts as narrowed."""
 
 
 def campaign_notes(stages: Sequence[Stage], planner: Planner, known: KnownThermal | None) -> tuple[str, ...]:
@@ -51,7 +48,8 @@ def _notes(stage: Stage, planner: Planner) -> Iterator[str]:
                 f"{margin.joint}; {100 * torque.margin:g} % are required."
             )
     asked = stage.details.get("range", 0.0)
-    narrow = [j for j, part in enumerate(stage.details.get("ranges", []), start=1) if part < SHOWN_REDUCTION * asked]
+    # A warm-up range counts as narrowed below 99 % of what was asked.
+    narrow = [j for j, part in enumerate(stage.details.get("ranges", []), start=1) if part < 0.99 * asked]
     if narrow:
         parts = ", ".join(f"{100 * stage.details['ranges'][j - 1]:.0f} %" for j in narrow)
         yield (
@@ -65,7 +63,7 @@ def _notes(stage: Stage, planner: Planner) -> Iterator[str]:
             f"left out."
         )
     angles = stage.details.get("angle_to_no_gravity_deg", [])
-    loaded = [joint for joint, angle in enumerate(angles, start=1) if angle > np.rad2deg(ALIGNED)]
+    loaded = [joint for joint, angle in enumerate(angles, start=1) if angle > np.rad2deg(VERTICAL_ANGLE)]
     if loaded:
         yield (
             f"The arm has no pose in which joint {_listed(loaded)} is free of gravity torque. Separate gravity from "

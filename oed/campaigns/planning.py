@@ -37,7 +37,7 @@ Array = NDArray[np.float64]
 SOFTER = (1.0, 0.85, 0.7, 0.5, 0.35, 0.2)
 """Shares of the acceleration and jerk limits that are tried in turn to keep the torque limits; speed is not reduced."""
 
-ALIGNED = np.deg2rad(1.0)
+VERTICAL_ANGLE = np.deg2rad(1.0)
 """Angle to the vertical up to which an axis counts as vertical."""
 
 

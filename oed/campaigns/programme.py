@@ -11,7 +11,7 @@ from robots.common.errors import InputError
 from robots.common.options import Option
 from robots.common.records import Record
 
-LONGEST = 7 * 24 * 3600.0
+LONGEST_CAMPAIGN = 7 * 24 * 3600.0
 """A campaign beyond a week is taken for a slip of the pen [s]."""
 
 
@@ -95,8 +95,10 @@ class Programme(Record):
                 f"a warm-up of {self.warm_up:g} s does not fit into a cycle of {self.cycle_time:g} s",
                 remedy="shorten the warm-up, or lengthen the cycle",
             )
-        if self.duration > LONGEST:
-            raise InputError(f"the campaign lasts {self.duration / 3600:.0f} h", allowed=f"{LONGEST / 3600:.0f} h")
+        if self.duration > LONGEST_CAMPAIGN:
+            raise InputError(
+                f"the campaign lasts {self.duration / 3600:.0f} h", allowed=f"{LONGEST_CAMPAIGN / 3600:.0f} h"
+            )
 
     @property
     def runs(self) -> int:

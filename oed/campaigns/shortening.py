@@ -10,15 +10,6 @@ from robots.common.errors import InfeasibleError
 LEAST_PLATEAU = 0.3
 """Time at each speed below which the warm-up gives way instead [s]: 75 samples at 4 ms to average over."""
 
-LEAST_WARM_UP = 0.5
-"""Share of the warm-up that must be left."""
-
-FILL = 10.0
-"""Time left over in a cycle that the warm-up takes on [s]; beyond it the robot rests."""
-
-STEPS = 10
-"""Of the bisection for the time at each speed: to a millisecond."""
-
 
 def fit_stages(planner: Planner, programme: Programme, excitation: Stage | None) -> tuple[list[Stage], tuple[str, ...]]:
     """Plans friction and warm-up stages that fit into the cycle.
@@ -57,7 +48,8 @@ def fit_stages(planner: Planner, programme: Programme, excitation: Stage | None)
     if len(longest.motion) > budget:
         low, high = min(LEAST_PLATEAU, programme.plateau), programme.plateau
         chosen = friction(low)
-        for _ in range(STEPS if len(chosen.motion) <= budget else 0):
+        # Bisection for the time at each speed: to a millisecond.
+        for _ in range(10 if len(chosen.motion) <= budget else 0):
             middle = (low + high) / 2.0
             stage = friction(middle)
             if len(stage.motion) <= budget:
@@ -74,7 +66,8 @@ def fit_stages(planner: Planner, programme: Programme, excitation: Stage | None)
     if left < 0:
         needed = (cycle - left) * period
         warm_up_time += left
-        if warm_up_time * period < LEAST_WARM_UP * programme.warm_up:
+        # Share of the warm-up that must be left.
+        if warm_up_time * period < 0.5 * programme.warm_up:
             reason = (
                 f"excitation takes {excitation.duration:.1f} s and friction {chosen.duration:.1f} s, which leaves "
                 f"{max(warm_up_time, 0) * period:.1f} s for the warm-up of {programme.warm_up:g} s"
@@ -83,7 +76,8 @@ def fit_stages(planner: Planner, programme: Programme, excitation: Stage | None)
         notes.append(
             f"The warm-up was shortened from {programme.warm_up:g} s to {warm_up_time * period:.1f} s as well."
         )
-    if 0 < left * period <= FILL:
+    # Time left over in a cycle that the warm-up takes on [s]; beyond it the robot rests.
+    if 0 < left * period <= 10.0:
         warm_up_time += left
     if warm_up_time != round(programme.warm_up / period):
         warm_ups = planner.warm_up(warm_up_time * period, programme.duties, programme.warm_up_range)

@@ -19,11 +19,9 @@ from robots.robot import Robot
 
 Array = NDArray[np.float64]
 
-SAMPLES = 4000  # poses from which the tool's nearest approach to its box is sought
-STARTS = 6
-HELD = 0.95  # of the usable torque that a start pose may take
-ROOM = 0.1  # around a start pose, in the scale of the limits, mostly [m]
-REACHED = 1e-5  # of the box's distance, below which the tool is within it [m]
+DRAWN_POSES = 4000  # poses from which the tool's nearest approach to its box is sought
+SEARCH_STARTS = 6
+BOX_TOLERANCE = 1e-5  # of the box's distance, below which the tool is within it [m]
 
 
 def check_feasible(robot: Robot, limits: GeometricLimits, home: ArrayLike) -> None:
@@ -55,7 +53,7 @@ def check_feasible(robot: Robot, limits: GeometricLimits, home: ArrayLike) -> No
     values = limits.linearise(q)[0][0]
     # Smooth clearances are a little small; whether bodies overlap was judged by the exact ones.
     others = [row for row, (name, limit) in enumerate(_labelled(limits)) if not isinstance(limit, CollisionLimit)]
-    wrong = [row for row in others if values[row] < -REACHED]
+    wrong = [row for row in others if values[row] < -BOX_TOLERANCE]
     if wrong:
         row = min(wrong, key=lambda index: values[index])
         unit = f" {limits.units[row]}" if limits.units[row] else ""
@@ -144,7 +142,7 @@ def nearest_feasible(limits: GeometricLimits, home: ArrayLike, *, seed: int = 0,
         return float((x - q) @ (x - q)), 2.0 * (x - q)
 
     rows: Any = {"type": "ineq", "fun": values, "jac": lambda x: np.array(function(x)[1])}
-    for attempt in range(STARTS):
+    for attempt in range(SEARCH_STARTS):
         start = np.clip(q + random.normal(scale=0.2 * attempt, size=robot.n), lower, upper)
         result = minimize(
             distance,
@@ -156,7 +154,7 @@ def nearest_feasible(limits: GeometricLimits, home: ArrayLike, *, seed: int = 0,
             options={"maxiter": 60},
         )
         pose = np.clip(result.x, lower, upper)
-        if np.isfinite(pose).all() and values(pose).min(initial=np.inf) >= -REACHED:
+        if np.isfinite(pose).all() and values(pose).min(initial=np.inf) >= -BOX_TOLERANCE:
             return np.asarray(pose)
     return roomy_pose(limits, q, seed=seed)
 
@@ -173,17 +171,19 @@ def roomy_pose(
         seed: of the poses that are tried.
 
     Returns:
-        Of the poses (n,) with `ROOM` to every bound, or nearly the most that any has, the one nearest to `home`; None
-        where no pose was found that keeps all limits.
+        Of the poses (n,) with a tenth of the limits' scale to every bound, or nearly the most that any has, the one
+        nearest to `home`; None where no pose was found that keeps all limits.
     """
-    q = random_poses(limits.robot.limits, SAMPLES, seed)
+    q = random_poses(limits.robot.limits, DRAWN_POSES, seed)
     still = np.zeros_like(q)
     if torque is not None:
-        q = q[(np.abs(torque.values(q, still, still)) <= HELD).all(axis=1)]
+        # A start pose takes at most 95 % of the usable torque.
+        q = q[(np.abs(torque.values(q, still, still)) <= 0.95).all(axis=1)]
     room = limits.values(q, q, q).min(axis=1, initial=np.inf)
     if room.max(initial=-np.inf) < 0.0:
         return None
-    enough = np.flatnonzero(room >= min(ROOM, 0.8 * room.max()))
+    # Around a start pose there should be a tenth of the limits' scale, mostly [m].
+    enough = np.flatnonzero(room >= min(0.1, 0.8 * room.max()))
     return np.round(q[enough[np.linalg.norm(q[enough] - home, axis=1).argmin()]], 3)
 
 
@@ -201,7 +201,7 @@ def tool_approach(robot: Robot, box: ToolBox, *, seed: int = 0) -> tuple[float, 
     lower, upper = robot.limits.lower, robot.limits.upper
     span = np.where(np.isfinite(upper - lower), upper - lower, 2.0 * np.pi)
     low = np.where(np.isfinite(lower), lower, np.where(np.isfinite(upper), upper - span, -np.pi))
-    q = low + span * np.random.default_rng(seed).uniform(0.001, 0.999, (SAMPLES, robot.n))
+    q = low + span * np.random.default_rng(seed).uniform(0.001, 0.999, (DRAWN_POSES, robot.n))
     distances = np.linalg.norm(_beyond(robot, box, q), axis=1)
     best = q[int(distances.argmin())]
 
@@ -209,7 +209,7 @@ def tool_approach(robot: Robot, box: ToolBox, *, seed: int = 0) -> tuple[float, 
         return _beyond(robot, box, x[None])[0]
 
     if distances.min() > 0.0:
-        for start in q[np.argsort(distances)[:STARTS]]:
+        for start in q[np.argsort(distances)[:SEARCH_STARTS]]:
             slope = partial(_slope, robot, box)
             result = least_squares(beyond, start, slope, (low, low + span))
             if np.linalg.norm(_beyond(robot, box, result.x[None])) < np.linalg.norm(_beyond(robot, box, best[None])):
@@ -241,7 +241,7 @@ def _slope(robot: Robot, box: ToolBox, q: Array) -> Array:
 
 def _check_box(robot: Robot, box: ToolBox) -> None:
     distance, place = tool_approach(robot, box)
-    if distance <= REACHED:
+    if distance <= BOX_TOLERANCE:
         return
     wider = []
     for axis, x, low, high in zip("xyz", place, box.lower, box.upper, strict=True):

@@ -12,7 +12,7 @@ from robots.collision import Frames, reach
 from robots.common.errors import InputError
 from robots.robot import Robot
 
-SINGULAR = 1e-4  # e, which keeps the inverse finite in a singular pose
+SINGULARITY_FLOOR = 1e-4  # e, which keeps the inverse finite in a singular pose
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -53,8 +53,8 @@ class SingularityLimit(GeometricLimit):
         jacobian = flange_jacobian(frames, length)
         wide = jacobian.shape[0] <= jacobian.shape[1]
         square = casadi.mtimes(jacobian, jacobian.T) if wide else casadi.mtimes(jacobian.T, jacobian)
-        inverse = _inverse(square + SINGULAR**2 * casadi.SX.eye(square.shape[0]))
-        value = casadi.sumsqr(inverse) ** -0.25 - SINGULAR - self.smallest
+        inverse = _inverse(square + SINGULARITY_FLOOR**2 * casadi.SX.eye(square.shape[0]))
+        value = casadi.sumsqr(inverse) ** -0.25 - SINGULARITY_FLOOR - self.smallest
         return value, casadi.jacobian(value, frames.q)
 
 

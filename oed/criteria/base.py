@@ -9,9 +9,6 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 
-# Below this share of the largest eigenvalue the smallest ones are rounding errors: the motion excites too little.
-FLOOR = 1e-15
-
 
 class Criterion(ABC):
     """A number that says how well a motion determines the parameters.
@@ -59,7 +56,8 @@ class Criterion(ABC):
 
 def floored(eigenvalues: Array) -> Array:
     """Lifts eigenvalues that rounding made zero or negative."""
-    return np.maximum(eigenvalues, FLOOR * max(float(eigenvalues[-1]), np.finfo(float).tiny))
+    # Below this share of the largest eigenvalue the smallest ones are rounding errors: the motion excites too little.
+    return np.maximum(eigenvalues, 1e-15 * max(float(eigenvalues[-1]), np.finfo(float).tiny))
 
 
 def soft_maximum(values: Array, sharpness: float) -> tuple[float, Array]:

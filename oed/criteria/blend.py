@@ -9,9 +9,6 @@ import numpy as np
 from oed.criteria.base import Array, Criterion
 from robots.common.errors import InputError
 
-EXACT = 1e13
-"""Sharpness at which a stand-in is the criterion to a part in 1e12."""
-
 
 class Blend(Criterion):
     """sum_i w_i log c_i, to be minimised: each criterion as the logarithm of a standard error, or of a ratio of two.
@@ -40,7 +37,8 @@ class Blend(Criterion):
 
     def value(self, eigenvalues: Array) -> float:
         """Gives the weighted sum of logarithms."""
-        return self.surrogate(eigenvalues, EXACT)[0]
+        # Sharpness at which a stand-in is the criterion to a part in 1e12.
+        return self.surrogate(eigenvalues, 1e13)[0]
 
     def surrogate(self, eigenvalues: Array, sharpness: float) -> tuple[float, Array]:
         """Adds the stand-ins up."""

@@ -13,8 +13,6 @@ from robots.common.errors import InputError
 Array = NDArray[np.float64]
 
 SCALINGS = ("none", "nominal", "unit")
-# A nominal value below this share of the largest one of its unit says nothing about the size to expect.
-SMALL = 0.01
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -146,7 +144,8 @@ def nominal_scale(base: BaseParameters) -> Array:
     size = np.abs(base.from_standard(nominal))
     kinds = [(column.unit, column.term) for column in base.columns]
     largest = {kind: max(s for s, k in zip(size, kinds, strict=True) if k == kind) for kind in set(kinds)}
-    floor = np.array([SMALL * largest[kind] if largest[kind] > 0 else 1.0 for kind in kinds])
+    # A nominal value below this share of the largest one of its unit says nothing about the size to expect.
+    floor = np.array([0.01 * largest[kind] if largest[kind] > 0 else 1.0 for kind in kinds])
     return np.maximum(size, floor)
 
 

@@ -14,8 +14,6 @@ from robots.common.files import ResultFolder, write_atomic
 
 ROBOT = "er3a"
 FILES = ("robot.yaml", "poses.csv", "held_out.csv")
-POSES, OTHERS = 40, 20
-NOISE = 5e-5  # m
 ERRORS = {
     **{"zero_2": 0.0042, "zero_3": -0.0031, "zero_5": 0.0058},
     **{"link_2_y": 0.0007, "link_3_x": -0.0009, "link_3_rx": 0.0008, "link_4_z": 0.0006},
@@ -53,9 +51,9 @@ def write_calibration_example(folder: str | PathLike[str], *, force: bool = Fals
     setup["tracker"] = type(setup["tracker"])(kind="pose", value=tracker)
     with ResultFolder(folder, force, names=FILES) as out:
         write_atomic(out.path("robot.yaml"), (files("robots.catalog") / f"{ROBOT}.yaml").read_bytes())
-        for name, count, seed in (("poses.csv", POSES, 1), ("held_out.csv", OTHERS, 2)):
+        for name, count, seed in (("poses.csv", 40, 1), ("held_out.csv", 20, 2)):
             q = random_positions(robot, count, seed=seed)
-            poses = simulate_poses(robot, q, measurement, ERRORS, setup=setup, noise={"m": NOISE}, seed=seed)
+            poses = simulate_poses(robot, q, measurement, ERRORS, setup=setup, noise={"m": 5e-5}, seed=seed)
             write_table(out.path(name), poses_to_columns(poses), {"robot": ROBOT})
     return tuple(Path(folder) / name for name in FILES)
 

@@ -14,11 +14,6 @@ from robots.limits import Limits
 
 Array = NDArray[np.float64]
 
-# The jerk of a move jumps between the file's samples. A quintic through their positions, velocities and accelerations,
-# as a controller may interpolate them, makes up to 1.75 times the jerk of it, and 0.024 jerk periods more acceleration.
-QUINTIC_JERK = 1.75
-QUINTIC_ACCELERATION = 0.024
-
 
 def assemble(
     excitation: Trajectory,
@@ -94,8 +89,11 @@ def _ends(segment: Segment) -> tuple[Array, Array]:
 
 def limits_between_samples(limits: Limits, period: float) -> Limits:
     """Lowers jerk and acceleration so that the moves keep the limits between the samples, too."""
-    jerk = np.minimum(limits.jerk / QUINTIC_JERK, limits.acceleration / period)
-    return replace(limits, jerk=jerk, acceleration=limits.acceleration - QUINTIC_ACCELERATION * jerk * period)
+    # The jerk of a move jumps between the file's samples. A quintic through their positions, velocities and
+    # accelerations, as a controller may interpolate them, makes up to 1.75 times the jerk of it, and 0.024 jerk periods
+    # more acceleration.
+    jerk = np.minimum(limits.jerk / 1.75, limits.acceleration / period)
+    return replace(limits, jerk=jerk, acceleration=limits.acceleration - 0.024 * jerk * period)
 
 
 def _move(kind: str, limits: Limits, start: Array, end: Array, period: float) -> list[Segment]:

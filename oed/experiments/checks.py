@@ -12,11 +12,6 @@ from robots.limits import Limits
 from robots.loading import catalogue
 from robots.robot import Robot
 
-# The controller interpolates between the file's samples; a hair of every limit is left to it.
-RESERVE = 0.9995
-FIRST_SPEED = 0.5
-"""Share of the velocity limits that motions use by default on a robot that is not of the catalogue."""
-
 # The share of its range that a joint must be able to travel in one period for an experiment to be worth its name.
 TRAVEL = 0.01
 
@@ -64,7 +59,8 @@ def velocity_share(robot: Robot, stated: float | None) -> float:
         InputError: a share out of range.
     """
     if stated is None:
-        return 1.0 if robot.origin in catalogue() else FIRST_SPEED
+        # Share of the velocity limits that motions use by default on a robot that is not of the catalogue.
+        return 1.0 if robot.origin in catalogue() else 0.5
     if not 0.0 < stated <= 1.0:
         raise InputError(f"the velocity fraction is {stated}", allowed="above 0, up to 1")
     return stated
@@ -77,9 +73,9 @@ def usable_limits(limits: Limits, velocity_fraction: float = 1.0) -> Limits:
         InfeasibleError: a limit of zero.
         InputError: a joint without a velocity limit.
     """
-    scaled = finite_limits(limits).scaled(
-        velocity=RESERVE * velocity_fraction, acceleration=RESERVE, jerk=RESERVE, torque=1.0
-    )
+    # The controller interpolates between the file's samples; a hair of every limit is left to it.
+    used = 0.9995
+    scaled = finite_limits(limits).scaled(velocity=used * velocity_fraction, acceleration=used, jerk=used, torque=1.0)
     ranges = limits.upper - limits.lower
-    narrower = np.where(np.isfinite(ranges), ranges, 0.0) * (1 - RESERVE) / 2
+    narrower = np.where(np.isfinite(ranges), ranges, 0.0) * (1 - used) / 2
     return replace(scaled, lower=scaled.lower + narrower, upper=scaled.upper - narrower)

@@ -40,9 +40,6 @@ from robots.terms.situations.flange_body import carrying, payload_part
 
 Array = NDArray[np.float64]
 
-# Per period and per wave of it: samples of the regressor, and of the limits.
-SAMPLES_PER_WAVE, LIMIT_SAMPLES_PER_WAVE = 20, 50
-
 
 @one_blas_thread()
 def design(
@@ -99,13 +96,14 @@ def design(
     weighting = choose_weighting(base, chosen, weighed.scaling, weighed.noise, weighed.after, weighed.task, samples)
     safety = choose_safety(known, base, rest_pose(bounds, plan.home), kept, movable=plan.home is None)
     waves = (family.size + 1) // 2
+    # Per period and per wave of it: 20 samples of the regressor, and 50 of the limits.
     problem = FourierProblem(
         base=base,
         criterion=chosen,
         limits=bounds,
         family=family,
-        samples=max(FourierProblem.samples, SAMPLES_PER_WAVE * waves),
-        limit_samples=max(FourierProblem.limit_samples, LIMIT_SAMPLES_PER_WAVE * waves),
+        samples=max(FourierProblem.samples, 20 * waves),
+        limit_samples=max(FourierProblem.limit_samples, 50 * waves),
         pointwise=safety.pointwise,
         averaged=safety.averaged,
         home=safety.home,

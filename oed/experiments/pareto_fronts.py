@@ -27,7 +27,6 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 
 PARETO = "pareto.json"
-MOST_CRITERIA = 3
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -173,7 +172,7 @@ def pareto(
     """
     chosen = tuple(choose_criterion(name) for name in criteria)
     names = [part.name for part in chosen]
-    if not 2 <= len(chosen) <= MOST_CRITERIA or len(set(names)) < len(names):
+    if not 2 <= len(chosen) <= 3 or len(set(names)) < len(names):
         raise InputError(f"criteria {', '.join(names) or 'none'}", allowed="two or three different ones")
     if "i" in names:
         raise InputError(

@@ -19,7 +19,7 @@ from robots.regressor import TorqueModel, default_model
 from robots.robot import Robot
 from robots.signals import Motion
 
-NOISE = 0.02
+ASSUMED_NOISE = 0.02
 """Torque noise over the torque: what models of robots commonly leave."""
 
 _LABELS = {"fourier": "Fourier series", "sinusoid": "velocity strokes", "whole": "whole experiment"}
@@ -97,7 +97,7 @@ def design_model(robot: Robot, settings: Mapping[str, Any]) -> TorqueModel:
 def excitation_findings(quality: Quality) -> tuple[Finding, ...]:
     """Says whether a motion determines all parameters, and whether noise leaves one of them open.
 
-    With torque noise of `NOISE` of the torque, the standard error of the worst-determined direction is about
+    With torque noise of `ASSUMED_NOISE` of the torque, the standard error of the worst-determined direction is about
     NOISE cond(Y) / sqrt(N) of the parameters' size. Above 1 that direction is not determined.
 
     Args:
@@ -114,8 +114,8 @@ def excitation_findings(quality: Quality) -> tuple[Finding, ...]:
     error = _worst_error(cond, quality.samples)
     text = (
         f"At least one combination of parameters is not determined: cond(Y) is {significant(cond, digits=2)}. With "
-        f"torque noise of {100 * NOISE:g} %, its standard error is about {significant(error, digits=2)} times the "
-        "parameters' size."
+        f"torque noise of {100 * ASSUMED_NOISE:g} %, its standard error is about {significant(error, digits=2)} times "
+        "the parameters' size."
     )
     return (Finding(code=code, text=text, action=action),)
 
@@ -134,4 +134,4 @@ def excitation_code(cond: float | None, samples: int) -> str:
 
 def _worst_error(cond: float, samples: int) -> float:
     """Standard error of the worst-determined direction over the parameters' size, see `excitation_findings`."""
-    return NOISE * cond / math.sqrt(samples)
+    return ASSUMED_NOISE * cond / math.sqrt(samples)

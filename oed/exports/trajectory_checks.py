@@ -15,20 +15,11 @@ from robots.regressor import default_model
 from robots.robot import Robot
 from robots.signals import Motion
 
-REST = 1e-3
-"""Speed at both ends up to which the robot stands [rad/s or m/s]."""
-
 FREE = "No collision"
 """How the text under ``collisions`` begins, in a trajectory that is proved free of them."""
 
 UNKNOWN_COLLISIONS = "NOT CHECKED for collisions, as far as its file says."
 """What is said of a trajectory whose file does not state under ``collisions`` what was checked."""
-
-SHARE = 1e-6
-"""A limit may be exceeded by this share: trajectories touch their limits, and files round."""
-
-TORQUE_SHARE = 1e-2
-"""The same of the torque: a model's torques are known no better."""
 
 
 def stated_collisions(metadata: Mapping[str, Any]) -> tuple[str, bool]:
@@ -89,7 +80,8 @@ def check_trajectory(
     _check_limits(motion, robot, file)
     for row, where in ((0, "begins"), (-1, "ends")):
         joint = int(np.abs(motion.dq[row]).argmax())
-        if abs(motion.dq[row, joint]) > REST:
+        # Speed at both ends up to which the robot stands [rad/s or m/s].
+        if abs(motion.dq[row, joint]) > 1e-3:
             raise InputError(
                 f"the trajectory {where} with a speed of {motion.dq[row, joint]:.3g}",
                 file=file,
@@ -100,8 +92,10 @@ def check_trajectory(
 
 def _check_limits(motion: Motion, robot: Robot, file: str | PathLike[str] | None) -> None:
     limits = robot.limits
-    margins = [(margin, SHARE) for margin in limits.margins(motion) if margin.quantity != "jerk"]
-    margins += [(margin, TORQUE_SHARE) for margin in _torque_margins(motion, robot)]
+    # A limit may be exceeded by this share: trajectories touch their limits, and files round.
+    margins = [(margin, 1e-6) for margin in limits.margins(motion) if margin.quantity != "jerk"]
+    # A model's torques are known to 1 %.
+    margins += [(margin, 1e-2) for margin in _torque_margins(motion, robot)]
     for margin, share in margins:
         if margin.slack < -share * max(abs(margin.limit), 1.0):
             unit = limits.unit(margin.joint - 1, margin.quantity)

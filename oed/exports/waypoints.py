@@ -16,7 +16,7 @@ from robots.robot import Robot
 
 Array = NDArray[np.float64]
 
-ROUNDING = 1e-6
+POSITION_ROUNDING = 1e-6
 """What a file rounds [rad or m]."""
 
 
@@ -74,8 +74,8 @@ def shorter_way(robot: Robot, waypoints: ArrayLike) -> Array:
     q = np.array(waypoints, dtype=np.float64)
     if q.ndim != 2 or q.shape[1] != robot.n or not np.isfinite(q).all():
         return q  # Those that use them say what is wrong.
-    within = robot.endless & (np.ptp(q, axis=0) <= 2 * np.pi + ROUNDING)
-    jumps = (np.abs(np.diff(q, axis=0)) > np.pi + ROUNDING) & within
+    within = robot.endless & (np.ptp(q, axis=0) <= 2 * np.pi + POSITION_ROUNDING)
+    jumps = (np.abs(np.diff(q, axis=0)) > np.pi + POSITION_ROUNDING) & within
     joints = np.flatnonzero(jumps.any(axis=0))
     for joint in joints:
         q[:, joint] = np.unwrap(q[:, joint])
@@ -104,7 +104,7 @@ def _check_units(table: Table, robot: Robot) -> None:
 
 def _check_limits(q: Array, table: Table, robot: Robot) -> None:
     limits = robot.limits
-    outside = np.argwhere((q < limits.lower - ROUNDING) | (q > limits.upper + ROUNDING))
+    outside = np.argwhere((q < limits.lower - POSITION_ROUNDING) | (q > limits.upper + POSITION_ROUNDING))
     if outside.size:
         row, joint = (int(index) for index in outside[0])
         raise InputError(

@@ -14,10 +14,6 @@ from oed.retiming.timing_problem import TimingProblem
 
 Array = NDArray[np.float64]
 
-_GROWTH = 6.0
-_STEPS = 12
-_WEIGHTS = 6
-
 
 def shorten(problem: TimingProblem, coefficients: Array, *, first_weight: float = 1.0) -> Array:
     """Minimises the duration from a timing strictly within the limits.
@@ -36,8 +32,9 @@ def shorten(problem: TimingProblem, coefficients: Array, *, first_weight: float 
     c = coefficients
     duration = float((problem.width / np.sqrt(problem.squared_speed(c))).sum())
     weight = first_weight * problem.s.size / duration
-    for _ in range(_WEIGHTS):
-        for _ in range(_STEPS):
+    # Weights of the barrier, and Newton steps of each.
+    for _ in range(6):
+        for _ in range(12):
             gradient, band = _quadratic(problem, c, weight)
             band[2] *= 1.0 + 1e-12
             try:
@@ -52,7 +49,7 @@ def shorten(problem: TimingProblem, coefficients: Array, *, first_weight: float 
             # Below: the change would not be seen in the duration.
             if decrement < 1e-4 * weight * duration:
                 break
-        weight *= _GROWTH
+        weight *= 6.0
     return c
 
 

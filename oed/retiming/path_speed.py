@@ -28,8 +28,6 @@ Array = NDArray[np.float64]
 InverseDynamics = Callable[[Array, Array, Array], Array]
 Friction = Callable[[Array], Array]
 
-_FRICTION_ROUNDS = 8
-
 _GRIDS = ((1.0, 0.9), (1.0, 0.5), (1.5, 0.9), (2.0, 0.5), (0.7, 0.0))
 """Cells over those asked for, and how much denser the ends are. Seidel's method, with its absolute tolerances, calls a
 solvable linear programme infeasible now and then; on another grid it meets others."""
@@ -141,7 +139,7 @@ def _with_friction(piece: PathPiece, limits: Limits, torque: TorqueConstraint | 
     speed = _solve(path, constraints, grid, torque, limits)
     if torque.friction is None:
         return speed
-    for _ in range(_FRICTION_ROUNDS):
+    for _ in range(8):
         torque.speed = speed if torque.speed is None else (torque.speed + speed) / 2.0
         try:
             update = _solve(path, constraints, grid, torque, limits)

@@ -14,9 +14,6 @@ from robots.signals import Motion
 
 Array = NDArray[np.float64]
 
-STILL = 1e-9
-"""Weighted speed, as a fraction of the largest, and length, as a fraction of the whole, below which nothing moves."""
-
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class PathPiece:
@@ -62,7 +59,8 @@ def split_path(path: Motion | ArrayLike, velocity: Array, *, most_knots: int = 2
     lengths = np.linalg.norm(chords, axis=1)
     if lengths.sum() <= 1e-12:
         return []
-    kept = np.flatnonzero(np.concatenate([[True], lengths > STILL * lengths.sum()]))
+    # Weighted speed, as a fraction of the largest, and length, as a fraction of the whole, below which nothing moves.
+    kept = np.flatnonzero(np.concatenate([[True], lengths > 1e-9 * lengths.sum()]))
     kept = np.unique(np.concatenate([kept, _last_of_each_rest(kept, q.shape[0])]))
     points, stops = q[kept], np.zeros(kept.size, dtype=bool)
     if isinstance(path, Motion):

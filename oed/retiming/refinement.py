@@ -18,16 +18,8 @@ from robots.signals import Motion
 Array = NDArray[np.float64]
 Torque = Callable[[Motion], Array | None]
 
-CELLS_PER_INTERVAL = 3
-"""Controller periods to an interval of the speed's spline, about: a phase of jerk lasts many times as long."""
-
 ORDERS = {"velocity": 1.0, "acceleration": 2.0, "jerk": 3.0, "torque": 2.0}
 """The powers of speed with which quantities grow."""
-
-PASSED = 1.0005
-"""Use of a limit above which it is tightened; stretching corrects the rest."""
-
-_TIGHTENINGS = 4
 
 
 def refine(
@@ -67,11 +59,12 @@ def refine(
     if factor is None:
         return None
     points = max(int(np.ceil(length / (period * factor))), 6)
-    grid = SpeedGrid(length=length, intervals=max(points // CELLS_PER_INTERVAL, 2))
+    # Controller periods to an interval of the speed's spline, about: a phase of jerk lasts many times as long.
+    grid = SpeedGrid(length=length, intervals=max(points // 3, 2))
     problem = TimingProblem(curve, grid, points, limits, inverse_dynamics, friction)
     best, weight = np.full(grid.size, factor**2), 1.0
     result: Motion | None = None
-    for _ in range(1 + _TIGHTENINGS):
+    for _ in range(5):
         start = _interior(problem, best)
         if start is None:
             break
@@ -145,7 +138,8 @@ def _tighten(
         parts.append((np.abs(tau) / limits.torque)[:, problem.limited])
     excess = np.hstack(parts)
     share = np.ones_like(problem.allowed)
-    for row, column in np.argwhere(excess > PASSED):
+    # Use of a limit above which it is tightened; stretching corrects the rest.
+    for row, column in np.argwhere(excess > 1.0005):
         low, high = s[max(row - 1, 0)], s[min(row + 1, len(s) - 1)]
         near = slice(*np.searchsorted(problem.s, [low - problem.width, high + problem.width]))
         share[near, column] = np.minimum(share[near, column], 0.998 / excess[row, column])

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from robots.signals import Motion
 
-KEPT = 1.0 + 1e-6
+KEPT_LIMIT_USE = 1.0 + 1e-6
 """Use of a limit up to which it counts as kept: rounding."""
 
 
@@ -50,7 +50,7 @@ class Retimed:
     @property
     def given_keeps_limits(self) -> bool | None:
         """Whether the given timing keeps the same limits; None for waypoints without times."""
-        return None if self.usage_before is None else _peak(self.usage_before)[2] <= KEPT
+        return None if self.usage_before is None else _peak(self.usage_before)[2] <= KEPT_LIMIT_USE
 
     @property
     def slower(self) -> bool:

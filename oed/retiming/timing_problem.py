@@ -16,9 +16,6 @@ Array = NDArray[np.float64]
 InverseDynamics = Callable[[Array, Array, Array], Array]
 Friction = Callable[[Array], Array]
 
-FASTEST = 1e4
-"""Largest squared speed-up where nothing moves and so no limit says anything."""
-
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Usage:
@@ -69,7 +66,8 @@ class TimingProblem:
         third = np.diff(d2(edges), axis=0) / self.width
         with np.errstate(divide="ignore"):
             fastest = (limits.speed_limit(curve(self.s), slope) / np.maximum(np.abs(slope), 1e-150)) ** 2
-        self.ceiling = np.minimum(fastest.min(axis=1), FASTEST)  # (M,), of x
+        # Largest squared speed-up where nothing moves and so no limit says anything.
+        self.ceiling = np.minimum(fastest.min(axis=1), 1e4)  # (M,), of x
         self.linear = _rows(bend, self.b0) + _rows(slope / 2, self.b1)  # acceleration
         self.linear /= limits.acceleration[None, :, None]
         self.jerk = _rows(third, self.b0) + _rows(1.5 * bend, self.b1) + _rows(slope / 2, self.b2)

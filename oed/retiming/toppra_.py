@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from oed.retiming.limits import finite_limits, limit_usage, require_inside, too_weak_to_hold
 from oed.retiming.paths import PathPiece, split_path
 from oed.retiming.refinement import ORDERS, Torque, refine
-from oed.retiming.result import KEPT, Retimed
+from oed.retiming.result import KEPT_LIMIT_USE, Retimed
 from oed.retiming.timing import TimeLaw, kinematics
 from oed.retiming.timing_problem import Friction, InverseDynamics
 from robots.common.errors import InfeasibleError, InputError
@@ -24,11 +24,6 @@ Array = NDArray[np.float64]
 OVERSHOOT = (
     "the smooth path swings out between its points: add points near the limit, or stop at each (--method ruckig)"
 )
-
-EXACT = 1e-4
-"""Deviation from the given path above which a timing that keeps the path exactly is preferred, however slow [rad]."""
-
-_STRETCH_ROUNDS = 60
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
@@ -141,7 +136,10 @@ class _Task:
         )
 
     def keeps_limits(self, motion: Motion) -> bool:
-        return max(float(use.max()) for use in limit_usage(motion, self.limits, self.torque(motion)).values()) <= KEPT
+        return (
+            max(float(use.max()) for use in limit_usage(motion, self.limits, self.torque(motion)).values())
+            <= KEPT_LIMIT_USE
+        )
 
 
 @dataclasses.dataclass(frozen=True)
@@ -169,7 +167,9 @@ def _fastest(stretch: Stretch, task: _Task) -> _Timing:
         if not timings:
             raise
     else:
-        if found.deviation <= EXACT or not timings:
+        # Deviation from the given path above which a timing that keeps the path exactly is preferred, however slow
+        # [rad].
+        if found.deviation <= 1e-4 or not timings:
             timings.append(found)
     return min(timings, key=lambda timing: len(timing.motion))
 
@@ -250,7 +250,7 @@ def _stretched(
     """Stretches a law until its samples keep every limit; None where that fails or takes longer than `give_up_at`."""
     natural = law.duration
     count = int(np.ceil(natural / period - 1e-9))
-    for _ in range(_STRETCH_ROUNDS):
+    for _ in range(60):
         if give_up_at is not None and count * period >= give_up_at:
             return None
         t = period * np.arange(count + 1, dtype=np.float64)
@@ -269,13 +269,6 @@ def _join(motions: list[Motion], period: float) -> Motion:
     parts = [motions[0], *(motion.slice(1, None) for motion in motions[1:])]
     q, dq, ddq = (np.concatenate([getattr(part, name) for part in parts]) for name in ("q", "dq", "ddq"))
     return Motion(period * np.arange(q.shape[0], dtype=np.float64), q, dq, ddq)
-
-
-REST = 1e-6
-"""Velocity and acceleration over their largest magnitudes below which a joint rests."""
-
-CONSISTENT = 1e-5
-"""Difference of a step from what velocity and acceleration make of it [rad or m] above which they are of no use."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -320,11 +313,13 @@ def _rests(motion: Motion) -> NDArray[np.bool_]:
     for values in (motion.dq, motion.ddq):
         largest = np.abs(values).max(axis=0)
         share = np.maximum(share, (np.abs(values) / np.where(largest > 0.0, largest, 1.0)).max(axis=1))
-    return share <= REST
+    # Velocity and acceleration over their largest magnitudes below which a joint rests.
+    return share <= 1e-6
 
 
 def _consistent(motion: Motion) -> bool:
     h = np.diff(motion.t)[:, None]
     mean = (motion.dq[1:] + motion.dq[:-1]) / 2
     expected = h * mean - h**2 / 12 * np.diff(motion.ddq, axis=0)
-    return bool(np.abs(np.diff(motion.q, axis=0) - expected).max() <= CONSISTENT)
+    # Difference of a step from what velocity and acceleration make of it [rad or m] above which they are of no use.
+    return bool(np.abs(np.diff(motion.q, axis=0) - expected).max() <= 1e-5)

@@ -18,25 +18,13 @@ from robots.limits import Limits
 SCAN = np.deg2rad([-90.0, -45.0, 0.0, 45.0, 90.0])
 """Angles from home at which each joint is tried: axes of industrial arms meet at right angles."""
 
-POLISHED = 12
-"""Scanned poses from which the solution is sought."""
+SIDE_WEIGHT = 1e-5
+"""Weight of one radian from the start of the refinement: joints that do not matter stay there."""
 
-NEARNESS = 1e-3
-"""Weight of one radian from home against one radian of misalignment, in the scan."""
-
-SIDE = 1e-5
-"""The same from where the polish starts: joints that do not matter stay there, and alignment costs its square."""
-
-MOVED = np.deg2rad(1.0)
-"""Way from home that counts as moving a joint."""
-
-PROXIMAL = 0.01
-"""Extra weight of a joint's way for each joint after it: a wrist sweeps less room than a shoulder."""
-
-ROOM = 0.5
+ROOM_SHARE = 0.5
 """Part of the most room that a pose must leave the joint."""
 
-ALIGNED = 1e-6
+ALIGNED_ANGLE = 1e-6
 """Misalignment that makes no difference [rad]: a millionth of the weight is left to act on the joint."""
 
 
@@ -76,7 +64,7 @@ def vertical_axis_pose(
         gravity: (3,) [m/s^2] in the base frame; the chain's by default.
         home: (n,) preferred pose [rad]; by default zero, or the middle of a range without zero.
         room: how far the joint can go from a pose (n,) without meeting anything [rad or m]; poses that leave it less
-            than `ROOM` of the most that any leaves are not taken.
+            than `ROOM_SHARE` of the most that any leaves are not taken.
 
     Returns:
         The pose and the angle that is left: 0 where gravity has no effect, pi/2 where the axis can only lie.
@@ -103,7 +91,8 @@ class _Search:
         self._chain, self._index, self._down, self._home = chain, index, down, home
         self._free = np.array([k for k in range(index) if chain.kinds[k] == "revolute"], dtype=np.int64)
         self._lower, self._upper = limits.lower[self._free], limits.upper[self._free]
-        self._weights = 1.0 + PROXIMAL * np.arange(chain.n - 1, -1, -1)
+        # Extra weight of a joint's way for each joint after it: a wrist sweeps less room than a shoulder.
+        self._weights = 1.0 + 0.01 * np.arange(chain.n - 1, -1, -1)
         self._linear = chain.kinds[index] == "prismatic"
 
     def best(self, room: Callable[[Array], float] | None) -> AxisPose:
@@ -113,11 +102,12 @@ class _Search:
         poses = self._poses(np.array(candidates))
         if room is not None:
             rooms = np.array([room(pose) for pose in poses])
-            poses = poses[rooms >= ROOM * rooms.max()]
+            poses = poses[rooms >= ROOM_SHARE * rooms.max()]
         angles = self._angles(poses)
         ways = np.abs(poses - self._home)
-        moved = (ways > MOVED).sum(axis=1)
-        first = int(np.lexsort(((ways @ self._weights).round(6), moved, (angles / ALIGNED).round()))[0])
+        # Way from home that counts as moving a joint.
+        moved = (ways > np.deg2rad(1.0)).sum(axis=1)
+        first = int(np.lexsort(((ways @ self._weights).round(6), moved, (angles / ALIGNED_ANGLE).round()))[0])
         pose = poses[first]
         pose.setflags(write=False)
         return AxisPose(pose=pose, angle=float(angles[first]))
@@ -130,11 +120,13 @@ class _Search:
         grid = np.stack(np.meshgrid(*options, indexing="ij"), axis=-1).reshape(-1, self._free.size)
         ways = np.abs(grid - self._home[self._free])
         far = ways @ self._weights[self._free] + (ways > 0.0).sum(axis=1)
-        costs = self._angles(self._poses(grid)) + NEARNESS * far
-        return grid[np.argsort(costs.round(9), kind="stable")[:POLISHED]]
+        # Weight of one radian from home against one radian of misalignment, in the scan.
+        costs = self._angles(self._poses(grid)) + 1e-3 * far
+        # Scanned poses from which the solution is sought.
+        return grid[np.argsort(costs.round(9), kind="stable")[:12]]
 
     def _polished(self, start: Array) -> Array:
-        if self._angles(self._poses(start[None]))[0] < ALIGNED:
+        if self._angles(self._poses(start[None]))[0] < ALIGNED_ANGLE:
             return start
         box = (self._lower, self._upper)
         tight: dict[str, Any] = {"xtol": 1e-15, "gtol": 1e-15, "ftol": 1e-15}
@@ -159,10 +151,10 @@ class _Search:
     def _residual(self, free: Array, start: Array) -> Array:
         axis = self._axes(self._poses(free[None])[0])[self._index]
         miss = np.atleast_1d(axis @ self._down) if self._linear else np.cross(axis, self._down)
-        return np.concatenate([miss, SIDE * (free - start)])
+        return np.concatenate([miss, SIDE_WEIGHT * (free - start)])
 
     def _jacobian(self, free: Array, start: Array) -> NDArray[np.float64]:
         axes = self._axes(self._poses(free[None])[0])
         turned = np.cross(axes[self._free], axes[self._index])  # d axis / d q_k, (K, 3)
         miss = (turned @ self._down)[None] if self._linear else np.cross(turned, self._down).T
-        return np.vstack([miss, SIDE * np.eye(self._free.size)])
+        return np.vstack([miss, SIDE_WEIGHT * np.eye(self._free.size)])

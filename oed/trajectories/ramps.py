@@ -13,12 +13,6 @@ from oed.trajectories.polynomial import PiecewisePolynomial
 from robots.common.errors import InfeasibleError, InputError
 from robots.limits import Limits
 
-HAIR = 1e-9
-"""Fraction of each limit that is left unused, so that rounding never passes it."""
-
-ENDLESS_RANGE = 2.0 * np.pi
-"""What counts as the whole range of a joint without position limits: one turn [rad]."""
-
 
 @dataclass(frozen=True, kw_only=True)
 class JointBounds:
@@ -112,7 +106,8 @@ def used_range(lower: float, upper: float, centre: float, fraction: float, joint
     if not 0.0 < fraction <= 1.0:
         raise InputError(f"found {fraction} of the range", joint=joint, allowed="a fraction above 0 and up to 1")
     if not np.isfinite(upper - lower):
-        half = ENDLESS_RANGE / 2.0
+        # The whole range of a joint without position limits is one turn.
+        half = np.pi
         # A limit on one side pushes the turn away from it.
         centre = float(np.clip(centre, lower + half, upper - half))
         lower, upper = centre - half, centre + half
@@ -120,7 +115,7 @@ def used_range(lower: float, upper: float, centre: float, fraction: float, joint
     return lower + inset, upper - inset
 
 
-def joint_bounds(limits: Limits, joint: int, *, reserve: float = HAIR) -> JointBounds:
+def joint_bounds(limits: Limits, joint: int, *, reserve: float = 1e-9) -> JointBounds:
     """Takes one joint's limits, a hair inside.
 
     Args:

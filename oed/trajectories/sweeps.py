@@ -27,9 +27,6 @@ from robots.limits import Limits
 SHORTEST_PLATEAU = 0.1
 """Time at constant speed that every level gets [s], 25 samples at 4 ms; in too short a range, speed gives way."""
 
-SAME_PLACE = 1e-12
-"""Distance below which two positions are one [rad]."""
-
 
 @dataclass(frozen=True, kw_only=True)
 class Plateau:
@@ -221,7 +218,8 @@ def sweep_over(
 
     for travel in travels:
         gap = abs(travel.lower - here)
-        if gap > SAME_PLACE:
+        # Distance below which two positions are one [rad].
+        if gap > 1e-12:
             append(stroke(bounds, here, travel.lower, bounds.highest_speed(gap))[0])
         for start, end in ((travel.lower, travel.upper), (travel.upper, travel.lower)):
             profile, begins, ends = stroke(bounds, start, end, travel.speed)

@@ -14,9 +14,6 @@ from oed.trajectories.stage_defaults import RANGE_FRACTION
 from robots.common.errors import InputError
 from robots.limits import Limits
 
-BLOCK = 30.0
-"""Default length of one move and the pause after it [s]: long against a stroke, short against the heating of a gear."""
-
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class WarmUp(Trajectory):
@@ -107,7 +104,7 @@ def plan_warm_up(
     period: float,
     fraction: float = RANGE_FRACTION,
     duty: float = 1.0,
-    block: float = BLOCK,
+    block: float = 30.0,
     centre: ArrayLike | None = None,
 ) -> WarmUp:
     """Plans a warm-up of all joints at full speed over a part of their ranges, back and forth.

@@ -26,10 +26,8 @@ log = logging.getLogger(__name__)
 FLAGS = ("-march=native", "-fno-math-errno", "-fPIC", "-shared")
 # Sines of whole vectors: tried first, and done without where the compiler, the C library or the processor lacks them.
 VECTOR_LIBM = ("-DVECTOR_LIBM", "-Wl,--no-undefined", "-lmvec")
-# Optimisation pays, up to a length at which it would take minutes: a chain of ten oblique joints, differentiated.
-LONG = 600_000
 # A robot that is loaded again has the same functions: their sources are kept, the last ones of a process.
-KEPT = 64
+KEPT_SOURCES = 64
 
 
 class CompilerError(RuntimeError):
@@ -84,7 +82,7 @@ def _source(function: casadi.Function) -> str:
     key = hashlib.sha256(function.serialize().encode()).digest()
     source = _SOURCES.pop(key, None) or c_source(row_major(function))
     _SOURCES[key] = source
-    if len(_SOURCES) > KEPT:
+    if len(_SOURCES) > KEPT_SOURCES:
         _SOURCES.popitem(last=False)
     return source
 
@@ -164,7 +162,9 @@ def _compile(path: str, source: str, library: Path) -> None:
     with tempfile.TemporaryDirectory(dir=library.parent) as folder:
         code, built = Path(folder) / "batch.c", Path(folder) / "batch.so"
         code.write_text(source, encoding="utf-8")
-        effort = "-O3" if len(source) < LONG else "-O1"
+        # Optimisation pays, up to a length at which it would take minutes: a chain of ten oblique joints,
+        # differentiated.
+        effort = "-O3" if len(source) < 600_000 else "-O1"
         for extra in (VECTOR_LIBM, ()):
             command = [path, effort, *FLAGS, str(code), "-o", str(built), *extra, "-lm"]
             result = subprocess.run(command, capture_output=True, text=True, check=False)

@@ -39,9 +39,7 @@ def batch_function(function: casadi.Function, backend: str = "auto") -> BatchFun
 
 
 # Long enough that numpy's cost per call vanishes, short enough that the registers stay in the cache.
-CHUNK = 2048
-# Columns transposed at a time: numpy's copy of a whole transposed chunk is ten times as slow.
-BAND = 8
+BATCH_ROWS = 2048
 
 
 class VectorisedFunction(BatchFunction):
@@ -54,19 +52,21 @@ class VectorisedFunction(BatchFunction):
     def _evaluate(self, samples: int, arguments: list[Array], outputs: tuple[Array, ...]) -> None:
         wide = [argument.reshape(samples, size) for argument, size in zip(arguments, self.input_sizes, strict=True)]
         flat = [output.reshape(samples, math.prod(output.shape[1:])) for output in outputs]
+        # Columns transposed at a time: numpy's copy of a whole transposed chunk is ten times as slow.
+        band_width = 8
         with np.errstate(all="ignore"):
-            for start in range(0, samples, CHUNK):
-                rows = slice(start, min(start + CHUNK, samples))
+            for start in range(0, samples, BATCH_ROWS):
+                rows = slice(start, min(start + BATCH_ROWS, samples))
                 # Registers are contiguous rows; the transpositions at both ends cost less than strided arithmetic.
                 inputs = [np.ascontiguousarray(a[rows].T) for a in wide]
                 results = [np.empty((f.shape[1], rows.stop - rows.start)) for f in flat]
                 self._run(inputs, results)
                 for target, result in zip(flat, results, strict=True):
-                    for band in range(0, result.shape[0], BAND):
-                        target[rows, band : band + BAND] = result[band : band + BAND].T
+                    for band in range(0, result.shape[0], band_width):
+                        target[rows, band : band + band_width] = result[band : band + band_width].T
 
     def _sum(self, groups: int, size: int, arguments: list[Array], outputs: tuple[Array, ...]) -> None:
-        step = max(1, CHUNK // size)
+        step = max(1, BATCH_ROWS // size)
         for start in range(0, groups, step):
             stop = min(start + step, groups)
             rows = [argument[start * size : stop * size] for argument in arguments]

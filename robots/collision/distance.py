@@ -34,8 +34,6 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 Segment = tuple[casadi.SX, casadi.SX]  # its two ends, (3, 1) each, in the base frame [m]
 
-_TINY = 1e-30
-
 
 @dataclass(frozen=True, eq=False)
 class Contact:
@@ -156,7 +154,7 @@ def _root(slope: Callable[[casadi.SX], casadi.SX], x0: casadi.SX, d: casadi.SX, 
             low, slope_low = low + below * (kink - low), slope_low + below * (value - slope_low)
             high, slope_high = high + above * (kink - high), slope_high + above * (value - slope_high)
     # The added number is for a root at a kink, where the interval has shrunk to nothing.
-    return _clip(low - (high - low) * slope_low / (slope_high - slope_low + _TINY))
+    return _clip(low - (high - low) * slope_low / (slope_high - slope_low + 1e-30))
 
 
 def _gap(rho: float, smoothing: float) -> float:

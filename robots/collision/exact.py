@@ -7,8 +7,6 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 
-_PARALLEL = 1e-6  # squared sine of the angle below which rounding has a say in where the lines are closest
-
 
 def segment_segment(a0: Array, a1: Array, b0: Array, b1: Array) -> Array:
     """Distance of two segments, ``min |a0 + s (a1 - a0) - b0 - t (b1 - b0)|`` over s and t in [0, 1].
@@ -28,7 +26,8 @@ def segment_segment(a0: Array, a1: Array, b0: Array, b1: Array) -> Array:
     a, e, b = _dot(u, u), _dot(v, v), _dot(u, v)
     c, f = _dot(u, w), _dot(v, w)
     determinant = a * e - b * b
-    apart = determinant > _PARALLEL * a * e
+    # For lines that are more nearly parallel, rounding decides where they are closest.
+    apart = determinant > 1e-6 * a * e
     s = _clip(np.where(apart, (b * f - c * e) / np.where(apart, determinant, 1.0), 0.0))
     t = _clip(_ratio(b * s + f, e))
     s = _clip(_ratio(b * t - c, a))

@@ -158,9 +158,6 @@ def _warn(robot: Robot, capsules: tuple[Capsule, ...], reason: str) -> None:
         warnings.warn(message, AssumedValueWarning, stacklevel=3)
 
 
-UPRIGHT = float(np.cos(np.deg2rad(10.0)))  # of the first axis; beyond, nothing says where the mounting plane is
-
-
 def base_plane(chain: Chain, limits: Limits, span: tuple[float, float] | None = None) -> Plane | None:
     """Finds the plane that an arm is mounted on: across its first turning axis, at the far end of its base.
 
@@ -179,7 +176,8 @@ def base_plane(chain: Chain, limits: Limits, span: tuple[float, float] | None = 
     q = random_poses(limits, 100)
     poses = chain.transforms(q)
     axis = poses[:, turning[0], :3, :3] @ chain.joints[turning[0]].axis
-    if np.abs(axis[:, 2]).min() < UPRIGHT:
+    # A first axis that leans by more than 10 degrees says nothing of where the mounting plane is.
+    if np.abs(axis[:, 2]).min() < float(np.cos(np.deg2rad(10.0))):
         return None
     low, high = span or (0.0, 0.0)
     arm = float(np.mean(chain.flange(q)[:, 2, 3])) - (low + high) / 2.0

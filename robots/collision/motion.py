@@ -13,8 +13,7 @@ from robots.signals import Motion
 
 Array = NDArray[np.float64]
 
-BLOCK = 8192  # samples at a time: hours at 4 ms must not fill the memory
-CELL = 0.02  # drawn shapes are judged once for all samples within so much of each joint [rad or m]
+SAMPLES_AT_A_TIME = 8192  # samples at a time: hours at 4 ms must not fill the memory
 
 
 def check_motion(
@@ -48,8 +47,8 @@ def check_motion(
     require_joints(model, motion)
     search, meetings = _Search(model, margin, max_halvings), _meetings(model, motion)
     difference = 0.0 if confirm else None
-    for start in range(0, max(1, len(motion) - 1), BLOCK - 1):
-        block = motion.slice(start, min(start + BLOCK, len(motion)))
+    for start in range(0, max(1, len(motion) - 1), SAMPLES_AT_A_TIME - 1):
+        block = motion.slice(start, min(start + SAMPLES_AT_A_TIME, len(motion)))
         sampled = search.block(block)
         if difference is not None:
             difference = max(difference, _disagreement(model, block, sampled))
@@ -71,7 +70,8 @@ def _meetings(model: CollisionModel, motion: Motion) -> tuple[tuple[str, float],
     """The pairs whose drawn shapes meet, and when first [s]."""
     found = []
     for pair in model.by_shape:
-        rows = distinct_rows(motion.q, pair, CELL)
+        # Drawn shapes are checked once for all samples within 0.02 rad or m of each joint.
+        rows = distinct_rows(motion.q, pair, 0.02)
         poses = poses_of(model.chain, motion.q[rows])
         near = body_clearance(model.capsules, pair, poses) < 0.0  # Capsules enclose the shapes.
         assert model.bodies is not None

@@ -16,10 +16,8 @@ from robots.limits import Limits
 
 Array = NDArray[np.float64]
 
-POSES = 1000  # of which a pair must leave one free to be worth watching
-NEAR = 0.015  # m; bodies that no pose takes farther apart touch by construction
-COARSE = 0.25  # of these poses; capsules so near in more of them would take too much of the free space
-SEED = 0
+SAMPLED_POSES = 1000  # of which a pair must leave one free to be worth watching
+TOUCHING_DISTANCE = 0.015  # m; bodies that no pose takes farther apart touch by construction
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -110,7 +108,7 @@ def poses_of(chain: Chain, q: Array) -> Array:
     return np.concatenate([base, chain.transforms(q)], axis=1)
 
 
-def random_poses(limits: Limits, count: int, seed: int = SEED) -> Array:
+def random_poses(limits: Limits, count: int, seed: int = 0) -> Array:
     """Draws poses (count, n) between the limits; an open end counts as half a turn, or a metre, from the other."""
     lower = np.where(np.isfinite(limits.lower), limits.lower, np.minimum(limits.upper, np.pi) - 2 * np.pi)
     lower = np.where(np.isfinite(lower), lower, -np.pi)
@@ -120,7 +118,7 @@ def random_poses(limits: Limits, count: int, seed: int = SEED) -> Array:
 
 def sampled_poses(chain: Chain, limits: Limits) -> Array:
     """Poses (N, n + 1, 4, 4) of the base and the links, by which pairs that always touch are found."""
-    return poses_of(chain, random_poses(limits, POSES))
+    return poses_of(chain, random_poses(limits, SAMPLED_POSES))
 
 
 def distinct_rows(q: Array, bodies: frozenset[int], cell: float) -> NDArray[np.intp]:
@@ -141,7 +139,7 @@ def always_touching(obstacle: Obstacle, capsules: Sequence[Capsule], poses: Arra
     return {
         frozenset((capsule.link, obstacle.name))
         for capsule in capsules
-        if capsule.link and (Pair(first=obstacle, second=capsule).clearance(poses) < NEAR).all()
+        if capsule.link and (Pair(first=obstacle, second=capsule).clearance(poses) < TOUCHING_DISTANCE).all()
     }
 
 
@@ -177,13 +175,14 @@ def choose_pairs(
     poses = sampled_poses(chain, limits)
     kept: list[Pair] = []
     excluded: list[tuple[str, str]] = []
-    for pair, share in zip(pairs, (clearances(pairs, poses) < NEAR).mean(axis=0), strict=True):
+    for pair, share in zip(pairs, (clearances(pairs, poses) < TOUCHING_DISTANCE).mean(axis=0), strict=True):
         bodies = frozenset((pair.first.link, pair.second.link))
         if bodies in ignored:
             excluded.append((pair.name, "to be ignored"))
         elif share == 1.0:
             excluded.append((pair.name, "touch in every pose"))
-        elif bodies in apart and share > COARSE:
+        # Capsules that are near in more than a quarter of the poses would take too much of the free space.
+        elif bodies in apart and share > 0.25:
             excluded.append((pair.name, "the drawn shapes do not meet, only the capsules about them"))
         else:
             kept.append(pair)

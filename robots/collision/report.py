@@ -9,9 +9,6 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 
-AGREEMENT = 1e-5
-"""By how much coal's distances may differ [m]: its iterative solver ends at 1e-6."""
-
 
 @dataclass(frozen=True, eq=False)
 class CollisionReport:
@@ -49,7 +46,8 @@ class CollisionReport:
     @property
     def confirmed(self) -> bool | None:
         """Whether coal found the same distances; None if it was not asked."""
-        return None if self.disagreement is None else self.disagreement <= AGREEMENT
+        # By how much coal's distances may differ [m]: its iterative solver ends at 1e-6.
+        return None if self.disagreement is None else self.disagreement <= 1e-5
 
     @property
     def worst(self) -> int | None:

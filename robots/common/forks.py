@@ -18,7 +18,7 @@ from robots.common.workers import start_worker
 Item = TypeVar("Item")
 Result = TypeVar("Result")
 
-OFTEN = 20
+ITEMS_PER_RETURN = 20
 """Items after which a process returns freed memory to the system."""
 
 _work: dict[int, tuple[Callable[[Any], Any], Sequence[Any]]] = {}
@@ -60,7 +60,7 @@ def forked(
     results = []
     for result in threaded(function, work) if threads else map(function, work):
         results.append(result)
-        if len(results) % OFTEN == 0:
+        if len(results) % ITEMS_PER_RETURN == 0:
             give_back()
         advance(len(results) / len(work))
     return results
@@ -93,6 +93,6 @@ def _in_forks(
 def _apply(number: int, start: int, chunk: int) -> list[Any]:
     function, work = _work[number]
     results = [function(item) for item in work[start : start + chunk]]
-    if start % OFTEN < chunk:
+    if start % ITEMS_PER_RETURN < chunk:
         give_back()
     return results

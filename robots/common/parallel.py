@@ -19,9 +19,6 @@ from robots.common.workers import start_worker
 Item = TypeVar("Item")
 Result = TypeVar("Result")
 
-MOST_THREADS = 4
-"""More threads than this wait for memory."""
-
 MOST_LOSSES = 2
 """Worker processes may end abruptly so often in a row without a finished item between; then it is no accident."""
 
@@ -144,7 +141,8 @@ def threaded(function: Callable[[Item], Result], items: Iterable[Item]) -> Itera
     Compiled code, linear algebra and filters leave Python's lock; sums taken in order come out alike on any machine.
     One of several workers has one thread: the other cores are busy.
     """
-    threads = 1 if is_worker() else min(available_cores(), MOST_THREADS)
+    # More threads than this wait for memory.
+    threads = 1 if is_worker() else min(available_cores(), 4)
     if threads == 1:
         yield from map(function, items)
         return

@@ -1,9 +1,20 @@
-"""Stretches of rows that have something in common."""
+"""Stretches of rows: those that have something in common, and pieces of a long log."""
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 import numpy as np
 from numpy.typing import NDArray
+
+# Short enough that what is worked out of a log's rows never stands in memory whole, and that threads share the work.
+ROWS_AT_A_TIME = 2048
+
+
+def chunks(rows: int, size: int = ROWS_AT_A_TIME) -> Iterator[slice]:
+    """Cuts so many rows into slices."""
+    for start in range(0, rows, size):
+        yield slice(start, min(start + size, rows))
 
 
 def spans(flags: NDArray[np.bool_]) -> list[tuple[int, int]]:

@@ -14,8 +14,7 @@ from robots.common.errors import InputError
 Array = NDArray[np.float64]
 Kind = Literal["revolute", "prismatic"]
 
-_ORTHONORMAL = 1e-9  # rotations built from angles are orthonormal to 1e-15; a mistyped matrix is off by far more
-_ROUNDING = 1e-15  # below it an entry of a rotation is rounding: cos(90 deg) in floating point is 6e-17, not 0
+_ROTATION_ROUNDING = 1e-15  # below it an entry of a rotation is rounding: cos(90 deg) in floating point is 6e-17, not 0
 
 
 def _frozen(value: ArrayLike, shape: tuple[int, ...], what: str, joint: str | None = None) -> Array:
@@ -34,10 +33,11 @@ def _frozen(value: ArrayLike, shape: tuple[int, ...], what: str, joint: str | No
 def _frozen_rotation(value: ArrayLike, what: str, joint: str | None = None) -> Array:
     rotation = np.array(_frozen(value, (3, 3), what, joint))
     error = np.abs(rotation @ rotation.T - np.eye(3)).max()
-    if error > _ORTHONORMAL or np.linalg.det(rotation) < 0.0:
+    # Rotations built from angles are orthonormal to 1e-15; a mistyped matrix is off by far more.
+    if error > 1e-9 or np.linalg.det(rotation) < 0.0:
         raise InputError(f"{what} is not a proper rotation matrix (orthonormality error {error:.1e})", joint=joint)
     # Exact zeros keep the symbolic dynamics sparse, and structurally absent columns exactly absent.
-    rotation[np.abs(rotation) < _ROUNDING] = 0.0
+    rotation[np.abs(rotation) < _ROTATION_ROUNDING] = 0.0
     rotation.flags.writeable = False
     return rotation
 
@@ -168,7 +168,7 @@ class Joint:
         length = np.linalg.norm(axis)
         if length < 1e-9:
             raise InputError("the axis has no length", joint=self.name, allowed="a vector other than zero")
-        if abs(length - 1.0) > _ROUNDING:
+        if abs(length - 1.0) > _ROTATION_ROUNDING:
             axis /= length
         axis.flags.writeable = False
         set_ = object.__setattr__

@@ -10,10 +10,8 @@ from robots.common.errors import InputError
 from robots.description import Geometry
 from robots.geometry.dh import DhRow
 
-FULL_TURN = 2.0 * np.pi + 1e-6  # no table needs a larger constant angle [rad]
-RIGHT = 0.01  # people write right angles as 1.57 [rad]
 # Sums of all lengths [m]: arms have 0.01 to 10 m, large cranes up to 50 m.
-SHORT, LONG, FAR = 0.01, 10.0, 50.0
+SHORTEST_ARM, LONGEST_CRANE = 0.01, 50.0
 
 
 def table_rows(geometry: Geometry, file: str) -> list[DhRow]:
@@ -41,7 +39,7 @@ def table_rows(geometry: Geometry, file: str) -> list[DhRow]:
         for row in geometry.joints
     ]
     total = _total(rows)
-    other = "mm" if total > FAR else "m" if geometry.lengths == "mm" and 0.0 < total < SHORT else None
+    other = "mm" if total > LONGEST_CRANE else "m" if geometry.lengths == "mm" and 0.0 < total < SHORTEST_ARM else None
     if other is not None:
         number, key = _longest(rows)
         raise InputError(
@@ -49,7 +47,7 @@ def table_rows(geometry: Geometry, file: str) -> list[DhRow]:
             file=file,
             column=f"geometry.joints[{number + 1}].{key}",
             joint=number + 1,
-            allowed=f"{SHORT:g} to {FAR:g} m in all",
+            allowed=f"{SHORTEST_ARM:g} to {LONGEST_CRANE:g} m in all",
             remedy=f"if the table is in {'millimetres' if other == 'mm' else 'metres'}, state lengths: {other}",
         )
     return rows
@@ -59,7 +57,8 @@ def _check_angles(geometry: Geometry, file: str) -> None:
     if geometry.angles == "rad":
         for number, row in enumerate(geometry.joints, start=1):
             for key in ("alpha", "offset"):
-                if abs(getattr(row, key)) > FULL_TURN:
+                # No table needs a constant angle of more than a turn [rad].
+                if abs(getattr(row, key)) > 2.0 * np.pi + 1e-6:
                     raise InputError(
                         f"{getattr(row, key):g} rad",
                         file=file,
@@ -72,7 +71,8 @@ def _check_angles(geometry: Geometry, file: str) -> None:
     twists = np.array([row.alpha for row in geometry.joints])
     turned = np.flatnonzero(twists)
     quarters = twists[turned] / (np.pi / 2)
-    if turned.size and (np.abs(quarters - np.round(quarters)) < RIGHT).all() and (np.abs(quarters) < 4.5).all():
+    # People write right angles as 1.57 rad.
+    if turned.size and (np.abs(quarters - np.round(quarters)) < 0.01).all() and (np.abs(quarters) < 4.5).all():
         number = int(turned[0]) + 1
         raise InputError(
             f"{twists[turned[0]]:g} deg, and every other twist, is a right angle in rad",
@@ -96,7 +96,8 @@ def table_notes(rows: Sequence[DhRow], convention: str) -> tuple[str, ...]:
     """
     notes = []
     total = _total(rows)
-    if total > LONG:
+    # Arms are 0.01 to 10 m long in all, large cranes up to 50 m.
+    if total > 10.0:
         number, key = _longest(rows)
         notes.append(
             f"a and d of the table add up to {total:.3g} m, most of it {key} of joint {number + 1}: they may be in mm "

@@ -9,15 +9,10 @@ from robots.common.errors import InputError
 
 Array = NDArray[np.float64]
 
-SIZE = 10  # m, mPx, mPy, mPz, Ixx, Ixy, Ixz, Iyy, Iyz, Izz
+BODY_PARAMETERS = 10  # m, mPx, mPy, mPz, Ixx, Ixy, Ixz, Iyy, Iyz, Izz
 _UPPER = np.triu_indices(3)  # (xx, xy, xz, yy, yz, zz), the order of our inertial parameters
-_INDEFINITE = 1e-6  # relative; real files carry four or five digits, so a thin rod's small moment may round below zero
 
-_EXCESS = 0.02  # of the triangle inequality, relative; as above, and scaled models of bodies breach it a little
-
-_NEGLIGIBLE = 1e-12  # kg m2, a grain of dust: some files give markers a mass and an inertia of 1e-35
-
-_SMALL_ARM = 0.3  # m; the frames of a pendulum or of a single axis may all coincide
+_NEGLIGIBLE_INERTIA = 1e-12  # kg m2, a grain of dust: some files give markers a mass and an inertia of 1e-35
 
 
 def symmetric(six: ArrayLike) -> Array:
@@ -82,7 +77,8 @@ def check_body(mass: float, inertia_at_com: ArrayLike, what: str, *, file: str |
             remedy="give it a mass, or an inertia of zero",
         )
     lowest = float(np.linalg.eigvalsh(inertia)[0])
-    if lowest < -max(_INDEFINITE * largest, _NEGLIGIBLE):
+    # Real files carry four or five digits, so the small moment of a thin rod may round below zero.
+    if lowest < -max(1e-6 * largest, _NEGLIGIBLE_INERTIA):
         raise InputError(
             f"{what} has an inertia with a negative principal moment of {lowest:.3g} kg m2",
             file=file,
@@ -107,13 +103,15 @@ def body_doubts(mass: float, com: ArrayLike, inertia_at_com: ArrayLike, size: fl
         return []
     doubts = []
     low, middle, high = np.linalg.eigvalsh(np.asarray(inertia_at_com, dtype=np.float64))
-    if high > (1.0 + _EXCESS) * (low + middle) + _NEGLIGIBLE:
+    # Rounded digits breach the triangle inequality a little, as do scaled models of bodies: by up to 2 %.
+    if high > 1.02 * (low + middle) + _NEGLIGIBLE_INERTIA:
         doubts.append(
             f"principal moments of {low:.3g}, {middle:.3g} and {high:.3g} kg m2 that no body has "
             "(the largest exceeds the sum of the others)"
         )
     distance = float(np.linalg.norm(com))
-    scale = 2.0 * max(size, _SMALL_ARM)
+    # The frames of a pendulum or of a single axis may all coincide: an arm counts as 0.3 m long at least.
+    scale = 2.0 * max(size, 0.3)
     if distance > scale:
         doubts.append(f"a centre of mass {distance:.3g} m from its joint, farther than the arm reaches")
     gyration = float(np.sqrt(max(high, 0.0) / mass))

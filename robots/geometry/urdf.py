@@ -12,15 +12,13 @@ from numpy.typing import NDArray
 
 from robots.common.errors import InputError
 from robots.geometry.chain import Chain, Joint, LinkPlace, joint_motion
-from robots.geometry.inertia import SIZE, body_doubts, check_body, inertial_parameters
+from robots.geometry.inertia import BODY_PARAMETERS, body_doubts, check_body, inertial_parameters
 from robots.geometry.urdf_limits import JointBounds, joint_bounds, limits_of
 from robots.geometry.urdf_selection import Selection, nearest, select
 from robots.geometry.urdf_xml import UrdfElements, UrdfJoint, UrdfLink, read_elements
 from robots.limits import Limits
 
 Array = NDArray[np.float64]
-
-_FEW = 3  # links of equal mass are common in pendulums, and in no arm
 
 
 class UrdfChain(NamedTuple):
@@ -151,7 +149,7 @@ class UrdfTree:
         selection = select(self, tip, joints, locked)
         moving = {joint.name: i for i, joint in enumerate(selection.moving)}
         chain_joints: list[Joint] = []
-        inertia = np.full((len(moving), SIZE), np.nan)
+        inertia = np.full((len(moving), BODY_PARAMETERS), np.nan)
         lumped: list[list[str]] = [[] for _ in moving]
         places: list[LinkPlace] = []
         held: list[str] = []
@@ -207,7 +205,7 @@ class UrdfTree:
     def _parameters(self, link: UrdfLink, pose: Array) -> Array:
         """Inertial parameters (10,) about the body's frame; NaN where the link states no mass."""
         if np.isnan(link.mass):
-            return np.full(SIZE, np.nan)
+            return np.full(BODY_PARAMETERS, np.nan)
         check_body(link.mass, link.inertia_at_com, f"link {link.name!r}", file=self.file)
         return inertial_parameters(link.mass, link.com, link.inertia_at_com, pose)
 
@@ -258,7 +256,8 @@ class UrdfTree:
             has = "link {} has" if len(massless) == 1 else "links {} have"
             notes.append(f"{has.format(', '.join(massless))} an inertia but no mass: it is not used")
         masses = [link.mass for link in links if link.mass > 0]
-        if len(masses) > _FEW and len(set(masses)) == 1:
+        # Links of equal mass are common in pendulums of up to three links, and in no arm.
+        if len(masses) > 3 and len(set(masses)) == 1:
             notes.append(f"all {len(masses)} links with a mass have {masses[0]:g} kg: it may stand for unknown masses")
         return notes + [
             f"link {link.name} has {doubt}"

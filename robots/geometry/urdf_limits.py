@@ -14,9 +14,6 @@ from robots.geometry.chain import Kind
 from robots.geometry.urdf_reader import UrdfReader
 from robots.limits import Limits
 
-# No arm turns a joint three times around, or half of it at eight turns per second; in degrees both are common.
-_ANGLE, _RATE = 20.0, 50.0  # [rad], [rad/s]
-_LENGTH, _SPEED = 30.0, 20.0  # [m], [m/s]
 _ENDLESS = {"revolute": 1e3, "prismatic": 1e4}  # exporters write such numbers, or 1e16, for "no limit"
 _MAGNITUDES = ("velocity", "effort", "acceleration", "deceleration", "jerk")
 
@@ -192,7 +189,8 @@ def _ends(limit: UrdfLimit, kind: Kind, name: str, file: str) -> tuple[float, fl
 def _wrong_units(limit: UrdfLimit, kind: Kind) -> list[str]:
     """What looks like degrees or millimetres."""
     linear = kind == "prismatic"
-    far, fast = (_LENGTH, _SPEED) if linear else (_ANGLE, _RATE)
+    # No arm turns a joint three times around, or at eight turns per second; in degrees both are common.
+    far, fast = (30.0, 20.0) if linear else (20.0, 50.0)
     unit, meant = ("m", "millimetres") if linear else ("rad", "degrees")
     notes = []
     ends = max(abs(value) for value in limit.range(kind) or (0.0,))

@@ -12,8 +12,6 @@ from robots.geometry.chain import homogeneous, rotation_from_quaternion, rotatio
 
 Array = NDArray[np.float64]
 
-_UNIT_LENGTH = 0.05  # a quaternion written with two digits is off by less; one that is farther off is another thing
-
 
 class UrdfReader:
     """Reads the values of one element.
@@ -100,7 +98,8 @@ class UrdfReader:
             raise self.error("<origin> states both rpy and quat_xyzw", allowed="one of them", remedy="remove the other")
         quaternion = self.numbers(origin, "quat_xyzw", 4)
         length = float(np.linalg.norm(quaternion))
-        if abs(length - 1.0) > _UNIT_LENGTH:
+        # A quaternion written with two digits is off by less than 5 %; one that is farther off is another thing.
+        if abs(length - 1.0) > 0.05:
             raise self.error(f"<origin> quat_xyzw has the length {length:.3g}", allowed="a unit quaternion x y z w")
         return homogeneous(rotation_from_quaternion(quaternion), xyz)
 

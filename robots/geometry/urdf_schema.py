@@ -6,8 +6,6 @@ from collections.abc import Iterator
 from difflib import get_close_matches
 from xml.etree import ElementTree
 
-_LISTED = 3  # owners that a note names; more are counted
-
 _POSE = {"origin": (("xyz", "rpy", "quat_xyzw"), ())}
 # Element, then its attributes and the elements within; what is drawn or only simulated is left out.
 _KNOWN: dict[str, tuple[tuple[str, ...], tuple[str, ...]]] = {
@@ -54,7 +52,8 @@ def unused_parts(robot: ElementTree.Element) -> tuple[str, ...]:
     texts = []
     for name, owners in found.items():
         named = [owner for owner in dict.fromkeys(owners) if owner]
-        where = ", ".join(named) if named and len(named) <= _LISTED else f"{len(owners)} times"
+        # Up to three owners are named, more are counted.
+        where = ", ".join(named) if named and len(named) <= 3 else f"{len(owners)} times"
         texts.append(f"{name} ({where})")
     return tuple(texts)
 

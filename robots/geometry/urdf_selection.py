@@ -14,7 +14,7 @@ from robots.common.errors import InputError
 from robots.geometry.urdf_xml import UrdfJoint, UrdfLink
 
 Choice = tuple[str | None, Sequence[str] | None, Mapping[str, float] | None]  # tip, joints, locked
-_LISTED = 12  # a humanoid has dozens of tips; a longer list does not help
+_LISTED_TIPS = 12  # a humanoid has dozens of tips; a longer list does not help
 
 
 class _Tree(Protocol):
@@ -174,11 +174,11 @@ def _only_one(tree: _Tree, locked: Mapping[str, float]) -> tuple[UrdfJoint, ...]
     if len(whole) == 1:
         return tuple(tree.joints[name] for name in whole[0])
     lines = [f"{tip}: {', '.join(names)}" for names, tip in choices.items()]
-    more = f" and {len(lines) - _LISTED} more" if len(lines) > _LISTED else ""
+    more = f" and {len(lines) - _LISTED_TIPS} more" if len(lines) > _LISTED_TIPS else ""
     raise InputError(
         f"the {tree.kind} branches into {len(whole)} chains",
         file=tree.file,
-        allowed="a tip link of these (tip: joints): " + "; ".join(lines[:_LISTED]) + more,
+        allowed="a tip link of these (tip: joints): " + "; ".join(lines[:_LISTED_TIPS]) + more,
         remedy="choose one by its tip (--tip) or its joints (--joints), or lock joints (--lock)",
     )
 

@@ -13,13 +13,7 @@ Array = NDArray[np.float64]
 
 # Mass of an arm [kg] = MASS payload^BY_PAYLOAD reach^BY_REACH: least squares over the data sheets of 27 arms of 2 to
 # 210 kg payload and 0.5 to 2.7 m reach, which scatter about it by a factor of 1.8.
-MASS, BY_PAYLOAD, BY_REACH = 18.5, 0.49, 1.44
-MOVED = 0.8  # share of that mass behind the first joint
-# A joint weighs what its reach to the flange asks for, and its own motor: this share of what the first one weighs more.
-OWN_MOTOR = 0.15
-# Radius of gyration of a link about its centre, as a fraction of its length and of the arm's.
-OWN_SHARE, ARM_SHARE = 0.2, 0.05
-SAMPLES = 2000
+USUAL_MASS, PAYLOAD_EXPONENT, REACH_EXPONENT = 18.5, 0.49, 1.44
 
 
 def usual_body(mass: float, end: ArrayLike, arm: float) -> Array:
@@ -34,7 +28,8 @@ def usual_body(mass: float, end: ArrayLike, arm: float) -> Array:
         (10,) inertial parameters about the link's frame.
     """
     end = np.asarray(end, dtype=np.float64)
-    spread = (OWN_SHARE * float(np.linalg.norm(end)) + ARM_SHARE * arm) ** 2
+    # Radius of gyration of a link about its centre: a fifth of its length and a twentieth of the arm's.
+    spread = (0.2 * float(np.linalg.norm(end)) + 0.05 * arm) ** 2
     return inertial_parameters(mass, end / 2, 2.0 * mass * spread * np.eye(3), np.eye(4))
 
 
@@ -52,8 +47,10 @@ def usual_masses(chain: Chain, limits: Limits, payload: float) -> Array:
     ends = [joint.translation for joint in chain.joints[1:]] + [chain.tip[:3, 3]]
     lengths = np.array([float(np.linalg.norm(end)) for end in ends])
     arm = max(float(lengths.sum()), 0.1)
-    moved = MOVED * MASS * payload**BY_PAYLOAD * working_reach(chain, limits) ** BY_REACH
-    left = np.cumsum(lengths[::-1])[::-1] / arm + OWN_MOTOR
+    # Of the usual mass, 80 % is behind the first joint.
+    moved = 0.8 * USUAL_MASS * payload**PAYLOAD_EXPONENT * working_reach(chain, limits) ** REACH_EXPONENT
+    # A joint weighs what its reach to the flange asks for, and its own motor: 15 % of what the first one weighs more.
+    left = np.cumsum(lengths[::-1])[::-1] / arm + 0.15
     return np.array([usual_body(mass, end, arm) for mass, end in zip(moved * left / left.sum(), ends, strict=True)])
 
 
@@ -69,7 +66,7 @@ def working_reach(chain: Chain, limits: Limits) -> float:
     open_end = np.where(np.array(chain.kinds) == "prismatic", 0.5, np.pi)
     lower = np.where(np.isfinite(limits.lower), limits.lower, np.minimum(limits.upper, open_end) - 2 * open_end)
     upper = np.where(np.isfinite(limits.upper), limits.upper, lower + 2 * open_end)
-    q = np.random.default_rng(0).uniform(lower, upper, (SAMPLES, chain.n))
+    q = np.random.default_rng(0).uniform(lower, upper, (2000, chain.n))
     first = chain.joints[0]
     away = chain.flange(q)[:, :3, 3] - first.translation
     if first.kind == "revolute":

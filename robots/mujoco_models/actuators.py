@@ -10,8 +10,7 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 
-JOINT, JOINT_IN_PARENT = 0, 1  # mjtTrn
-FIXED_GAIN, NO_BIAS = 0, 0  # mjtGain, mjtBias
+FIXED_GAIN = 0  # mjtGain
 
 
 def actuators_of(model: Any, joint: int) -> Iterator[tuple[int, float]]:
@@ -25,7 +24,8 @@ def actuators_of(model: Any, joint: int) -> Iterator[tuple[int, float]]:
         The number of the actuator and its gear ratio.
     """
     for a in range(len(model.actuator_trntype)):
-        if model.actuator_trntype[a] in (JOINT, JOINT_IN_PARENT) and model.actuator_trnid[a, 0] == joint:
+        # mjTRN_JOINT, mjTRN_JOINTINPARENT
+        if model.actuator_trntype[a] in (0, 1) and model.actuator_trnid[a, 0] == joint:
             yield a, float(model.actuator_gear[a, 0])
 
 
@@ -51,7 +51,8 @@ def _largest(model: Any, actuator: int) -> float:
     bounds = [np.inf]
     if model.actuator_forcelimited[actuator]:
         bounds.append(float(np.min(np.abs(model.actuator_forcerange[actuator]))))
-    direct = model.actuator_gaintype[actuator] == FIXED_GAIN and model.actuator_biastype[actuator] == NO_BIAS
+    unbiased = model.actuator_biastype[actuator] == 0  # mjBIAS_NONE
+    direct = model.actuator_gaintype[actuator] == FIXED_GAIN and unbiased
     control = _control(model, actuator)
     if direct and model.actuator_ctrllimited[control]:
         reach = float(np.min(np.abs(model.actuator_ctrlrange[control])))

@@ -17,8 +17,6 @@ from robots.mujoco_models.actuators import effort_limit
 Array = NDArray[np.float64]
 
 FREE, BALL, SLIDE, HINGE = range(4)  # mjtJoint
-BODY, JOINT, SITE = 1, 3, 6  # mjtObj
-JOINT_EQUALITY = 2  # mjtEq
 
 
 def pose(position: Array, quaternion: Array) -> Array:
@@ -195,7 +193,7 @@ def linear_couplings(model: Any) -> list[int]:
     return [
         e
         for e in range(model.neq)
-        if model.eq_type[e] == JOINT_EQUALITY
+        if model.eq_type[e] == 2  # mjEQ_JOINT
         and model.eq_active0[e]
         and model.eq_obj2id[e] >= 0
         and not np.any(model.eq_data[e, 2:5])

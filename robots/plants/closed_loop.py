@@ -12,19 +12,12 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 Beyond = Callable[[Array, Array, Array], tuple[Array, Array]]
 
-PASSES = 25
-# The last pass may change the loop's torque by this share of it, or of this share of the driving torque.
-CLOSE, FAINT = 0.01, 1e-3
-# A motion whose loop adds so many times the driving torque is none.
-DIVERGED = 1e4
+# The last pass may change the loop's torque by this share of it.
+CONVERGED_CHANGE = 0.01
 # An inertia below this share of what the loop is laid out for is filled up: no joint may accelerate without bound.
-LEAST_INERTIA = 0.05
-# Sweeps over joints whose friction turns round, and Newton's steps of each.
-SWEEPS, STEPS = 30, 12
-STICKS = 1e-4  # of a sign's width, to which its velocity is solved for
+LEAST_INERTIA_SHARE = 0.05
 # Beyond so many widths of the sign it is one.
-SATURATED = 6.0
-SHARPEST = 1e-6  # [rad/s or m/s] width of a sign that is stated as sharp
+SATURATED_WIDTHS = 6.0
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -106,7 +99,7 @@ class Driven:
     @property
     def converged(self) -> bool:
         """Whether the last pass confirmed the one before."""
-        return bool(self.change <= CLOSE)
+        return bool(self.change <= CONVERGED_CHANGE)
 
 
 def drive(
@@ -117,7 +110,7 @@ def drive(
     inertia: Array,
     sign_width: Array,
     loop: Loop | None = None,
-    passes: int = PASSES,
+    passes: int = 25,
 ) -> Driven:
     """Follows a robot that is driven by a torque and held to its reference by a loop.
 
@@ -141,7 +134,8 @@ def drive(
     """
     h, r = reference.step, reference
     stiffness, damping = (loop or Loop()).gains(inertia)
-    width = np.maximum(sign_width, SHARPEST)
+    # A sign that is stated as sharp gets this width [rad/s or m/s].
+    width = np.maximum(sign_width, 1e-6)
     filled = _filled(tangent.inertia, inertia)
     M, D, K = tangent.inertia, tangent.damping + np.diag(damping), tangent.stiffness + np.diag(stiffness)
     heavy = (M + np.diag(filled)) / h
@@ -152,7 +146,7 @@ def drive(
     q, dq, ddq = r.q, r.dq, r.ddq
     correction = np.zeros_like(q)
     change, done = np.inf, 0
-    while done < passes and change > CLOSE:
+    while done < passes and change > CONVERGED_CHANGE:
         done += 1
         smooth, turning = resistance(q, dq, ddq)
         sign = np.tanh(dq / width)
@@ -162,9 +156,11 @@ def drive(
         with np.errstate(over="ignore", invalid="ignore"):  # of a motion that diverges, which is reported below
             q, dq, ddq = _follow(r, inverse, from_state, held - known, np.maximum(turning, 0.0), width)
             before, correction = correction, -stiffness * (q - r.q) - damping * (dq - r.dq) - filled * (ddq - r.ddq)
-            size = np.maximum(_rms(correction), FAINT * level)
+            # A correction counts as 0.1 % of the driving torque at least.
+            size = np.maximum(_rms(correction), 1e-3 * level)
             change = float(np.max(_rms(correction - before) / size))
-        if not (size < DIVERGED * level).all():
+        # A motion whose loop adds so many times the driving torque is none.
+        if not (size < 1e4 * level).all():
             change = np.inf
             break
     return Driven(q=q, dq=dq, ddq=ddq, correction=correction, passes=done, change=change, filled=filled)
@@ -182,7 +178,7 @@ def _filled(matrices: Array, inertia: Array) -> Array:
     """Inertia (n,) that keeps every matrix's eigenvalues, over the loop's own inertia, above the least."""
     root = np.sqrt(inertia)
     lowest = float(np.linalg.eigvalsh((matrices + np.swapaxes(matrices, 1, 2)) / 2 / root[:, None] / root)[:, 0].min())
-    return np.asarray(max(LEAST_INERTIA - lowest, 0.0) * inertia)
+    return np.asarray(max(LEAST_INERTIA_SHARE - lowest, 0.0) * inertia)
 
 
 def _follow(
@@ -197,7 +193,7 @@ def _follow(
     v = velocities[0] = r.dq[0] - h / 2 * r.ddq[0]
     q = positions[0] = r.q[0] - h / 2 * r.dq[0]
     state = np.concatenate([v, q])
-    sharp, way = SATURATED * width, np.sign(v)
+    sharp, way = SATURATED_WIDTHS * width, np.sign(v)
     for k in range(len(push)):
         wanted = free[k] + from_state[k] @ state
         new = wanted - drag[k] @ way
@@ -218,7 +214,7 @@ def _turned(wanted: Array, inverse: Array, turning: Array, width: Array, new: Ar
     Joints that turn are solved for together, the others pull with all of their friction; those that turn in turn join
     them.
     """
-    sharp = SATURATED * width
+    sharp = SATURATED_WIDTHS * width
     pull = turning * way
     active = np.zeros(len(new), dtype=bool)
     while True:
@@ -243,14 +239,16 @@ def _solved_together(B: Array, turning: Array, width: Array, free: Array) -> Arr
     """Solves B v + turning tanh(v / width) = B free joint by joint, the others as they are (Gauss and Seidel)."""
     target, v = B @ free, np.zeros_like(free)
     count = len(v)
-    for _ in range(SWEEPS):
+    # Sweeps over the joints whose friction changes its sign.
+    for _ in range(30):
         largest = 0.0
         for j in range(count):
             x = float(target[j] - B[j] @ v + B[j, j] * v[j])
             value = _solved(float(B[j, j]), float(turning[j]), float(width[j]), x)
             largest = max(largest, abs(value - v[j]) / float(width[j]))
             v[j] = value
-        if largest < STICKS:
+        # The velocity is solved for to this part of the sign's width.
+        if largest < 1e-4:
             break
     return v
 
@@ -263,9 +261,10 @@ def _solved(b: float, f: float, w: float, x: float) -> float:
     if f <= 0.0:
         return x / b
     v = x / (b + f / w) if abs(x) <= b * w + f else (x - f if x > 0 else x + f) / b
-    if abs(v) > SATURATED * w:
+    if abs(v) > SATURATED_WIDTHS * w:
         return v
-    for _ in range(STEPS):
+    # Newton steps of one joint.
+    for _ in range(12):
         s = math.tanh(v / w)
         step = (b * v + f * s - x) / (b + f / w * (1 - s * s))
         v -= step

@@ -21,9 +21,6 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
-SHARP = 1e-3
-"""Width [rad/s or m/s] of a sign that is stated as sharp: a limit that is watched by its derivatives needs one."""
-
 
 @dataclass(frozen=True, kw_only=True)
 class PlantEffect:
@@ -93,7 +90,8 @@ class PlantEffect:
         load = rigid - ddq * casadi.SX(rotor_inertias(model, pi).sum(axis=0))
         load = load if gear_load is None else load + gear_load
         at = [q, dq, ddq, rigid, load, Y @ casadi.SX(pi)]
-        at += [casadi.tanh(dq / casadi.SX(np.where(width > 0, width, SHARP))), casadi.SX(list(self.shape))]
+        # Width [rad/s or m/s] of a sign that is stated as sharp: a limit that is watched by its derivatives needs one.
+        at += [casadi.tanh(dq / casadi.SX(np.where(width > 0, width, 1e-3))), casadi.SX(list(self.shape))]
         return term.function(model.robot, self.joint)(*at) @ casadi.SX(list(self.coefficients))
 
     def torque(self, situation: Situation) -> Array:

@@ -14,13 +14,10 @@ from robots.regressor import TorqueModel
 from robots.robot import Robot
 from robots.signals import Motion
 from robots.thermal import ThermalModel, build_thermal_model, known_thermal
-from robots.thermal.motion import PAUSE
+from robots.thermal.motion import PAUSE_STEPS
 
 Array = NDArray[np.float64]
 Thermometers = Literal["none", "ambient", "all"]
-
-RESOLUTION = 1.0
-"""Time over which power is averaged [s]: short against the fastest time constant, some two minutes."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -127,10 +124,11 @@ def heat_piece(motion: Motion, friction: Array) -> HeatPiece:
         return HeatPiece(edges=t, power=np.zeros((0, motion.n)))
     # A polynomial fitted to data may dip below zero where there were none; friction never gives power back.
     power, lengths = np.maximum(friction * motion.dq, 0.0), np.diff(t)
-    moving = lengths <= PAUSE * np.median(lengths)
+    moving = lengths <= PAUSE_STEPS * np.median(lengths)
     energy = np.where(moving[:, None], (power[1:] + power[:-1]) / 2.0, 0.0) * lengths[:, None]
     heat = np.vstack([np.zeros(motion.n), np.cumsum(energy, axis=0)])
-    edges = np.linspace(t[0], t[-1], max(1, int(np.ceil((t[-1] - t[0]) / RESOLUTION - 1e-9))) + 1)
+    # Power is averaged over 1 s: short against the fastest time constant, some two minutes.
+    edges = np.linspace(t[0], t[-1], max(1, int(np.ceil(t[-1] - t[0] - 1e-9))) + 1)
     at_edges = np.stack([np.interp(edges, t, column) for column in heat.T], axis=-1)
     return HeatPiece(edges=edges, power=np.maximum(np.diff(at_edges, axis=0), 0.0) / np.diff(edges)[:, None])
 

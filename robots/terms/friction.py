@@ -23,7 +23,7 @@ POLYNOMIAL = (1, 2, 3, 4)
 BENDS = (0.1, 0.4)
 FINE_BENDS = (0.1, 0.4, 1.0)
 # Speed [rad/s or m/s] below which a joint stands, and share of the rows whose speed is usual: noise makes larger ones.
-SLOWEST, USUAL = 1e-3, 0.999
+STANDING_SPEED, USUAL_SPEED_SHARE = 1e-3, 0.999
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -174,7 +174,9 @@ class BendingFriction(FrictionTerm):
     def within(cls, speeds: NDArray[np.float64], bends: tuple[float, ...] = BENDS) -> BendingFriction:
         """Builds the friction of motions with these highest speeds (n,) [rad/s or m/s], rounded to two digits."""
         # The speed of a joint at rest is not known.
-        return cls(speed=tuple(float(f"{speed:.2g}") if speed > SLOWEST else 1.0 for speed in speeds), bends=bends)
+        return cls(
+            speed=tuple(float(f"{speed:.2g}") if speed > STANDING_SPEED else 1.0 for speed in speeds), bends=bends
+        )
 
     def units(self, force: str, length: str) -> dict[str, str]:
         """Returns the units of one joint's coefficients."""

@@ -10,9 +10,6 @@ from robots.common.errors import InputError
 
 Array = NDArray[np.float64]
 
-# Trapezoidal rule in w, p = 1 / (1 + exp(-w)): step over the order, error exp(-pi^2 / step); and e^-40 of the weight.
-_STEP, _REACH = 0.3, 40.0
-
 
 def mittag_leffler(x: ArrayLike, order: float) -> Array:
     """Gives E_nu(-x) = sum_k (-x)^k / Gamma(nu k + 1), which falls from 1 to 0 (thesis eq. 133).
@@ -45,8 +42,11 @@ def mittag_leffler(x: ArrayLike, order: float) -> Array:
     with np.errstate(divide="ignore"):
         log_t = np.log(value).ravel() / order
     # Large arguments live on slow rates, which are at small p.
-    slowest = _REACH + order * max(float(log_t.max(initial=0.0)), 0.0)
-    w = np.arange(-slowest, _REACH, _STEP * order)
+    # Trapezoidal rule in w, p = 1 / (1 + exp(-w)), as far as e^-40 of the weight.
+    reach = 40.0
+    slowest = reach + order * max(float(log_t.max(initial=0.0)), 0.0)
+    # The error of a step is exp(-pi^2 / step).
+    w = np.arange(-slowest, reach, 0.3 * order)
     p, rest = expit(w), expit(-w)
     weight = p * rest / (p * rest).sum()
     log_rate = (np.log(np.sin(order * np.pi * p)) - np.log(np.sin(order * np.pi * rest))) / order

@@ -13,7 +13,7 @@ from robots.thermal.base import ThermalModel
 Array = NDArray[np.float64]
 
 # A step of so many median steps is a pause between logs, in which the joint rests.
-PAUSE = 20.0
+PAUSE_STEPS = 20.0
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -114,7 +114,7 @@ def simulate_motion(
     # A polynomial fitted to data may dip below zero where there were none; friction never gives power back.
     W = np.maximum(cold * velocity, 0.0)
     lengths = np.diff(times)
-    moving = lengths <= PAUSE * np.median(lengths)
+    moving = lengths <= PAUSE_STEPS * np.median(lengths)
     middle = np.where(moving, (W[1:] + W[:-1]) / 2.0, 0.0)
     heat = np.concatenate([[0.0], np.cumsum(middle * lengths)])
     count = max(1, int(np.ceil((times[-1] - times[0]) / resolution - 1e-9)))

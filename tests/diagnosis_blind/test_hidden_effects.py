@@ -20,10 +20,10 @@ from oed.benchmarks.truth.effects import (
     actuator,
     compliant_base,
     friction,
-    strangers,
     surroundings,
     transmission,
-    whole_strangers,
+    unlisted_joint_effects,
+    unlisted_robot_effects,
 )
 from oed.benchmarks.truth.effects.base import Effect
 from oed.benchmarks.truth.oracle import ask_oracle
@@ -78,8 +78,8 @@ LABELLED = (
 )
 NOTHING = Hide(seed=7032, periodic=False)
 PAIR = Hide(seed=7011, effects=(friction.PositionDependent, surroundings.Payload), joint=1)
-STRANGE = Hide(seed=7021, effects=(strangers.CrossWave,), joint=2, size=0.05)
-SWINGING = Hide(seed=7041, effects=(whole_strangers.Slosh,), size=0.01, duration=60.0)
+STRANGE = Hide(seed=7021, effects=(unlisted_joint_effects.CrossWave,), joint=2, size=0.05)
+SWINGING = Hide(seed=7041, effects=(unlisted_robot_effects.Slosh,), size=0.01, duration=60.0)
 MORE = (
     Hide(seed=7004, effects=(surroundings.Payload,), kind="heavy"),
     Hide(seed=7033, kind="ur10"),
@@ -97,12 +97,12 @@ MORE = (
     Hide(seed=7073, effects=(compliant_base.LeaningBase,), size=0.02, kind="ur10"),
 )
 MORE_STRANGE = (
-    Hide(seed=7071, effects=(strangers.Drag,), joint=1, size=0.03),
-    Hide(seed=7074, effects=(strangers.DeadZone,), joint=2, size=0.02),
-    Hide(seed=7075, effects=(whole_strangers.SlippedBase,), size=0.015, kind="ur10", periodic=False),
-    Hide(seed=7072, effects=(whole_strangers.Hose,), size=0.03, kind="ur10"),
-    Hide(seed=7076, effects=(strangers.SlippedZero,), size=0.015, joint=3),
-    Hide(seed=7077, effects=(whole_strangers.Conveyor,), size=0.015, kind="panda"),
+    Hide(seed=7071, effects=(unlisted_joint_effects.Drag,), joint=1, size=0.03),
+    Hide(seed=7074, effects=(unlisted_joint_effects.DeadZone,), joint=2, size=0.02),
+    Hide(seed=7075, effects=(unlisted_robot_effects.SlippedBase,), size=0.015, kind="ur10", periodic=False),
+    Hide(seed=7072, effects=(unlisted_robot_effects.Hose,), size=0.03, kind="ur10"),
+    Hide(seed=7076, effects=(unlisted_joint_effects.SlippedZero,), size=0.015, joint=3),
+    Hide(seed=7077, effects=(unlisted_robot_effects.Conveyor,), size=0.015, kind="panda"),
 )
 """Cases for a longer run."""
 
@@ -181,7 +181,7 @@ def test_what_swings_at_the_flange_is_reported_with_its_frequency() -> None:
     """Liquid in a tank is ``unexplained`` on the whole robot, reported by its frequency, and mends unseen data."""
     truth, said = examined(SWINGING)
     (hidden,) = truth.effects
-    assert isinstance(hidden, whole_strangers.Slosh)
+    assert isinstance(hidden, unlisted_robot_effects.Slosh)
     assert said["verdict"] == "unexplained"
     (finding,) = said["findings"]
     assert (finding["effect"], finding["joint"]) == ("unexplained", None)

@@ -22,7 +22,7 @@ from benchmarks.diagnosis_parts.statistics import (
 )
 from benchmarks.diagnosis_parts.strata import STRATA, TUNING, tasks
 from oed.benchmarks.truth.effects.friction import FrictionStep, Stribeck
-from oed.benchmarks.truth.effects.strangers import CrossWave
+from oed.benchmarks.truth.effects.unlisted_joint_effects import CrossWave
 from tests.diagnosis_blind.judging import Truth, complaints
 
 AFTER = {"after_extension": 3.2e-3, "oracle_before": 4.5e-3, "oracle_after": 3e-3}

@@ -11,7 +11,7 @@ import numpy as np
 from estimation.actuators.exports.expressible import Expressible, expressible
 from estimation.actuators.result import Actuators
 from estimation.exports.mjcf.contents import Contents
-from estimation.exports.mjcf.editing import STEPS, Source, keep_assets, read_source, set_inertial
+from estimation.exports.mjcf.editing import FRICTION_TIME_STEPS, Source, keep_assets, read_source, set_inertial
 from estimation.exports.mjcf.new_model import new_model
 from estimation.exports.mjcf.xml_elements import inertial, numbers
 from robots.common.errors import InputError
@@ -82,7 +82,7 @@ def _edited(source: Source, result: Actuators, known: Expressible, folder: Path)
         element.set("frictionloss", repr(float(known.friction[j])))
         if known.friction[j] > 0:
             # MuJoCo's default lets a joint creep that friction should hold.
-            element.set("solreffriction", f"{STEPS * step!r} 1")
+            element.set("solreffriction", f"{FRICTION_TIME_STEPS * step!r} 1")
         if known.mass_factor[j] != 1.0:
             _scale_body(source, name, float(known.mass_factor[j]))
     keep_assets(source, folder)

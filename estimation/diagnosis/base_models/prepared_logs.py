@@ -18,7 +18,7 @@ from robots.base_parameters import BaseParameters
 from robots.common.errors import NotIdentifiableError
 from robots.signals import Log
 from robots.terms import FINE_BENDS, BendingFriction, FrictionTerm
-from robots.terms.friction import USUAL
+from robots.terms.friction import USUAL_SPEED_SHARE
 
 # Findings of the gate that an effect of the robot may cause, or that the diagnosis reports itself.
 TOLERATED = frozenset(
@@ -94,7 +94,7 @@ def prepare_logs(fit: Ready, unseen: Ready | None, friction: str | FrictionTerm)
         raise NotIdentifiableError("no joint moves", remedy="record a log in which the arm moves")
     # Held-out logs count too: a gravity that occurs only there needs the robot's description as a prior.
     gravities = [log.gravity for log in (*logs, *other) if log.gravity is not None]
-    speeds = np.quantile(np.abs(recording.dq), USUAL, axis=0)
+    speeds = np.quantile(np.abs(recording.dq), USUAL_SPEED_SHARE, axis=0)
     # A curve that the base model cannot follow would have a name.
     chosen = BendingFriction.within(speeds, FINE_BENDS) if friction == "auto" else friction
     base = base_parameters(robot, chosen, (FIRST_VELOCITY_SCALE,) * robot.n, gravities)

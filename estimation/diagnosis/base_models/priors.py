@@ -9,8 +9,8 @@ from estimation.diagnosis.base_models.baseline import Baseline
 from estimation.diagnosis.recordings.log_reading import Recording
 from estimation.linear_algebra.scaled import inverse_root
 from estimation.regressions.parameter_priors import (
-    OWN,
-    SILENT,
+    OWN_TORQUE_RATIO,
+    SILENT_COLUMN,
     GaussianPrior,
     friction_levels,
     prior_from_description,
@@ -62,12 +62,12 @@ def base_model_prior(baseline: Baseline, recording: Recording, strength: float =
         levels[own, np.arange(len(own))] = raised
         usual = np.array([usual_share(column) for column in baseline.base.columns])
         share = (levels / torque[:, None]).max(axis=0) / usual
-        pull = GaussianPrior(np.diag(np.maximum(share, SILENT) ** 2), np.zeros(len(own)))
+        pull = GaussianPrior(np.diag(np.maximum(share, SILENT_COLUMN) ** 2), np.zeros(len(own)))
     b, m = len(pull.target), baseline.nuisance.shape[2]
     precision = np.zeros((b + m, b + m))
     precision[:b, :b] = pull.precision
     # Errors of the sign widths need a bound, too: rows that hardly contain them would allow any value.
-    precision[range(b, b + m), range(b, b + m)] = 1.0 / (OWN * torque[:m]) ** 2
+    precision[range(b, b + m), range(b, b + m)] = 1.0 / (OWN_TORQUE_RATIO * torque[:m]) ** 2
     return GaussianPrior(strength * precision, np.concatenate([pull.target, np.zeros(m)]))
 
 

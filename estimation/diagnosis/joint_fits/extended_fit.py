@@ -22,7 +22,7 @@ from estimation.diagnosis.joint_fits.shape_errors import (
     with_value,
 )
 from estimation.diagnosis.joint_fits.shrinkage import effects_prior
-from estimation.identifications.verdicts import NEGLIGIBLE, RELATIVE
+from estimation.identifications.verdicts import DETERMINED_ERROR, NEGLIGIBLE_TORQUE
 from estimation.models.extension import Extension
 from estimation.models.model import Model
 from estimation.regressions.parameter_priors import GaussianPrior
@@ -254,5 +254,5 @@ def _determined(problem: Problem, values: Array, errors: Array) -> NDArray[np.bo
     torque = np.sqrt(np.mean(problem.recording.tau**2, axis=0))
     excited = np.sqrt(np.mean(Y**2, axis=0))
     share = (errors * excited / np.maximum(torque, 1e-12)[:, None]).max(axis=0)
-    known: NDArray[np.bool_] = (errors <= RELATIVE * np.abs(values)) | (share <= NEGLIGIBLE)
+    known: NDArray[np.bool_] = (errors <= DETERMINED_ERROR * np.abs(values)) | (share <= NEGLIGIBLE_TORQUE)
     return known & (excited.max(axis=0) > 0) & (errors > 0)

@@ -11,7 +11,7 @@ from scipy.fft import next_fast_len
 
 from estimation.diagnosis.noise_models.noise_nuisance_basis import NuisanceProjection
 from estimation.diagnosis.noise_models.spectral_lines import remove_lines
-from estimation.uncertainty.autoregressive import HIGHEST_ORDER, Noise, fit_noise, levinson
+from estimation.uncertainty.autoregressive import HIGHEST_NOISE_ORDER, Noise, fit_noise, levinson
 
 Array = NDArray[np.float64]
 
@@ -44,7 +44,7 @@ class SpectrumSettings:
 # With nuisance functions, the whole memory is used. The order that predicts best misses much of the noise slower than a
 # second, against which slow effects are tested. Without nuisance functions, such an order would take slow effects for
 # noise.
-WITH_NUISANCE = SpectrumSettings(flat=0.15, memory=1.0, rows=100, times=HIGHEST_ORDER, held=False)
+WITH_NUISANCE = SpectrumSettings(flat=0.15, memory=1.0, rows=100, times=HIGHEST_NOISE_ORDER, held=False)
 WITHOUT_NUISANCE = SpectrumSettings(flat=1.0, memory=0.2, rows=1, times=1, held=True)
 
 
@@ -79,7 +79,7 @@ def fit_noise_process(
     """
     rows, joints = sum(map(len, pieces)), pieces[0].shape[1]
     longest = np.minimum(colour.memory / step, counts / colour.rows)
-    orders = np.clip(longest, LOWEST_ORDER, HIGHEST_ORDER).astype(int)
+    orders = np.clip(longest, LOWEST_ORDER, HIGHEST_NOISE_ORDER).astype(int)
     size = next_fast_len(max(map(len, pieces)) + int(orders.max()) + 1, real=True)
     power = sum(np.abs(np.fft.rfft(piece, size, axis=0)) ** 2 for piece in pieces) / counts
     power = remove_lines(power / beside.kept(size, counts), 1 / (size * step), period)

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from scipy.ndimage import maximum_filter1d
 
 from estimation.diagnosis.calibration import CREEP_SPEED, CREEP_TIME, MIN_SHARP_SPEED_SIGMAS, MIN_SPEED_SIGMAS
-from estimation.regressions.preparation import SLOW
+from estimation.regressions.preparation import SIGN_SPEED_SHARE
 from robots.common.stretches import spans
 
 Array = NDArray[np.float64]
@@ -124,7 +124,7 @@ def find_directions(
         kicked = largest > NO_KICK * float(np.sqrt(np.mean(a**2)))
         beside = int(np.clip(np.ceil(SPREAD / (cutoff * step)) if kicked else 1, 1, BESIDE)) if sampled else BESIDE
         near = maximum_filter1d(turned.astype(np.int8), 2 * beside, origin=0) > 0
-        unsure[:, j] = (np.abs(v) < np.maximum(MIN_SPEED_SIGMAS * error, SLOW * speed)) | near
+        unsure[:, j] = (np.abs(v) < np.maximum(MIN_SPEED_SIGMAS * error, SIGN_SPEED_SHARE * speed)) | near
         change = np.abs(a) * step
         # At each reversal the error is at least its RMS over all reversals: a jump may hide in the noise. A joint at
         # rest has no jumps, which the weights allow for.

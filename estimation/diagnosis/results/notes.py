@@ -26,7 +26,7 @@ from estimation.diagnosis.validations.validated_findings import Change, ChangedF
 from robots.terms.base import force_unit
 from robots.terms.discrepancies.patterns import PREFIX
 from robots.terms.effects import EFFECTS
-from robots.terms.effects.current_clipping import CERTAIN, CurrentClipping
+from robots.terms.effects.current_clipping import FLAT_TOP_CHANCE, CurrentClipping
 
 Array = NDArray[np.float64]
 
@@ -76,7 +76,7 @@ def notes_of(
         notes.append(f"{whose} friction, gear and rotor effects cannot be detected. Gravity and coupling torques can.")
     clipped_joints = {finding.joint for finding in findings if finding.effect == CLIPPING.name}
     for j in sorted({*range(1, recording.n + 1)} - clipped_joints):
-        if CLIPPING.chance(problem.state_for(CLIPPING), j, recording.tau) < CERTAIN:
+        if CLIPPING.chance(problem.state_for(CLIPPING), j, recording.tau) < FLAT_TOP_CHANCE:
             notes.append(_AT_LIMIT.format(j, float(np.abs(recording.tau[:, j - 1]).max()), force_unit(robot, j - 1)))
     strange = _strange(problem, after)
     notes += strange.values()

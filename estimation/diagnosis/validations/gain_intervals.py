@@ -16,7 +16,7 @@ from estimation.diagnosis.recordings.log_reading import Recording
 from estimation.regressions.parameter_priors import GaussianPrior
 from estimation.uncertainty.blocks import moving_block_sums
 from estimation.uncertainty.correlations import correlation_rows
-from estimation.uncertainty.quantiles import CHI2_95, TAIL
+from estimation.uncertainty.quantiles import CHI2_95, TAIL_95
 from robots.common.plain import several
 
 Array = NDArray[np.float64]
@@ -117,7 +117,7 @@ class HeldOutErrors:
         sums = moving_block_sums(np.hstack([*squares, counts]), block, RESAMPLES, rng)
         old, new, counted = np.split(sums, 3, axis=1)
         falls = ((np.sqrt(old / np.maximum(counted, 1)) - np.sqrt(new / np.maximum(counted, 1))) / level).mean(axis=1)
-        low, high = np.quantile(falls, [TAIL, 1 - TAIL])
+        low, high = np.quantile(falls, [TAIL_95, 1 - TAIL_95])
         return float(low), float(high)
 
     def surely_worse(self, model: int) -> bool:

@@ -19,9 +19,9 @@ from estimation.uncertainty.correlations import effective_rows
 from estimation.uncertainty.quantiles import student_95
 from robots.signals import Log
 from robots.terms.base import force_unit, length_unit
-from robots.terms.effect_bases.unknown_rotor import KNOWN
+from robots.terms.effect_bases.parameters import DAMPING_RATIO
+from robots.terms.effect_bases.unknown_rotor import KNOWN_ROTOR
 from robots.terms.effects import EFFECTS
-from robots.terms.effects.joint_elasticity import DAMPING
 from robots.terms.situations.situation import Situation
 
 Array = NDArray[np.float64]
@@ -272,7 +272,7 @@ def _extension(now: Situation, joint: int, compliance: float, error: float) -> E
     return Extension(
         effect=EFFECT,
         joint=joint,
-        shape=(stiffness, KNOWN, DAMPING),
+        shape=(stiffness, KNOWN_ROTOR, DAMPING_RATIO),
         coefficients=np.array([compliance]),
         covariance=np.diag([error**2, np.inf, np.inf, np.inf]),
     )

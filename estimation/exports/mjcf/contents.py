@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from estimation.exports.feasible import NEAREST, nearest_feasible
-from estimation.exports.friction import LinearFriction, linear_friction
+from estimation.exports.friction import NAMED_DIFFERENCE, LinearFriction, linear_friction
 from estimation.exports.mjcf.couplings import Coupling, coupling_of
 from estimation.exports.standard import REMEDY, standard_and_rotors
 from estimation.exports.unstated import unstated_terms
@@ -21,9 +21,7 @@ from robots.terms.situations.situation import situation
 
 Array = NDArray[np.float64]
 
-ROUGH = 0.02  # of the friction or spring torque: a larger difference from the identified curve is named
-SHARE = 1e-9  # a body's smallest eigenvalue over its largest, below which it is none
-POSITIONS = 50
+SPRING_POSITIONS = 50
 
 
 @dataclass(kw_only=True, eq=False)
@@ -109,7 +107,7 @@ def _rough_friction(robot: Robot, friction: LinearFriction) -> list[str]:
     rough = [
         f"{friction.error[i]:.2g} {robot.limits.unit(i, 'torque')} at joint {name}"
         for i, name in enumerate(robot.joint_names)
-        if friction.error[i] > ROUGH * friction.largest[i]
+        if friction.error[i] > NAMED_DIFFERENCE * friction.largest[i]
     ]
     text = "damping and frictionloss approximate the identified friction; largest difference up to the recorded speed:"
     return [f"{text} {', '.join(rough)}"] if rough else []
@@ -137,7 +135,7 @@ def _spring(contents: Contents, model: Model, robot: Robot, extension: Extension
     assert extension.joint is not None
     i = extension.joint - 1
     low, high = _positions(model, robot, i)
-    q, torque = np.linspace(low, high, POSITIONS), _torque_at(model, extension, low, high)
+    q, torque = np.linspace(low, high, SPRING_POSITIONS), _torque_at(model, extension, low, high)
     slope, intercept = (float(x) for x in np.polyfit(q, torque, 1))
     unit, name = robot.limits.unit(i, "torque"), robot.joint_names[i]
     if slope == 0.0:
@@ -145,7 +143,7 @@ def _spring(contents: Contents, model: Model, robot: Robot, extension: Extension
     error, largest = float(np.abs(slope * q + intercept - torque).max()), float(np.ptp(torque))
     contents.stiffness[i], contents.springref[i] = slope, -intercept / slope
     contents.stated.append(f"spring of joint {name}")
-    if error > ROUGH * largest:
+    if error > NAMED_DIFFERENCE * largest:
         contents.remarks.append(
             f"stiffness approximates the identified spring of joint {name}; largest difference over the recorded "
             f"positions: {error:.2g} {unit}"
@@ -156,12 +154,12 @@ def _spring(contents: Contents, model: Model, robot: Robot, extension: Extension
 def _torque_at(model: Model, extension: Extension, low: float, high: float) -> Array:
     assert extension.joint is not None
     n = model.robot.n
-    q = np.zeros((POSITIONS, n))
-    q[:, extension.joint - 1] = np.linspace(low, high, POSITIONS)
+    q = np.zeros((SPRING_POSITIONS, n))
+    q[:, extension.joint - 1] = np.linspace(low, high, SPRING_POSITIONS)
     parameters = np.zeros(model.torque_model.size)
     parameters[list(model.columns)] = model.values
     still = np.zeros_like(q)
-    state = situation(model.torque_model, parameters, np.arange(POSITIONS) * 1.0, q, still, still)
+    state = situation(model.torque_model, parameters, np.arange(SPRING_POSITIONS) * 1.0, q, still, still)
     return np.asarray(extension.torque(state)[:, extension.joint - 1])
 
 
@@ -179,7 +177,8 @@ def _positions(model: Model, robot: Robot, i: int) -> tuple[float, float]:
 def _payload(contents: Contents, extension: Extension) -> bool:
     body = np.asarray(extension.coefficients, dtype=float)
     values = np.linalg.eigvalsh(pseudo_inertia(body))
-    if not body[0] > 0.0 or values[0] < -SHARE * values[-1]:
+    # A body without a positive mass, or with a negative eigenvalue beyond rounding, is none.
+    if not body[0] > 0.0 or values[0] < -1e-9 * values[-1]:
         return False
     contents.payload = body if contents.payload is None else contents.payload + body
     contents.stated.append("payload")

@@ -11,8 +11,6 @@ from estimation.models.extension import Extension
 
 Array = NDArray[np.float64]
 
-UNEVEN = 0.05  # relative difference of the two directions that is named
-
 
 @dataclass(frozen=True, kw_only=True)
 class Tendon:
@@ -70,7 +68,8 @@ def coupling_of(extension: Extension, armature: Array, damping: Array | None) ->
         )
         if tendon.damping or tendon.armature or tendon.frictionloss:
             tendons.append(tendon)
-    uneven = abs(on_inner - on_outer) > UNEVEN * max(abs(on_inner), abs(on_outer))
+    # A difference of the two directions of more than 5 % is named.
+    uneven = abs(on_inner - on_outer) > 0.05 * max(abs(on_inner), abs(on_outer))
     remark = (
         f"the viscous coupling of joints {inner + 1} and {outer + 1} is the mean of {on_inner:.2g} and {on_outer:.2g}, "
         "because a tendon acts on both alike"

@@ -26,7 +26,7 @@ from robots.terms.situations.sensitivities import moved_body
 Array = NDArray[np.float64]
 Element = ElementTree.Element
 
-STEPS = 2.0  # time constant of dry friction in time steps, the smallest that MuJoCo accepts
+FRICTION_TIME_STEPS = 2.0  # time constant of dry friction in time steps, the smallest that MuJoCo accepts
 DEFAULT_SOLREF = (0.02, 1.0)
 
 
@@ -197,7 +197,7 @@ def _write_joint(source: Source, contents: Contents, robot: Robot, i: int, j: in
         element.set("damping", _first(contents.damping[i], getattr(model, "dof_dampingpoly", None), dof))
         element.set("frictionloss", repr(float(contents.coulomb[i])))
         if contents.coulomb[i] > 0.0 and tuple(model.dof_solref[dof]) == DEFAULT_SOLREF:
-            element.set("solreffriction", f"{STEPS * float(model.opt.timestep)!r} 1")
+            element.set("solreffriction", f"{FRICTION_TIME_STEPS * float(model.opt.timestep)!r} 1")
     stiffness = float(contents.stiffness[i])
     had_spring = bool(model.jnt_stiffness[j])
     if stiffness or had_spring:

@@ -20,8 +20,6 @@ from robots.mujoco_models.files import compile_mjcf, is_mjcf, mujoco_library
 from robots.robot import Robot
 from robots.version import VERSION
 
-ROUNDING = 1e-9  # relative; MuJoCo keeps what it reads in double precision
-
 
 @dataclass(frozen=True, kw_only=True)
 class Mjcf:
@@ -120,7 +118,8 @@ def _confirm(text: str, contents: Contents, robot: Robot, folder: Path) -> None:
         if place.body > 0 and place.name in index:
             found[place.body - 1] += body_inertia(compiled, index[place.name], place.pose)
     scale = np.abs(contents.inertia).max(axis=1, keepdims=True)
-    if (np.abs(found - contents.inertia) > ROUNDING * scale).any():
+    # MuJoCo keeps what it reads in double precision.
+    if (np.abs(found - contents.inertia) > 1e-9 * scale).any():
         raise InfeasibleError(
             "MuJoCo gives the bodies of the written file other masses or inertias",
             remedy="remove boundmass and boundinertia from <compiler>",

@@ -11,10 +11,10 @@ from numpy.typing import ArrayLike, NDArray
 
 from estimation.exports.c_code import check_prefix, generated
 from estimation.external_forces.residuals.dynamics import dynamics_of
-from estimation.external_forces.residuals.friction_levels import MEMORY
-from estimation.external_forces.residuals.signals import SETTLING
+from estimation.external_forces.residuals.friction_levels import FRICTION_MEMORY
+from estimation.external_forces.residuals.signals import SETTLING_CONSTANTS
 from estimation.external_forces.thresholds.calibrations import Calibration
-from estimation.external_forces.wrenches import UNOBSERVABLE
+from estimation.external_forces.wrenches import UNOBSERVABLE_SHARE
 from estimation.models.model import Model
 from robots.common.errors import InputError
 from robots.common.files import write_atomic
@@ -104,11 +104,11 @@ def observer_code(
     numbers = {
         "CONSTANT": calibration.constant,
         "PERIOD": calibration.period,
-        "MEMORY": MEMORY,
+        "MEMORY": FRICTION_MEMORY,
         "THRESHOLD": calibration.threshold.value,
-        "SETTLING": SETTLING * calibration.constant,
+        "SETTLING": SETTLING_CONSTANTS * calibration.constant,
         "FORGOTTEN": calibration.memory,
-        "UNOBSERVABLE": UNOBSERVABLE,
+        "UNOBSERVABLE": UNOBSERVABLE_SHARE,
     }
     head = HEAD.format(name=model.robot.name, version=VERSION, prefix=prefix, n=dynamics.n)
     lines = [f"enum {{ NAME_N = {dynamics.n}, NAME_WORK = {work} }};"]

@@ -11,8 +11,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from estimation.external_forces.online.step_functions import StepErrors, StepFunction
 from estimation.external_forces.residuals.dynamics import dynamics_of
-from estimation.external_forces.residuals.friction_levels import MEMORY, contact_weight
-from estimation.external_forces.residuals.signals import SETTLING
+from estimation.external_forces.residuals.friction_levels import FRICTION_MEMORY, contact_weight
+from estimation.external_forces.residuals.signals import SETTLING_CONSTANTS
 from estimation.external_forces.thresholds.calibrations import Calibration
 from estimation.external_forces.wrenches import tool_load
 from estimation.models.model import Model
@@ -22,7 +22,7 @@ from robots.thermal.online import OnlineFriction
 
 Array = NDArray[np.float64]
 
-RESOLUTION = 1.0
+HEAT_STEP = 1.0
 """Time over which the friction's power is averaged [s]: short against the time constants of a joint."""
 
 
@@ -113,7 +113,7 @@ class ForceObserver:
         self._errors = StepErrors(calibration.errors)
         self._sliding = calibration.errors.sliding
         self._constant, self._threshold = calibration.constant, calibration.threshold.value
-        self._friction = [None if own is None else OnlineFriction(own, np.zeros(4), RESOLUTION) for own in thermal]
+        self._friction = [None if own is None else OnlineFriction(own, np.zeros(4), HEAT_STEP) for own in thermal]
         self.reset()
 
     @property
@@ -189,12 +189,12 @@ class ForceObserver:
         deviation = errors.deviation(self._amplitudes)
         statistic = errors.statistic(self._residual, deviation) / self._threshold
         if step is not None and not fresh:
-            b = math.exp(-min(step, 2.0 * self.calibration.period) / MEMORY)
+            b = math.exp(-min(step, 2.0 * self.calibration.period) / FRICTION_MEMORY)
             counts = np.where(slides, (1.0 - b) * float(contact_weight(statistic)), 0.0)
             kept = np.where(slides, b, 1.0)
             self._cross = kept * self._cross - counts * external * mean
             self._square = kept * self._square + counts * mean * mean
-        if statistic > 1.0 and t - self._begun > SETTLING * constant:
+        if statistic > 1.0 and t - self._begun > SETTLING_CONSTANTS * constant:
             self._touched = t
         contact = t - self._touched <= self.calibration.memory
         return Reading(t, self._residual, deviation, statistic, contact, jacobian, at, self.calibration)
@@ -203,13 +203,13 @@ class ForceObserver:
         """Adds the energy of a step, and follows the temperatures once a second."""
         self._energy += np.maximum(power, 0.0) * step
         self._gathered += step
-        while self._gathered >= RESOLUTION:
+        while self._gathered >= HEAT_STEP:
             mean = self._energy / self._gathered
             for j, online in enumerate(self._friction):
                 if online is not None:
                     self._factors[j] = online.heat_by(float(mean[j]))
-            self._energy -= mean * RESOLUTION
-            self._gathered -= RESOLUTION
+            self._energy -= mean * HEAT_STEP
+            self._gathered -= HEAT_STEP
 
     def _checked(self, *signals: ArrayLike) -> Array:
         """Gives q, dq and tau (3, n) as one array.

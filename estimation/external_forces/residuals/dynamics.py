@@ -11,10 +11,10 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from estimation.models.model import Model
-from estimation.regressions.joint_regressor import chunks
 from robots.batch import BatchFunction, batch_function, builds_expressions
 from robots.collision.kinematics import symbolic_frames
 from robots.common.errors import InputError
+from robots.common.stretches import chunks
 from robots.regressor import TorqueModel
 from robots.terms.situations.flange_body import require_flange, with_body
 

@@ -10,9 +10,6 @@ from scipy.signal import lfilter
 
 Array = NDArray[np.float64]
 
-# Relative spread of the time steps up to which one coefficient serves all of them.
-EVEN = 1e-6
-
 
 def time_constant(bandwidth: float) -> float:
     """Gives the time constant [s] of a first-order filter of that bandwidth [Hz]."""
@@ -75,7 +72,8 @@ def _run(x: Array, steps: Array, constant: float) -> Array:
     if not len(steps):
         return x
     decay = np.exp(-steps / constant)
-    if np.ptp(steps) <= EVEN * steps.mean():
+    # Relative spread of the time steps up to which one coefficient serves all of them.
+    if np.ptp(steps) <= 1e-6 * steps.mean():
         a = float(decay.mean())
         return np.asarray(lfilter([1.0 - a], [1.0, -a], x, axis=0, zi=a * x[None, 0])[0])
     y = np.array(x)

@@ -9,7 +9,7 @@ from estimation.external_forces.residuals.filters import filtered
 
 Array = NDArray[np.float64]
 
-MEMORY = 30.0
+FRICTION_MEMORY = 30.0
 """Time constant of the level [s]: joints heat up in minutes, a push lasts a fraction of a second."""
 
 
@@ -59,11 +59,11 @@ def _followed(steps: Array, counts: Array, external: Array, friction: Array) -> 
     """The excess (M,) at the rows of one joint that count, `steps` [s] after each other."""
     clock, once = np.cumsum(steps) - steps[0], np.zeros(len(steps), dtype=bool)
     once[0] = True
-    first = clock <= MEMORY
+    first = clock <= FRICTION_MEMORY
     sums = []
     for product in (-counts * external * friction, counts * friction**2):
         product[0] = product[first].mean()
-        sums.append(filtered(product[:, None], clock, MEMORY, once)[:, 0])
+        sums.append(filtered(product[:, None], clock, FRICTION_MEMORY, once)[:, 0])
     return np.divide(sums[0], sums[1], out=np.zeros_like(sums[0]), where=sums[1] > 0.0)
 
 

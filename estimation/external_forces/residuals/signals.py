@@ -23,9 +23,9 @@ from robots.signals import Log
 Array = NDArray[np.float64]
 
 # Time constants that a log must last.
-SHORTEST = 10.0
+SHORTEST_LOG_CONSTANTS = 10.0
 # Time constants after a start in which nothing is judged.
-SETTLING = 3.0
+SETTLING_CONSTANTS = 3.0
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -105,11 +105,11 @@ def signals_of(
     if prediction.measured is None:
         raise InputError("the log has no torque", file=file, remedy="record tau1.. or i1.. with the positions")
     motion, constant = prediction.motion, time_constant(bandwidth)
-    if motion.duration < SHORTEST * constant:
+    if motion.duration < SHORTEST_LOG_CONSTANTS * constant:
         raise InputError(
             f"a log of {motion.duration:.2g} s",
             file=file,
-            allowed=f"{SHORTEST * constant:.2g} s or more at a bandwidth of {bandwidth:g} Hz",
+            allowed=f"{SHORTEST_LOG_CONSTANTS * constant:.2g} s or more at a bandwidth of {bandwidth:g} Hz",
         )
     q, dq, ddq = motion.q, motion.dq, motion.ddq
     cold = model.torque(q, dq, ddq, gravity=log.gravity, payload=log.payload)
@@ -172,7 +172,7 @@ def _unsettled(t: Array, begins: NDArray[np.bool_], constant: float, smoother: S
         own = t[first:last]
         # The momentum's change feels the smoothing's end for a period of its cut-off.
         edge = max(smoother.edge(float(own[-1] - own[0])), 1.0 / smoother.cutoff)
-        result[first:last] = (own < own[0] + max(edge, SETTLING * constant)) | (own > own[-1] - edge)
+        result[first:last] = (own < own[0] + max(edge, SETTLING_CONSTANTS * constant)) | (own > own[-1] - edge)
     return result
 
 

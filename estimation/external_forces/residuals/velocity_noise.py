@@ -7,17 +7,14 @@ from numpy.typing import NDArray
 
 from estimation.uncertainty.quantiles import robust_deviation
 from robots.signals import Log, Motion
-from robots.terms.friction import SLOWEST
+from robots.terms.friction import STANDING_SPEED
 
 Array = NDArray[np.float64]
 
 # The sign of the friction is open below so many standard deviations of the noise.
-NOISY = 3.0
+NOISE_SIGMAS = 3.0
 # Speed [rad/s or m/s] from which a joint slides: below it friction may be static.
-SLIDING = 10 * SLOWEST
-# Standard deviation of a normal distribution over the median size.
-# Least share of white noise that a smoothing is taken to remove: without any, nothing shows how large it is.
-LEAST_REMOVED = 0.05
+SLIDING = 10 * STANDING_SPEED
 
 
 def smoothed_noise(log: Log, motion: Motion, cutoff: float) -> Array:
@@ -35,7 +32,8 @@ def smoothed_noise(log: Log, motion: Motion, cutoff: float) -> Array:
     passed = min(cutoff, nyquist)
     raw = np.column_stack([np.interp(motion.t, log.t, column) for column in log.q.T])
     removed = robust_deviation(raw - motion.q)
-    white = removed / np.sqrt(max(1.0 - passed / nyquist, LEAST_REMOVED))
+    # A smoothing is taken to remove 5 % of white noise at least: without any, nothing shows how large it is.
+    white = removed / np.sqrt(max(1.0 - passed / nyquist, 0.05))
     return np.asarray(white * 2.0 * np.pi * np.sqrt(passed**3 / (3.0 * nyquist)))
 
 
@@ -47,4 +45,4 @@ def logged_noise(dq: Array) -> Array:
 
 def sliding_speed(noise: Array) -> Array:
     """Gives the speeds (n,) from which a joint surely slides, by the noise of its velocity (n,) [rad/s or m/s]."""
-    return np.maximum(SLIDING, NOISY * noise)
+    return np.maximum(SLIDING, NOISE_SIGMAS * noise)

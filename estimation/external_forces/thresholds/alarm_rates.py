@@ -11,11 +11,9 @@ from robots.common.errors import InputError
 
 Array = NDArray[np.float64]
 
-HOUR = 3600.0
 # Shares of the samples below the levels above which peaks count. All high ones with enough independent peaks are tried;
 # of the lower ones the first that has enough, where no high one has.
 HIGH, LOW = (0.995, 0.99, 0.98, 0.95, 0.9), (0.8, 0.7, 0.6, 0.5)
-ENOUGH_PEAKS = 20
 # Fewer independent peaks than this say too little of a tail.
 LEAST_PEAKS = 8
 
@@ -75,7 +73,7 @@ def alarm_threshold(statistic: Array, period: float, rate: float, *, robust: boo
         if found is not None and share in LOW:
             break
         tried = _above(float(np.quantile(statistic, share)) if len(statistic) else 0.0, statistic, period, rate, robust)
-        if tried.peaks < ENOUGH_PEAKS and share != LOW[-1]:
+        if tried.peaks < 20 and share != LOW[-1]:
             continue
         # A tail that falls more slowly than it does lower down shows in the higher levels.
         if found is None or tried.value > found.value:
@@ -115,7 +113,7 @@ def _above(base: float, statistic: Array, period: float, rate: float, robust: bo
 
 
 def _threshold(base: float, excess: float, peaks: int, seconds: float, rate: float) -> float:
-    times = max(peaks / seconds * HOUR / rate, 1.0)
+    times = max(peaks / seconds * 3600.0 / rate, 1.0)
     return base + peaks * excess * float(np.expm1(np.log(times) / peaks))
 
 

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from estimation.external_forces.localisation import Localiser
 from estimation.external_forces.options import Velocity
 from estimation.external_forces.residuals.filters import time_constant
-from estimation.external_forces.residuals.signals import SETTLING
+from estimation.external_forces.residuals.signals import SETTLING_CONSTANTS
 from estimation.external_forces.thresholds.alarm_rates import AlarmThreshold
 from estimation.external_forces.thresholds.error_models import ErrorModel
 from estimation.external_forces.thresholds.rate_checks import RateCheck
@@ -67,7 +67,7 @@ class Calibration(Record):
     @property
     def memory(self) -> float:
         """Time after which the observer has forgotten a contact [s]: exceedances closer than this are one contact."""
-        return SETTLING * self.constant
+        return SETTLING_CONSTANTS * self.constant
 
 
 def read_calibration(path: str | Path, joints: int) -> Calibration:

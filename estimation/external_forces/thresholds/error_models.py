@@ -10,26 +10,20 @@ from numpy.typing import NDArray
 from scipy.optimize import nnls
 
 from estimation.exports.friction import linear_friction
-from estimation.external_forces.residuals.velocity_noise import NOISY, SLIDING
+from estimation.external_forces.residuals.velocity_noise import NOISE_SIGMAS, SLIDING
 from estimation.models.model import Model
 from robots.common.records import Record
-from robots.terms.friction import SLOWEST
+from robots.terms.friction import STANDING_SPEED
 
 Array = NDArray[np.float64]
 
 # Widths of the reversals that are compared, as shares of a joint's highest speed.
 WIDTHS = np.geomspace(1e-3, 0.3, 16)
-# Rounds of the weighted fit; rows that stand for a longer log.
-ROUNDS, MOST_ROWS = 4, 20_000
 # Speeds [rad/s or m/s] that are compared: below such a one the sign of the friction is open.
-HOLDING = (SLOWEST, 2 * SLOWEST, 5 * SLOWEST, SLIDING)
+HOLDING = (STANDING_SPEED, 2 * STANDING_SPEED, 5 * STANDING_SPEED, SLIDING)
 # Seconds of new healthy motion that count as much as the fit's band of other motions. On arms that
 # `benchmarks/force_motions.py` draws, the residual of motions that neither has seen is then as large as stated.
-PRIOR = 10.0
-# Quantile that counts as the largest of the healthy logs.
-LARGEST = 0.999
-# Smallest variance as a share of the mean one, and smallest eigenvalue of the correlation.
-LEAST, DISTINCT = 1e-3, 1e-3
+PRIOR_SECONDS = 10.0
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -155,7 +149,7 @@ def fit_error_model(
     the healthy logs show: they may have no stops.
 
     What the fit's splits say of other motions is the growth g of the model's band: g^2 v. Where v is as in the healthy
-    logs, it counts beside their residual as much as `PRIOR` seconds do, so that inside = g^2 PRIOR / (PRIOR + seconds).
+    logs, it counts beside their residual as much as p = `PRIOR_SECONDS` do, so that inside = g^2 p / (p + seconds).
     What v has more than there counts in full: inside + beyond = g^2.
 
     Args:
@@ -173,10 +167,11 @@ def fit_error_model(
     friction_of = linear_friction(model)
     coulomb = np.zeros(n) if friction_of is None else friction_of.coulomb
     fastest = np.maximum(np.abs(dq).max(axis=0), np.finfo(float).tiny)
-    rows = np.flatnonzero(counts)[:: max(1, int(counts.sum()) // MOST_ROWS)]
+    # So many rows stand for a longer log.
+    rows = np.flatnonzero(counts)[:: max(1, int(counts.sum()) // 20_000)]
     square = residual[rows] ** 2
     known = np.stack([lagged(np.abs(friction))[rows] ** 2, lagged(np.sqrt(variance))[rows] ** 2])
-    holding = np.maximum(np.array(HOLDING)[:, None], NOISY * np.broadcast_to(velocity_noise, (n,)))
+    holding = np.maximum(np.array(HOLDING)[:, None], NOISE_SIGMAS * np.broadcast_to(velocity_noise, (n,)))
     held = [lagged(holding_amplitude(dq, coulomb, speed))[rows] ** 2 for speed in holding]
     best, fitted, slowest = np.full(n, np.inf), np.zeros((5, n)), np.zeros(n, dtype=int)
     tried = [(share, 0) for share in WIDTHS] + [(None, k) for k in range(1, len(HOLDING))]
@@ -188,7 +183,8 @@ def fit_error_model(
             weights, cost = _variance_fit(columns, square[:, j], held[k][:, j])
             if cost < best[j]:
                 best[j], fitted[:, j], slowest[j] = cost, [*weights, width[j]], k
-    growth, share = band_growth(model) ** 2, PRIOR / (PRIOR + seconds)
+    growth, share = band_growth(model) ** 2, PRIOR_SECONDS / (PRIOR_SECONDS + seconds)
+    # Quantile that counts as the largest of the healthy logs.
     found = ErrorModel(
         level=fitted[0],
         reversal=fitted[1],
@@ -196,7 +192,7 @@ def fit_error_model(
         leverage=fitted[3],
         inside=share * growth,
         beyond=(1.0 - share) * growth,
-        reach=np.sqrt(np.quantile(variance[counts], LARGEST, axis=0)),
+        reach=np.sqrt(np.quantile(variance[counts], 0.999, axis=0)),
         width=fitted[4],
         coulomb=coulomb,
         holding=holding[slowest, np.arange(n)],
@@ -220,13 +216,15 @@ def _variance_fit(columns: Array, square: Array, added: Array) -> tuple[Array, f
     # A narrow reversal that no sample comes near, or no errors of the parameters: such a column has no weight.
     scale = np.where(scale > np.sqrt(np.finfo(float).tiny), scale, np.inf)
     unit, variance, weights = columns / scale, np.full(len(square), mean) + added, np.zeros(columns.shape[1])
-    for _ in range(ROUNDS):
+    # Rounds of the weighted fit.
+    for _ in range(4):
         weighted = unit / variance[:, None]
         # Four unknowns: the triangle of the rows has the same solution as the rows.
         rows = np.column_stack([weighted, (square - added) / variance])
         triangle = np.asarray(np.linalg.qr(rows, mode="r"))
         weights = nnls(triangle[:, :-1], triangle[:, -1])[0] / scale
-        weights[0] = max(weights[0], LEAST * mean)
+        # Smallest variance, as a share of the mean one.
+        weights[0] = max(weights[0], 1e-3 * mean)
         variance = columns @ weights + added
     return weights, float(np.mean(np.log(variance) + square / variance))
 
@@ -236,6 +234,7 @@ def _correlation(z: Array) -> Array:
     moments = z.T @ z / len(z)
     scale = np.sqrt(np.diag(moments))
     values, vectors = np.linalg.eigh(moments / scale[:, None] / scale)
-    lifted = (vectors * np.maximum(values, DISTINCT)) @ vectors.T
+    # Smallest eigenvalue of the correlation.
+    lifted = (vectors * np.maximum(values, 1e-3)) @ vectors.T
     scale = np.sqrt(np.diag(lifted))
     return np.asarray(lifted / scale[:, None] / scale)

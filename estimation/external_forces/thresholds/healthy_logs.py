@@ -13,7 +13,7 @@ from estimation.external_forces.localisation import fit_localiser
 from estimation.external_forces.options import Velocity
 from estimation.external_forces.residuals.filters import time_constant
 from estimation.external_forces.residuals.friction_levels import contact_weight
-from estimation.external_forces.residuals.signals import SETTLING, Signals
+from estimation.external_forces.residuals.signals import SETTLING_CONSTANTS, Signals
 from estimation.external_forces.thresholds.alarm_rates import alarm_threshold
 from estimation.external_forces.thresholds.calibrations import Calibration
 from estimation.external_forces.thresholds.error_models import fit_error_model
@@ -27,11 +27,8 @@ from robots.common.stretches import joined_spans
 Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 
-# Samples of the healthy log from which the levels of the localisation are estimated.
-MOST_ROWS = 4000
-ITERATIONS = 8
-# Where the first round cuts residuals off, and a normal distribution's standard deviation over its median size.
-WINSOR = 3.0
+# Rows that stand for a longer log: for the levels of the localisation, and where a repeated motion is sought.
+MOST_HEALTHY_ROWS = 20_000
 
 
 def calibrate_signals(
@@ -66,7 +63,7 @@ def calibrate_signals(
     seconds = 0.0 if in_fit else whole.period * int(new.sum())
     lag = lag_of(whole, bandwidth)
     # The filter begins with zero, and its first moments know little of the residual.
-    settled = _since(whole) > SETTLING * time_constant(bandwidth)
+    settled = _since(whole) > SETTLING_CONSTANTS * time_constant(bandwidth)
     counts = settled.copy()
     if not (counts & new).any():
         raise InputError(
@@ -74,7 +71,7 @@ def calibrate_signals(
             remedy="give a longer healthy log with --healthy: a minute or more",
         )
     noise = np.median(whole.velocity_noise, axis=0)
-    for number in range(ITERATIONS if own else 1):
+    for number in range(8 if own else 1):
         first = own and number == 0
         residual = lag(whole.external, from_zero=True)
         # Contacts are not known at first: they must not enter the size of the errors.
@@ -93,14 +90,14 @@ def calibrate_signals(
         seen = observe(whole, errors.seen, bandwidth)
         statistic, deviation = seen.statistic, seen.deviation
         threshold = alarm_threshold(statistic[counts & new], whole.period, false_alarms, robust=first)
-        reach = max(round(SETTLING * time_constant(bandwidth) / whole.period), 1)
+        reach = max(round(SETTLING_CONSTANTS * time_constant(bandwidth) / whole.period), 1)
         kept = settled & ~_near(statistic > threshold.value, reach)
         if (kept == counts).all():
             break
         if own:
             counts = kept
             whole = whole.levelled(contact_weight(statistic / threshold.value))
-    rows = np.flatnonzero(counts)[:: max(1, int(counts.sum()) // MOST_ROWS)]
+    rows = np.flatnonzero(counts)[:: max(1, int(counts.sum()) // MOST_HEALTHY_ROWS)]
     spread = errors.covariance(deviation[rows])
     localiser = fit_localiser(model.robot.chain, whole.q[rows], residual[rows], spread, whole.jacobian[rows])
     return Calibration(
@@ -168,7 +165,8 @@ def _rows(signals: Signals, rows: slice) -> Signals:
 
 def _winsorised(residual: Array, counts: Flags) -> Array:
     """Cuts residuals (N, n) off at three robust standard deviations."""
-    level = WINSOR * robust_deviation(residual[counts])
+    # Where the first round cuts residuals off, in standard deviations.
+    level = 3.0 * robust_deviation(residual[counts])
     return np.clip(residual, -level, level)
 
 
@@ -195,14 +193,6 @@ def _joined(parts: Sequence[Signals]) -> Signals:
     return Signals(**{**arrays, "t": np.concatenate(times)})
 
 
-# Distance in each position and velocity, in their standard deviations, below which a motion is the same one.
-NEAR = 0.2
-# Time [s] after which a motion may repeat, largest number of such times in a log, and rows that stand for a longer log.
-AFTER, MOST_TIMES, MOST_ROWS = 5.0, 50, 20_000
-# A joint whose velocity varies less than this [rad/s or m/s] rests.
-RESTING = 1e-6
-
-
 def first_visits(t: Array, q: Array, dq: Array) -> NDArray[np.bool_]:
     """Marks the samples (N,) whose positions and velocities no sample of an earlier time had.
 
@@ -215,19 +205,23 @@ def first_visits(t: Array, q: Array, dq: Array) -> NDArray[np.bool_]:
     """
     state = np.concatenate([q, dq], axis=1)
     spread = state.std(axis=0)
-    moves = np.tile(dq.std(axis=0) > RESTING, 2)
+    # A joint whose velocity varies less than this [rad/s or m/s] rests.
+    moves = np.tile(dq.std(axis=0) > 1e-6, 2)
     new = np.ones(len(t), dtype=bool)
     if not moves.any():
         return new
-    step = -(-len(t) // MOST_ROWS)
+    step = -(-len(t) // MOST_HEALTHY_ROWS)
     points = state[::step, moves] / spread[moves]
-    length = max(AFTER, float(t[-1] - t[0]) / MOST_TIMES)
+    # A motion may repeat after 5 s, and a log is split into at most fifty times.
+    length = max(5.0, float(t[-1] - t[0]) / 50)
     block = ((t[::step] - t[0]) // length).astype(int)
     seen = np.zeros(len(points), dtype=bool)
     for number in range(2, int(block[-1]) + 1):
         earlier, own = points[(block < number - 1) & ~seen], np.flatnonzero(block == number)
         if len(earlier) and len(own):
-            distance, _ = cKDTree(earlier).query(points[own], p=np.inf, distance_upper_bound=NEAR)
+            # Distance in each position and velocity, in their standard deviations, below which a motion is the same
+            # one.
+            distance, _ = cKDTree(earlier).query(points[own], p=np.inf, distance_upper_bound=0.2)
             seen[own] = np.isfinite(distance)
     new &= ~np.repeat(seen, step)[: len(t)]
     return new

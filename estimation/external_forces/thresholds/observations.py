@@ -16,9 +16,6 @@ from estimation.external_forces.thresholds.error_models import ErrorModel
 
 Array = NDArray[np.float64]
 
-# Rounds in which the friction's level and the weights of the samples suit each other, and when they do.
-ITERATIONS, ALIKE = 12, 1e-3
-
 
 @dataclass(frozen=True, eq=False)
 class Observed:
@@ -63,10 +60,12 @@ def observe_robustly(signals: Signals, calibration: Calibration) -> tuple[Signal
         The signals with that level, and what is observed.
     """
     weights = np.ones(len(signals.t))
-    for _ in range(ITERATIONS):
+    # Rounds in which the friction's level and the weights of the samples adapt to each other, ...
+    for _ in range(12):
         observed = observe(signals, calibration.errors, calibration.bandwidth)
         before, weights = weights, contact_weight(observed.statistic / calibration.threshold.value)
-        if np.abs(weights - before).max() <= ALIKE:
+        # ... until the weights have settled.
+        if np.abs(weights - before).max() <= 1e-3:
             break
         signals = signals.levelled(weights)
     return signals, observed

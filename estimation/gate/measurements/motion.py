@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from estimation.gate.measurements.columns import Columns
-from estimation.regressions.preparation import TREMBLE
+from estimation.regressions.preparation import TREMBLE_SHARE
 from robots.robot import Robot
 from robots.signals import Log
 
@@ -56,5 +56,5 @@ def standing_joints(robot: Robot, columns: Columns) -> NDArray[np.bool_]:
         robot: with n joints.
         columns: of the log.
     """
-    stands: NDArray[np.bool_] = travel_shares(robot, columns) < TREMBLE
+    stands: NDArray[np.bool_] = travel_shares(robot, columns) < TREMBLE_SHARE
     return stands

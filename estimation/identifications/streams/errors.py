@@ -8,15 +8,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from estimation.identifications.assembly import Figures
-from estimation.identifications.fit import MOST_ROWS, STRETCHES
+from estimation.identifications.fit import SANDWICH_ROWS, SANDWICH_STRETCHES
 from estimation.regressions.preparation import Rows
-from estimation.uncertainty.quantiles import BAND
+from estimation.uncertainty.quantiles import BAND_SHARE
 from robots.signals import Motion
 
 Array = NDArray[np.float64]
 
 # Bins of the errors' sizes, equal steps of their logarithm: a quantile is known to 0.1 %.
-BINS, DECADES = 20_000, 9.0
+ERROR_BINS, ERROR_DECADES = 20_000, 9.0
 
 
 class Errors:
@@ -38,11 +38,11 @@ class Errors:
         self.torque, self.sums, self.squares, self.judged = np.zeros((4, n))
         self.kept: list[tuple[Rows, Array]] = []
         self._second, self._seconds = np.zeros(n), 0
-        self._counts = np.zeros((n, BINS))
+        self._counts = np.zeros((n, ERROR_BINS))
         self._lower, self._upper = np.full(n, np.inf), np.full(n, -np.inf)
         self._fastest, self._hardest = np.zeros((2, n))
-        length = MOST_ROWS // STRETCHES
-        self._places = [] if total <= MOST_ROWS else _spread(total - length, STRETCHES)
+        length = SANDWICH_ROWS // SANDWICH_STRETCHES
+        self._places = [] if total <= SANDWICH_ROWS else _spread(total - length, SANDWICH_STRETCHES)
         self._length = length
 
     def add(self, part: Rows, predicted: Array) -> None:
@@ -66,9 +66,9 @@ class Errors:
         self._fastest = np.maximum(self._fastest, np.abs(motion.dq).max(axis=0))
         self._hardest = np.maximum(self._hardest, np.abs(motion.ddq).max(axis=0))
         sizes = np.log10(np.maximum(np.abs(error) / self._scale, 1e-300))
-        bins = np.clip(((sizes + DECADES - 1) / DECADES * BINS).astype(int), 0, BINS - 1)
+        bins = np.clip(((sizes + ERROR_DECADES - 1) / ERROR_DECADES * ERROR_BINS).astype(int), 0, ERROR_BINS - 1)
         for joint in range(error.shape[1]):
-            self._counts[joint] += np.bincount(bins[judged[:, joint], joint], minlength=BINS)
+            self._counts[joint] += np.bincount(bins[judged[:, joint], joint], minlength=ERROR_BINS)
         if not self._places:
             self.kept.append((part, predicted))
         for begin in self._places:
@@ -90,10 +90,10 @@ class Errors:
 
     @property
     def band(self) -> Array:
-        """Half-widths (n,) that hold `BAND` of each joint's errors; NaN where none is known."""
+        """Half-widths (n,) that hold `BAND_SHARE` of each joint's errors; NaN where none is known."""
         total = self._counts.sum(axis=1)
-        first = (np.cumsum(self._counts, axis=1) >= BAND * total[:, None]).argmax(axis=1)
-        size = self._scale * 10 ** ((first + 0.5) / BINS * DECADES - DECADES + 1)
+        first = (np.cumsum(self._counts, axis=1) >= BAND_SHARE * total[:, None]).argmax(axis=1)
+        size = self._scale * 10 ** ((first + 0.5) / ERROR_BINS * ERROR_DECADES - ERROR_DECADES + 1)
         return np.where(total > 0, size, np.nan)
 
     @property

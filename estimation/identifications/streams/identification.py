@@ -10,10 +10,9 @@ from estimation.estimators import Estimator, Solution
 from estimation.estimators import estimator as choose_estimator
 from estimation.identifications.assembly import assemble, describe_logs_and_method, joint_fits
 from estimation.identifications.choices import Candidates, Choice, choose
-from estimation.identifications.comparison import MOST_ROWS, STRETCHES
+from estimation.identifications.comparison import COMPARED_ROWS, COMPARED_STRETCHES
 from estimation.identifications.estimate import Estimate
 from estimation.identifications.fit import (
-    AVERAGED,
     Fit,
     Fitted,
     covariances,
@@ -23,7 +22,7 @@ from estimation.identifications.fit import (
 from estimation.identifications.model_forms import ModelForm
 from estimation.identifications.streams.errors import Errors
 from estimation.identifications.streams.pieces import Pieces
-from estimation.identifications.streams.survey import BLOCK, merged_report, survey
+from estimation.identifications.streams.survey import SURVEYED_ROWS, merged_report, survey
 from estimation.identifications.verdicts import require_predictable
 from estimation.logs.parquet_streams import LogStream
 from estimation.preprocessing import LowPass
@@ -31,6 +30,7 @@ from estimation.regressions.braking_friction import with_braking_friction
 from estimation.regressions.joint_regressor import JointRegressor
 from estimation.regressions.moments import Moments
 from estimation.regressions.torque_meanings import with_torque_constants
+from estimation.uncertainty.averages import AVERAGING_TIME
 from robots.base_parameters import BaseParameters
 from robots.common.errors import InputError, NotIdentifiableError
 from robots.common.parallel import one_blas_thread
@@ -39,8 +39,6 @@ from robots.robot import Robot
 from robots.terms import BendingFriction, FrictionTerm
 
 METHODS = ("wls", "ols")
-# How often the file is read: for the survey, the speeds, the moments and the errors.
-READINGS = 4
 
 
 @one_blas_thread()
@@ -89,8 +87,9 @@ def identify_stream(
         )
     if stream.n != robot.n:
         raise InputError(f"{stream.n} joints", file=stream.path, allowed=f"{robot.n}, as {robot.name} has")
-    robot = with_torque_constants(robot, [stream.rows(0, min(BLOCK, len(stream)))], stream.torque_is)
-    bar = _Rows(progress or SILENT, READINGS * len(stream))
+    robot = with_torque_constants(robot, [stream.rows(0, min(SURVEYED_ROWS, len(stream)))], stream.torque_is)
+    # The file is read four times: for the survey, the speeds, the moments and the errors.
+    bar = _Rows(progress or SILENT, 4 * len(stream))
     found = survey(robot, stream, bar.advance)
     report = merged_report(found, stream)
     report.raise_if_refused()
@@ -106,9 +105,9 @@ def identify_stream(
     form = ModelForm(robot, friction, rotor, offset, [] if stream.gravity is None else [stream.gravity])
     base = form.first(by_position)
     bar.advance(0, "choosing smoothing and model")
-    stretches = pieces.stretches(STRETCHES, MOST_ROWS // STRETCHES)
+    stretches = pieces.stretches(COMPARED_STRETCHES, COMPARED_ROWS // COMPARED_STRETCHES)
     low_pass = replace(candidates or Candidates(), smoothers=())
-    spread = found.spread if found.rows > MOST_ROWS else None
+    spread = found.spread if found.rows > COMPARED_ROWS else None
     choice = choose(base, stretches, chosen, low_pass, position=position, spread=spread)
     # The stretches are one log: how they differ is no contradiction between logs.
     choice = replace(choice, contradiction=None)
@@ -196,7 +195,7 @@ def _fit(
         moments,
         solution,
         choice.ridge,
-        round(AVERAGED / period),
+        round(AVERAGING_TIME / period),
         seed,
         errors.rows,
     )

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from estimation.identifications.streams.survey import Segment, Survey
 from estimation.logs.parquet_streams import LogStream
 from estimation.preprocessing import LowPass, smooth
-from estimation.regressions.preparation import OVERLAP, PIECE, TREMBLE, Prepared, Rows, prepare
+from estimation.regressions.preparation import OVERLAP_PERIODS, SMOOTHED_ROWS, TREMBLE_SHARE, Prepared, Rows, prepare
 from estimation.regressions.torque_meanings import as_joint_torque
 from robots.robot import Robot
 from robots.signals import Motion
@@ -32,7 +32,7 @@ class Pieces:
     def __init__(self, robot: Robot, stream: LogStream, survey: Survey) -> None:
         self.robot, self.stream, self.survey = robot, stream, survey
         ranges = np.array([segment.upper - segment.lower for segment in survey.segments])
-        self._still = ranges < TREMBLE * ranges.max(axis=0)
+        self._still = ranges < TREMBLE_SHARE * ranges.max(axis=0)
         self._whole = not self._still.any(axis=1).all()
 
     def stretches(self, count: int, rows: int) -> list[Prepared]:
@@ -75,12 +75,12 @@ class Pieces:
 
     def _bounds(self, segment: Segment) -> Iterator[tuple[int, int]]:
         count = segment.stop - segment.first
-        yield from pairwise(np.linspace(0, count, -(-count // PIECE) + 1).astype(int).tolist())
+        yield from pairwise(np.linspace(0, count, -(-count // SMOOTHED_ROWS) + 1).astype(int).tolist())
 
     def _piece(
         self, k: int, segment: Segment, first: int, stop: int, smoother: LowPass
     ) -> tuple[Prepared, Motion, Array] | None:
-        margin = round(OVERLAP / (smoother.cutoff * segment.period))
+        margin = round(OVERLAP_PERIODS / (smoother.cutoff * segment.period))
         edge = smoother.edge(segment.end - segment.start)
         count = segment.stop - segment.first
         ready = self._prepared(k, segment.first + max(first - margin, 0), segment.first + min(stop + margin, count))

@@ -23,7 +23,7 @@ from robots.signals import Log
 Array = NDArray[np.float64]
 
 # Rows that the gate checks at a time.
-BLOCK = 500_000
+SURVEYED_ROWS = 500_000
 
 
 @dataclass
@@ -145,7 +145,7 @@ def survey(robot: Robot, stream: LogStream, advance: Callable[[int, str], None])
     """
     found = Survey()
     for start, end in stream.runs():
-        bounds = np.linspace(start, end, max(1, -(-(end - start) // BLOCK)) + 1).astype(int).tolist()
+        bounds = np.linspace(start, end, max(1, -(-(end - start) // SURVEYED_ROWS)) + 1).astype(int).tolist()
         for first, stop in pairwise(bounds):
             log = as_joint_torque(robot, stream.rows(first, stop), stream.torque_is, estimate=False)
             report = check_log(robot, log)

@@ -14,11 +14,7 @@ from estimation.monitoring.control_charts.level_filter import CORRELATION_TIME
 from robots.common.records import Record
 
 # Allowance of the CUSUM: half of a change by two standard deviations of the innovations.
-ALLOWANCE = 1.0
-# Memory of the EWMA [s]: several correlation times of the model error.
-MEMORY = 1800.0
-# Serial correlation of innovations: prior weight [windows], and steps to which it is rounded.
-CORRELATION_PRIOR, CORRELATION_STEP, LARGEST_CORRELATION = 100.0, 0.05, 0.6
+CUSUM_ALLOWANCE = 1.0
 
 
 @dataclass
@@ -52,21 +48,25 @@ class Chart(Record):
     @property
     def weight(self) -> float:
         """Weight of the newest window in the EWMA."""
-        return min(1.0, self.window / MEMORY)
+        # Memory of the EWMA [s]: several correlation times of the model error.
+        return min(1.0, self.window / 1800.0)
 
     @property
     def correlation(self) -> float:
         """Serial correlation of the innovations, never negative, rounded up."""
-        found = self.products / (self.squares + CORRELATION_PRIOR)
-        rounded = float(np.ceil(max(found, 0.0) / CORRELATION_STEP)) * CORRELATION_STEP
-        return min(rounded, LARGEST_CORRELATION)
+        # Prior weight of the serial correlation of innovations [windows].
+        found = self.products / (self.squares + 100.0)
+        # Steps to which the serial correlation of innovations is rounded.
+        step = 0.05
+        rounded = float(np.ceil(max(found, 0.0) / step)) * step
+        return min(rounded, 0.6)
 
     @property
     def limits(self) -> tuple[float, float]:
         """Thresholds of the CUSUM and of the EWMA, each in its standard deviations."""
         slow = float(np.exp(-self.window / CORRELATION_TIME))
         return (
-            cusum_threshold(ALLOWANCE, self.run_length, self.correlation),
+            cusum_threshold(CUSUM_ALLOWANCE, self.run_length, self.correlation),
             ewma_threshold(self.weight, self.run_length, slow),
         )
 
@@ -87,8 +87,8 @@ class Chart(Record):
         self.products += clipped * self.last
         self.squares += clipped * clipped
         self.last = clipped
-        self.up = max(0.0, self.up + z - ALLOWANCE)
-        self.down = max(0.0, self.down - z - ALLOWANCE)
+        self.up = max(0.0, self.up + z - CUSUM_ALLOWANCE)
+        self.down = max(0.0, self.down - z - CUSUM_ALLOWANCE)
         w = max(self.weight, 1.0 / (self.count + 1))
         self.level += w * (deviation - self.level)
         self.unlogged += w * (unlogged - self.unlogged)
@@ -107,12 +107,6 @@ class Chart(Record):
         self.count = 0
 
 
-# Prior of a window's largest chi-square, of white noise in six joints and fifty blocks, and its weight in windows.
-PRIOR_MEAN, PRIOR_DEVIATION, PRIOR_WINDOWS = 17.0, 6.0, 10.0
-MOST_WINDOWS = 2000.0
-EULER = 0.5772156649
-
-
 @dataclass
 class BurstChart(Record):
     """The extreme-value distribution (Gumbel) of a window's largest chi-square, learnt from healthy windows.
@@ -125,9 +119,9 @@ class BurstChart(Record):
     """
 
     run_length: float
-    count: float = PRIOR_WINDOWS
-    mean: float = PRIOR_MEAN
-    square: float = PRIOR_WINDOWS * PRIOR_DEVIATION**2
+    count: float = 10.0
+    mean: float = 17.0
+    square: float = 10.0 * 6.0**2
 
     @property
     def threshold(self) -> float:
@@ -135,25 +129,25 @@ class BurstChart(Record):
         deviation = float(np.sqrt(self.square / self.count))
         # Few windows say little of the spread.
         scale = deviation * (1 + 2 / self.count) * np.sqrt(6) / np.pi
-        place = self.mean - EULER * scale
+        place = self.mean - np.euler_gamma * scale
         return float(place - scale * np.log(-np.log1p(-1.0 / self.run_length)))
 
     def update(self, chi: float) -> bool:
         """Takes a window's largest chi-square into account, and says whether it is an alarm."""
         if chi > self.threshold:
             return True
-        self.count = min(self.count + 1, MOST_WINDOWS)
+        most = 2000.0
+        self.count = min(self.count + 1, most)
         step = chi - self.mean
         self.mean += step / self.count
-        if self.count >= MOST_WINDOWS:
-            self.square *= 1 - 1 / MOST_WINDOWS
+        if self.count >= most:
+            self.square *= 1 - 1 / most
         self.square += step * (chi - self.mean)
         return False
 
 
 # Mean overshoot of a normal random walk beyond a boundary, on both sides together (Siegmund 1985, eq. 10.17).
-OVERSHOOT = 1.166
-HIGHEST = 1e4
+CUSUM_OVERSHOOT = 1.166
 
 
 def cusum_run_length(threshold: float, allowance: float, correlation: float = 0.0) -> float:
@@ -168,7 +162,7 @@ def cusum_run_length(threshold: float, allowance: float, correlation: float = 0.
         correlation: rho between consecutive values.
     """
     variance = (1 + correlation) / (1 - correlation)
-    exponent = 2 * allowance * (threshold + OVERSHOOT) / variance
+    exponent = 2 * allowance * (threshold + CUSUM_OVERSHOOT) / variance
     return float(variance / (2 * allowance**2) * (np.expm1(min(exponent, 600.0)) - exponent) / 2)
 
 
@@ -182,7 +176,7 @@ def cusum_threshold(allowance: float, run_length: float, correlation: float = 0.
         correlation: rho between consecutive values.
     """
     return float(
-        brentq(lambda h: np.log(cusum_run_length(h, allowance, correlation) / run_length), -OVERSHOOT + 1e-6, HIGHEST)
+        brentq(lambda h: np.log(cusum_run_length(h, allowance, correlation) / run_length), -CUSUM_OVERSHOOT + 1e-6, 1e4)
     )
 
 

@@ -11,10 +11,6 @@ Array = NDArray[np.float64]
 
 # Correlation time of the model error [s], about that of a change of the motion or of the temperature.
 CORRELATION_TIME = 300.0
-# The prior of the model error's variance counts as so many windows, and no more than so many others count beside it.
-PRIOR_WINDOWS, MOST_WINDOWS = 30.0, 1000.0
-# Squared standardised innovations above this count as this: an outlier is not a larger variance.
-CLIPPED = 9.0
 
 
 class LevelFilter(Record):
@@ -61,7 +57,9 @@ class LevelFilter(Record):
     @property
     def _ratio(self) -> float:
         """The learnt variance of the model error over that of the prior."""
-        return (PRIOR_WINDOWS + self.square) / (PRIOR_WINDOWS + self.weight)
+        # The prior of the model error's variance counts as so many windows.
+        prior_windows = 30.0
+        return (prior_windows + self.square) / (prior_windows + self.weight)
 
     def explained(self, features: Array) -> tuple[float, float]:
         """What the coefficients make of features (m,), and its variance, without the model error."""
@@ -102,9 +100,12 @@ class LevelFilter(Record):
         z = error / float(np.sqrt(total))
         # Only what the model error makes of the innovation says something of its size.
         share = max(total - variance, 0.0) / total
-        worth = share * min(z * z, CLIPPED) * self._ratio
-        self.weight = min(self.weight + share, MOST_WINDOWS)
-        forgotten = 1 - share / MOST_WINDOWS if self.weight >= MOST_WINDOWS else 1.0
+        # Squared standardised innovations above this count as this: an outlier is not a larger variance.
+        worth = share * min(z * z, 9.0) * self._ratio
+        # No more windows than this count beside the prior.
+        most = 1000.0
+        self.weight = min(self.weight + share, most)
+        forgotten = 1 - share / most if self.weight >= most else 1.0
         self.square = self.square * forgotten + worth
         return z
 

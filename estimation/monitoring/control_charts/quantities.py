@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from estimation.monitoring.control_charts.change_fit import StepFit, fit_steps
 from estimation.monitoring.control_charts.charts import Chart
 from estimation.monitoring.control_charts.level_filter import LevelFilter
-from estimation.monitoring.settings import PAUSE
+from estimation.monitoring.settings import PAUSE_SECONDS
 from estimation.uncertainty.quantiles import chi2_limit
 from robots.common.records import Record
 
@@ -20,18 +20,13 @@ Array = NDArray[np.float64]
 Group = Literal["friction", "offset", "payload", "common", "residual"]
 
 # The model error projects onto each direction with this share of the model's residual.
-SHARE = 0.5
-# Share of the variance by unlogged work that is alike in all pauses: the same work comes again.
-LASTING_SHARE = 0.5
-# Windows kept for dating and sizing a change.
-KEPT = 150
-# Probability that any quantity of a healthy robot differs from the model at the start.
-START = 0.05
+DIRECTION_SHARE = 0.5
 
 
 def start_limit(count: int) -> float:
     """Chi-square of one degree of freedom that none of some healthy quantities exceeds at the start."""
-    return chi2_limit(START, tests=count)
+    # Probability that any quantity of a healthy robot differs from the model at the start.
+    return chi2_limit(0.05, tests=count)
 
 
 @dataclass(frozen=True, eq=False)
@@ -92,13 +87,14 @@ class Quantity(Record):
         """
         self.samples.append(sample)
         self.before.append((self.level.coefficients.copy(), self.level.covariance[:-1, :-1].copy()))
-        if len(self.samples) > KEPT:
+        # Windows kept for dating and sizing a change.
+        if len(self.samples) > 150:
             del self.samples[0], self.before[0]
         explained, unsure = self.level.explained(sample.features)
         self.deviation = sample.y - explained
         if not learn:
             return False
-        paused = self.level.time is None or sample.t - self.level.time > PAUSE
+        paused = self.level.time is None or sample.t - self.level.time > PAUSE_SECONDS
         self.level.predict(sample.t)
         if paused:
             self.level.widen(sample.unlogged)
@@ -121,7 +117,7 @@ class Quantity(Record):
         """Indices of the samples that follow a pause."""
         starts = np.array([s.start for s in self.samples])
         ends = np.array([s.end for s in self.samples])
-        return 1 + np.flatnonzero(starts[1:] - ends[:-1] > PAUSE)
+        return 1 + np.flatnonzero(starts[1:] - ends[:-1] > PAUSE_SECONDS)
 
     def differs_from_start(self, first: float, limit: float) -> bool:
         """Tests whether all windows so far differ from the prior level, which is that of the model.
@@ -164,5 +160,6 @@ class Quantity(Record):
         log = np.zeros(len(spread))
         log[self.after_pauses()] = 1.0
         log = np.cumsum(log)
-        same = np.where(log[:, None] == log[None, :], 1.0, LASTING_SHARE)
+        # Share of the variance by unlogged work that is alike in all pauses: the same work comes again.
+        same = np.where(log[:, None] == log[None, :], 1.0, 0.5)
         return np.asarray(same * spread[:, None] * spread[None, :])

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     import pandas as pd
 
 RESULT, TABLE = "fleet.json", "fleet.csv"
-LISTED = 20
+LISTED_ROBOTS = 20
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -77,10 +77,10 @@ class FleetResult(Result, format="robot-oed fleet"):
         """Gives the verdict and the worst robots."""
         lines = [self.verdict()]
         shown = [row for row in self.rows if row.light != "green"]
-        for row in shown[:LISTED]:
+        for row in shown[:LISTED_ROBOTS]:
             lines.append(f"  {row.light:5}  {row.name}: {row.text}")
-        if len(shown) > LISTED:
-            lines.append(f"  and {len(shown) - LISTED} more")
+        if len(shown) > LISTED_ROBOTS:
+            lines.append(f"  and {len(shown) - LISTED_ROBOTS} more")
         count, left_out = sum(len(row.logs) for row in self.rows), sum(row.left_out for row in self.rows)
         lines.append(f"  {count} logs, {left_out} left out; {self.resumed} robots were done before")
         if self.single > 1:

@@ -12,8 +12,6 @@ from estimation.monitoring.log_row import LogRow
 from estimation.monitoring.result import MonitorResult
 from robots.common.records import Record
 
-# Points of a trend that are kept of each robot.
-POINTS = 240
 LIGHTS = ("red", "amber", "grey", "green")
 """From the worst to the best; grey is a robot without a log that can be used."""
 
@@ -119,7 +117,8 @@ class RobotRow(Record, shares=("origin",)):
 def _trend(result: MonitorResult) -> Trend:
     h = result.history
     count = len(h["start"])
-    chosen = np.unique(np.linspace(0, count - 1, min(POINTS, count)).round().astype(int))
+    # Points of a trend that are kept of each robot.
+    chosen = np.unique(np.linspace(0, count - 1, min(240, count)).round().astype(int))
     names = [row.name for row in result.logs if row.used]
 
     def percent(values: Any) -> tuple[tuple[float | None, ...], ...]:

@@ -9,12 +9,9 @@ from itertools import pairwise
 import numpy as np
 
 from estimation.comparisons.runs import date_in
-from estimation.monitoring.findings import DAY, when
+from estimation.monitoring.findings import when
+from robots.common.tables.times import SECONDS_PER_DAY
 from robots.signals import UNKNOWN_PAUSE, Log
-
-# Logs that all begin within this time [s] have clocks of their own.
-SAME_START = 1.0
-LISTED = 12
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -44,7 +41,8 @@ def place_logs(logs: Sequence[Log], last: float | None = None) -> tuple[list[Pla
         return [], []
     notes: list[str] = []
     starts = np.array([float(log.t[0]) for log in logs])
-    anew = len(logs) > 1 and float(np.ptp(starts)) < SAME_START
+    # Logs that all begin within this time [s] have clocks of their own.
+    anew = len(logs) > 1 and float(np.ptp(starts)) < 1.0
     dates = [date_in([str(log.metadata.get("file", "")).replace("\\", "/").split("/")[-1], log.name]) for log in logs]
     if anew and all(date is not None for date in dates) and len(set(dates)) == len(dates):
         known = [float(date) for date in dates if date is not None]
@@ -82,13 +80,13 @@ def missing_days(spans: Sequence[tuple[float, float]]) -> list[str]:
         return []
     origin = spans[0][0]
     pauses = np.array([later[0] - before[1] for before, later in pairwise(spans)])
-    nights = pauses[pauses > DAY / 4]
-    if len(nights) < 2 or float(np.median(nights)) > 1.25 * DAY:
+    nights = pauses[pauses > SECONDS_PER_DAY / 4]
+    if len(nights) < 2 or float(np.median(nights)) > 1.25 * SECONDS_PER_DAY:
         return []
     found = []
     for before, later in pairwise(spans):
-        days = round((later[0] - before[0]) / DAY)
-        if later[0] - before[1] > 1.25 * DAY and days >= 2:
+        days = round((later[0] - before[0]) / SECONDS_PER_DAY)
+        if later[0] - before[1] > 1.25 * SECONDS_PER_DAY and days >= 2:
             count = "a day" if days == 2 else f"{days - 1} days"
             found.append(
                 f"No log for {count} between {when(before[1], origin)} and {when(later[0], origin)}. A change in this "
@@ -99,11 +97,12 @@ def missing_days(spans: Sequence[tuple[float, float]]) -> list[str]:
 
 def _listed(names: Sequence[str]) -> str:
     """Names in their order; the middle of a long list is left out."""
-    shown = names if len(names) <= LISTED else [*names[: LISTED - 2], "...", names[-1]]
+    listed = 12
+    shown = names if len(names) <= listed else [*names[: listed - 2], "...", names[-1]]
     return ", ".join(shown)
 
 
 def _duration(seconds: float) -> str:
-    if seconds >= 2 * DAY:
-        return f"{seconds / DAY:.1f} days"
+    if seconds >= 2 * SECONDS_PER_DAY:
+        return f"{seconds / SECONDS_PER_DAY:.1f} days"
     return f"{seconds / 3600:.1f} h" if seconds >= 3600 else f"{seconds:.0f} s"

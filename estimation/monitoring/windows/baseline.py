@@ -13,7 +13,6 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from estimation.models.model import Model, load_model
-from estimation.predictions.checked_motions import CUTOFF
 from estimation.thermal import ThermalTorqueModel, thermal_from_dict
 from robots.common.errors import InputError
 from robots.common.records import read_json
@@ -23,9 +22,6 @@ from robots.terms.situations.flange_body import FLANGE, link_columns, with_body
 from robots.terms.situations.sensitivities import moved_body
 
 Array = NDArray[np.float64]
-
-# Least cut-off [Hz]: a low-pass rings at a stop, and the sign of the friction follows the ringing.
-LEAST_CUTOFF = 8.0
 
 PAYLOAD = ("payload_mass", "payload_mx", "payload_my", "payload_mz")
 """Directions of a payload: its mass [kg] and first moments [kg m] in the flange's frame."""
@@ -69,7 +65,8 @@ class Baseline:
     @property
     def cutoff(self) -> float:
         """Cut-off of the smoothing [Hz]: that of the model, or a higher one that does not ring at stops."""
-        return max(float(self.model.provenance.get("cutoff_hz", CUTOFF)), LEAST_CUTOFF)
+        # Least cut-off [Hz]: a low-pass rings at a stop, and the sign of the friction follows the ringing.
+        return max(self.model.cutoff, 8.0)
 
     @property
     def residual(self) -> Array:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from estimation.monitoring.settings import PAUSE, Heat
+from estimation.monitoring.settings import PAUSE_SECONDS, Heat
 from estimation.monitoring.windows.baseline import Baseline
 from estimation.monitoring.windows.unlogged_work import DUTY_SPREAD, JOINT_SPREAD, UnloggedWork
 from robots.common.errors import InputError
@@ -16,21 +16,16 @@ from robots.thermal.online import Step, discretise
 Array = NDArray[np.float64]
 
 # Time constants of a joint [s]: the means of Table 8 of the thesis, of six joints at full duty.
-FAST, SLOW = 138.0, 1467.0
+FAST_TIME_CONSTANT, SLOW_TIME_CONSTANT = 138.0, 1467.0
 # What a healthy joint's friction differs from the model's by (log), beyond what all joints share: the larger RMS of
 # eight virtual robots with plain and thermal models, cold and warm, on known and other motions (largest: 0.19).
-LEVEL = 0.055
+HEALTHY_LEVEL_SPREAD = 0.055
 # Priors (mean, standard deviation) of what the features explain, in logs of the friction. The last one is the level.
-MODEL_PRIOR = ((1.0, 0.15), (0.0, LEVEL))
-TEMPERATURE_PRIOR = ((-0.2, 0.2), (0.0, LEVEL))
-COMMON_PRIOR = ((-0.2, 0.2), (-0.3, 0.3), (0.0, LEVEL))
+MODEL_PRIOR = ((1.0, 0.15), (0.0, HEALTHY_LEVEL_SPREAD))
+TEMPERATURE_PRIOR = ((-0.2, 0.2), (0.0, HEALTHY_LEVEL_SPREAD))
+COMMON_PRIOR = ((-0.2, 0.2), (-0.3, 0.3), (0.0, HEALTHY_LEVEL_SPREAD))
 # Without heat, temperature changes the level, too.
 LEVEL_PRIOR = ((0.0, 0.3),)
-# Temperatures count per so many degrees from this one.
-DEGREES, ROOM = 20.0, 20.0
-# Standard deviations of what is unknown and common to all joints: the ambient temperature [K], or a share.
-AMBIENT_SPREAD, COMMON_SPREAD = 10.0, 0.5
-LOWEST_FACTOR = 0.05
 
 
 class HeatState(Record):
@@ -61,7 +56,11 @@ class HeatState(Record):
         self.kept = np.zeros((n, 2))
         self.reference = np.full(n, np.nan)
         fast = baseline.time_constant
-        self.times = np.array([FAST, SLOW] if fast is None else [fast, fast * SLOW / FAST])
+        self.times = np.array(
+            [FAST_TIME_CONSTANT, SLOW_TIME_CONSTANT]
+            if fast is None
+            else [fast, fast * SLOW_TIME_CONSTANT / FAST_TIME_CONSTANT]
+        )
         self.temperatures = np.full(n, np.nan)
         self.work = UnloggedWork(n)
         self.work.rested = list(self.states)
@@ -78,8 +77,10 @@ class HeatState(Record):
     def common_spread(self) -> Array:
         """Standard deviations of the common unknowns (2,): in their unit, and the duty; zero where there is none."""
         if self.kind == "model":
-            return np.array([AMBIENT_SPREAD, DUTY_SPREAD])
-        return np.array([0.0 if self.kind == "none" else COMMON_SPREAD, 0.0])
+            # Standard deviations of what all joints share: of the ambient temperature [K] and of the duty.
+            return np.array([10.0, DUTY_SPREAD])
+        # Standard deviation of a share that is common to all joints.
+        return np.array([0.0 if self.kind == "none" else 0.5, 0.0])
 
     def factor(self, j: int) -> float:
         """Friction of joint j, counted from 0, over the model's, by the thermal model; 1 without one."""
@@ -90,7 +91,7 @@ class HeatState(Record):
         if model is None or state is None:
             return 1.0
         T = model.zone_temperatures(model.values, list(state))[0]
-        return max(float(model.friction_factor(T)), LOWEST_FACTOR)
+        return max(float(model.friction_factor(T)), 0.05)
 
     def features(self, j: int) -> Array | None:
         """What explains the log of the friction of joint j (m,); None where it is not known."""
@@ -98,7 +99,8 @@ class HeatState(Record):
             return np.array([np.log(self.factor(j)), 1.0])
         if self.kind == "temperature":
             T = self.temperatures[j]
-            return np.array([(T - ROOM) / DEGREES, 1.0]) if np.isfinite(T) else None
+            # Temperatures count per 20 degrees, from 20 degC.
+            return np.array([(T - 20.0) / 20.0, 1.0]) if np.isfinite(T) else None
         if self.kind == "common":
             return np.array([*self.kept[j], 1.0])
         return np.ones(1)
@@ -127,7 +129,7 @@ class HeatState(Record):
         """Goes on by a time without rows [s]: the joints rest, or in a long one work unseen."""
         if duration <= 0:
             return
-        if self.kind == "model" and duration > PAUSE:
+        if self.kind == "model" and duration > PAUSE_SECONDS:
             self.states = self.work.settle(self.states)
             self.work.pause(self.states, duration, ambient, self._factor_of, self._heated)
         else:

@@ -14,13 +14,9 @@ from estimation.uncertainty.quantiles import NORMAL_MEDIAN
 
 Array = NDArray[np.float64]
 
-HIGHEST_ORDER = 12
+WINDOW_NOISE_ORDER = 12
 # Rows below this share of the usual speed say more of presliding than of friction.
-SLOWEST = 0.03
-# A short force is looked for in blocks of this time [s].
-BLOCK = 0.2
-# A quantity whose prior is hardly narrowed is not determined by the window.
-NARROWED = 0.5
+SLIDING_SPEED_SHARE = 0.03
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -138,7 +134,7 @@ def project(
     """
     n = tau.shape[1]
     y = tau - directions.rest
-    live = np.abs(dq) >= SLOWEST * usual_speed
+    live = np.abs(dq) >= SLIDING_SPEED_SHARE * usual_speed
     scale = np.sqrt(np.mean(tau**2, axis=0))
     if colour is None or np.isnan(colour.variances).any():
         plain = Colour((np.zeros(0),) * n, np.maximum((0.1 * scale) ** 2, np.finfo(float).tiny))
@@ -149,13 +145,14 @@ def project(
     residual = y - _fitted(values, directions)
     covariances, rows = _colour(residual, live)
     at, burst, joints, scatter = _burst(t, residual, live, colour)
+    # A quantity whose prior is hardly narrowed is not determined by the window.
     return Window(
         t=float(t.mean()),
         start=edges[0],
         end=edges[1],
         values=values,
         covariance=covariance,
-        determined=np.diag(covariance) < NARROWED**2 * prior,
+        determined=np.diag(covariance) < 0.5**2 * prior,
         power=np.maximum((directions.friction * dq).mean(axis=0), 0.0),
         friction_rms=np.sqrt(np.mean(directions.friction**2, axis=0)),
         torque_rms=scale,
@@ -213,7 +210,7 @@ def _usable(live: NDArray[np.bool_], order: int) -> NDArray[np.bool_]:
 
 def _colour(residual: Array, live: NDArray[np.bool_]) -> tuple[Array, Array]:
     rows = np.maximum(live.sum(axis=0), 1).astype(float)
-    found = autocovariance(np.where(live, residual, 0.0), rows, HIGHEST_ORDER)
+    found = autocovariance(np.where(live, residual, 0.0), rows, WINDOW_NOISE_ORDER)
     found[:, 0] = np.maximum(found[:, 0], np.finfo(float).tiny)
     return found, rows
 
@@ -231,7 +228,8 @@ def _burst(t: Array, residual: Array, live: NDArray[np.bool_], colour: Colour) -
         chosen = _usable(live[:, j], len(a))
         # The sum of whitened values over the root of their number is normal for noise, and large for a short force.
         white[chosen, j] = filtered[chosen] / np.sqrt(colour.variances[j])
-    length = max(1, round(BLOCK / float(t[1] - t[0])))
+    # A short force is looked for in blocks of this time [s].
+    length = max(1, round(0.2 / float(t[1] - t[0])))
     count = len(t) // length
     if count == 0:
         return float(t[0]), 0.0, np.zeros(n), np.ones(n)

@@ -13,14 +13,8 @@ from robots.common.records import Record
 
 Array = NDArray[np.float64]
 
-# A step of so many median steps, and of so many seconds, is a pause.
-PAUSE_STEPS, PAUSE_SECONDS = 20.0, 0.5
-# The last part of a recording counts from this share of a window on, and with so many rows.
-SHORTEST, FEWEST = 0.3, 50
 # A window with rests ends after so many times its length of motion at the latest.
-LONGEST = 6.0
-# Motion is the change of the positions over this time [s].
-LOOK_BACK = 0.2
+LONGEST_WINDOW = 6.0
 
 
 class StreamWindows(Record):
@@ -74,7 +68,8 @@ class StreamWindows(Record):
             )
         if self.period is None and len(steps) >= 1:
             self.period = float(np.median(steps))
-        longest = max(PAUSE_STEPS * (self.period or 0.0), PAUSE_SECONDS)
+        # A step of twenty median steps, and of half a second, is a pause.
+        longest = max(20.0 * (self.period or 0.0), 0.5)
         begin = 0
         offset = 1 if len(self.rows) else 0
         for cut in np.flatnonzero(steps > longest).tolist():
@@ -92,7 +87,8 @@ class StreamWindows(Record):
             return
         inside = int((rows[:, 0] >= start).sum())
         moved = self._motion(rows, start)
-        if len(moved) and moved[-1] >= SHORTEST * self.window and inside >= FEWEST:
+        # The last part of a recording counts from 30 % of a window on, and with 50 rows.
+        if len(moved) and moved[-1] >= 0.3 * self.window and inside >= 50:
             yield rows, start, last, True
 
     def _grow(self, rows: Array) -> Iterator[tuple[Array, float, float, bool]]:
@@ -116,15 +112,16 @@ class StreamWindows(Record):
         moved = self._motion(self.rows, start)
         inside = t[t >= start]
         rested = inside - start - moved
-        done = np.flatnonzero((moved >= self.window) | (inside >= start + LONGEST * self.window))
+        done = np.flatnonzero((moved >= self.window) | (inside >= start + LONGEST_WINDOW * self.window))
         if not len(done):
             return None
-        return float(min(start + self.window + rested[done[0]], start + LONGEST * self.window))
+        return float(min(start + self.window + rested[done[0]], start + LONGEST_WINDOW * self.window))
 
     def _motion(self, rows: Array, start: float) -> Array:
         """Time [s] in which any joint has moved since the start, at each row from it on."""
         t, q = rows[:, 0], rows[:, 1 : 1 + len(self.slowest)]
-        back = max(1, round(LOOK_BACK / self.period)) if self.period else 1
+        # Motion is the change of the positions over this time [s].
+        back = max(1, round(0.2 / self.period)) if self.period else 1
         if len(t) <= back:
             return t[t >= start] - start
         speed = np.abs(q[back:] - q[:-back]) / (t[back:] - t[:-back])[:, None]

@@ -11,14 +11,8 @@ from robots.common.records import Record
 
 Array = NDArray[np.float64]
 
-# A pause of this length [s] leads to a steady state, whatever it holds.
-LONGEST = 6 * 3600.0
-# Within this time [s] the fall of friction by its own heat is small.
-STEP = 60.0
 # Prior standard deviation of the duty. Its mean is zero: a pause is a rest.
 DUTY_SPREAD = 0.5
-# Below this duty the log of the friction changes evenly with it.
-LEAST_DUTY = 0.05
 # Standard deviation of the change of friction by unlogged work that one joint has beside the others, as a share of that
 # change: 0.3 to 0.4 on six virtual robots of two kinds, after pauses of 10 to 60 min with other motions.
 JOINT_SPREAD = 0.35
@@ -69,7 +63,8 @@ class UnloggedWork(Record):
         Args:
             change: relative change of the friction by work in the whole pause. The duty is the share of it.
         """
-        duty = max(self.duty, LEAST_DUTY)
+        # Below this duty the log of the friction changes evenly with it.
+        duty = max(self.duty, 0.05)
         return float(np.log1p(duty * change) / duty)
 
     def record(self, power: Array, duration: float) -> None:
@@ -108,10 +103,13 @@ class UnloggedWork(Record):
         if self.time == 0:
             return
         power = self.energy / self.time
-        rest = min(duration, LONGEST)
-        steps = [STEP] * int(rest // STEP)
-        if rest % STEP > 1e-3:
-            steps.append(rest % STEP)
+        # A pause of this length [s] leads to a steady state, whatever it holds.
+        rest = min(duration, 6 * 3600.0)
+        # Within this time [s] the fall of friction by its own heat is small.
+        step_length = 60.0
+        steps = [step_length] * int(rest // step_length)
+        if rest % step_length > 1e-3:
+            steps.append(rest % step_length)
         for j, state in enumerate(states):
             if state is None:
                 continue

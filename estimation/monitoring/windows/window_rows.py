@@ -14,10 +14,6 @@ from robots.common.errors import InputError
 
 Array = NDArray[np.float64]
 
-# Blocks per period of the smoothing's cut-off: slow enough to be cheap, fast enough for what the motion holds.
-BLOCKS_PER_PERIOD = 5.0
-FEWEST_BLOCKS = 20
-
 
 def settling(cutoff: float) -> float:
     """Time [s] at the edge of rows in which their smoothing has too little to rest on."""
@@ -77,9 +73,10 @@ def rows_of_window(
     high = min(end, float(t[-1]) - edge) if last else end
     inside = (t >= low) & (t < high)
     period = float(np.median(np.diff(t)))
-    size = max(1, int(1.0 / (BLOCKS_PER_PERIOD * baseline.cutoff * period)))
+    # Blocks per period of the smoothing's cut-off: slow enough to be cheap, fast enough for what the motion holds.
+    size = max(1, int(1.0 / (5.0 * baseline.cutoff * period)))
     count = int(inside.sum()) // size
-    if count < FEWEST_BLOCKS:
+    if count < 20:
         return None
     first = int(np.argmax(inside))
     chosen = slice(first, first + count * size)

@@ -15,9 +15,6 @@ if TYPE_CHECKING:
     import pandas as pd
     from matplotlib.axes import Axes
 
-# Measurements are averaged over so long before they are compared [s].
-AVERAGED = 120.0
-
 
 @dataclass(frozen=True, kw_only=True)
 class PhaseErrors:
@@ -137,7 +134,8 @@ def phase_errors(runs: Sequence[RunFit], *, heating: bool) -> PhaseErrors | None
         return None
     run = max(with_phase, key=lambda run: (run.channel == "friction", run.power))
     mask = run.heating == heating
-    index = ((run.t[mask] - run.t[mask][0]) / AVERAGED).astype(np.int64)
+    # Measurements are averaged over so long before they are compared [s].
+    index = ((run.t[mask] - run.t[mask][0]) / 120.0).astype(np.int64)
     counts = np.bincount(index)
     full = counts > 0
     measured = np.abs(np.bincount(index, run.measured[mask])[full] / counts[full])

@@ -17,8 +17,7 @@ from robots.thermal import ThermalModel
 Array = NDArray[np.float64]
 
 # Heat and friction of the exponential fall depend on each other; their iteration ends at this relative change.
-SETTLED, MOST_ROUNDS = 1e-7, 30
-TOLERANCE, EVALUATIONS = 1e-6, 40
+SETTLED_FALL, MOST_FALL_ROUNDS = 1e-7, 30
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -74,9 +73,8 @@ def fit_curved(search: Search, solution: Solution, colour: float, predicted: Arr
     # Surroundings stay where the prior has them: about where the first fit found them.
     begin = solution.coordinates
     first = np.clip(solution.coordinates[free], low + 1e-9, high - 1e-9)
-    found = least_squares(
-        errors, first, bounds=(low, high), x_scale="jac", ftol=TOLERANCE, xtol=TOLERANCE, max_nfev=EVALUATIONS
-    )
+    tolerance = 1e-6
+    found = least_squares(errors, first, bounds=(low, high), x_scale="jac", ftol=tolerance, xtol=tolerance, max_nfev=40)
     coordinates = whole(found.x)
     curved = _predictions(search, coordinates)
     gain = _squares(search, predicted) - _squares(search, curved)
@@ -96,10 +94,10 @@ def curved_factor(model: ThermalModel, temperature: Array) -> tuple[Array, Array
 def curved_steady_state(model: ThermalModel, power: float) -> float:
     """Temperature where heat is produced at constant power, with the exponential fall [degC]."""
     T, more = np.nan, 1.0
-    for _ in range(MOST_ROUNDS):
+    for _ in range(MOST_FALL_ROUNDS):
         T = float(model.steady_state(power * more, drives=0.0)[..., 0])
         before, more = more, float(curved_factor(model, np.array(T))[1])
-        if abs(more - before) < SETTLED:
+        if abs(more - before) < SETTLED_FALL:
             break
     return T
 
@@ -130,9 +128,9 @@ def _predictions(search: Search, coordinates: Array) -> Array:
 def _path(model: ThermalModel, run: ThermalRun, start: Array, ambient: float) -> Array:
     more = np.ones(len(run.t))
     T = np.empty(0)
-    for _ in range(MOST_ROUNDS):
+    for _ in range(MOST_FALL_ROUNDS):
         T = run_temperatures(model, run, list(start), ambient=ambient, factor=(more[1:] + more[:-1]) / 2.0)
         before, more = more, curved_factor(model, T[:, 0])[1]
-        if np.abs(more - before).max() < SETTLED:
+        if np.abs(more - before).max() < SETTLED_FALL:
             break
     return T

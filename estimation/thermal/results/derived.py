@@ -42,8 +42,6 @@ class Quantity:
 
 # Name of the ratio that is seen in the logs, without any extrapolation.
 SPAN = "highest over lowest friction in the logs"
-# A quantity is determined when its standard error is below this share of it.
-RELATIVE = 0.5
 
 
 def derive(
@@ -91,13 +89,14 @@ def derive(
         other = _values(curved.model, powers, friction, heat_known, curved=True)
         variances += curved.probability * (other - central) ** 2
     errors = np.sqrt(variances)
+    # A quantity is determined when its standard error is below this share of it.
     return tuple(
         Quantity(
             name=name,
             value=float(value),
             unit=unit,
             standard_error=float(error),
-            determined=bool(error <= RELATIVE * abs(value)),
+            determined=bool(error <= 0.5 * abs(value)),
         )
         for name, unit, value, error in zip(names, units, central, errors, strict=True)
     )

@@ -172,10 +172,6 @@ def _mean_power(run: ThermalRun) -> float:
 
 # Fall of the log likelihood at a one-sided 95 % bound.
 FALL = normal_quantile(0.95) ** 2 / 2
-# Bisections of the logarithm: the bound is found to 2 %.
-STEPS = 7
-# Where the rest is at its bounds, IPOPT goes on for ever about a cost that it has long found.
-ITERATIONS = 400
 
 
 def slow_bound(
@@ -208,11 +204,11 @@ def slow_bound(
     current = solution.coordinates
 
     def kept(constant: float) -> Solution:
-        return solve(
-            problem, current, free, weights, prior, slow=(power, float(np.exp(constant))), max_iterations=ITERATIONS
-        )
+        # Where the rest is at its bounds, IPOPT goes on for ever about a cost that it has long found.
+        return solve(problem, current, free, weights, prior, slow=(power, float(np.exp(constant))), max_iterations=400)
 
-    for _ in range(STEPS):
+    # Bisections of the logarithm: the bound is found to 2 %.
+    for _ in range(7):
         middle = (low + high) / 2.0
         tried = kept(middle)
         close = abs(problem.slow_gap(tried.coordinates, power, float(np.exp(middle)))) < 1e-3

@@ -10,13 +10,12 @@ from numpy.typing import NDArray
 
 from estimation.models.model import Model
 from estimation.preprocessing import resample, smooth
-from estimation.regressions.preparation import SLOW, torque_of
-from estimation.thermal.runs.extraction import FAR, bins
+from estimation.regressions.preparation import SIGN_SPEED_SHARE, torque_of
+from estimation.thermal.runs.extraction import SEPARATE_RUN_GAP, bins
+from robots.common.stretches import chunks
 from robots.signals import Log
 
 Array = NDArray[np.float64]
-
-CHUNK = 4096
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -99,7 +98,7 @@ def condense(model: Model, logs: Sequence[Log], width: float) -> Condensed:
     ordered = tuple(sorted(logs, key=lambda log: float(log.t[0])))
     runs: list[list[int]] = []
     for k, log in enumerate(ordered):
-        if runs and log.t[0] - ordered[runs[-1][-1]].t[-1] < FAR:
+        if runs and log.t[0] - ordered[runs[-1][-1]].t[-1] < SEPARATE_RUN_GAP:
             runs[-1].append(k)
         else:
             runs.append([k])
@@ -130,12 +129,12 @@ def condense(model: Model, logs: Sequence[Log], width: float) -> Condensed:
 
 
 def _sums_of(model: Model, log: Log, width: float) -> tuple[Array, list[list[Array]]]:
-    motion = smooth(resample(log.t, log.q), float(model.provenance.get("cutoff_hz", 10.0)))
+    motion = smooth(resample(log.t, log.q), model.cutoff)
     tau = torque_of(model.robot, log)
     edges, index = bins(motion.t, width)
     count, size, n = len(edges) - 1, len(model.columns), model.robot.n
     speed = np.sqrt(np.mean(motion.dq**2, axis=0))
-    good = (np.abs(motion.dq) >= SLOW * speed) & (speed > 1e-9)
+    good = (np.abs(motion.dq) >= SIGN_SPEED_SHARE * speed) & (speed > 1e-9)
     own = [
         np.array([k for k, c in enumerate(model.parameters) if c.friction and c.joint == j + 1], dtype=np.intp)
         for j in range(n)
@@ -152,9 +151,9 @@ def _sums_of(model: Model, log: Log, width: float) -> tuple[Array, list[list[Arr
     ]
     starts = np.searchsorted(index, np.arange(count + 1))
     for b in range(count):
-        rows_in_bin = max(int(starts[b + 1] - starts[b]), 1)
-        for first in range(int(starts[b]), int(starts[b + 1]), CHUNK):
-            rows = slice(first, min(first + CHUNK, int(starts[b + 1])))
+        first, rows_in_bin = int(starts[b]), int(starts[b + 1] - starts[b])
+        for piece in chunks(rows_in_bin):
+            rows = slice(first + piece.start, first + piece.stop)
             Y = model.torque_model.regressor(motion.q[rows], motion.dq[rows], motion.ddq[rows], columns=model.columns)
             for j in range(n):
                 mask = good[rows, j]

@@ -12,18 +12,15 @@ from numpy.typing import NDArray
 from estimation.logs.known_setup import HEAT, require_plain
 from estimation.models.model import Model
 from estimation.preprocessing import resample, smooth
-from estimation.regressions.preparation import SLOW, torque_of
+from estimation.regressions.preparation import SIGN_SPEED_SHARE, torque_of
 from estimation.thermal.runs.thermal_run import ThermalRun
 from robots.common.errors import InputError, NotIdentifiableError
 from robots.signals import Log
 
 Array = NDArray[np.float64]
 
-BIN = 10.0
-"""Time over which friction and power are averaged [s]: short against the fast time constants, some two minutes."""
-
 # Logs that lie further apart are fitted as runs of their own, each with its own start [s].
-FAR = 6.0 * 3600.0
+SEPARATE_RUN_GAP = 6.0 * 3600.0
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -64,7 +61,7 @@ def friction_signal(model: Model, log: Log) -> FrictionSignal:
     if not own.any():
         raise InputError("a model without friction", allowed="a model with a friction term")
     tau = torque_of(model.robot, log)
-    motion = smooth(resample(log.t, log.q), float(model.provenance.get("cutoff_hz", 10.0)))
+    motion = smooth(resample(log.t, log.q), model.cutoff)
     parts = []
     for chosen in (~own, own):
         columns = [c for c, yes in zip(model.columns, chosen, strict=True) if yes]
@@ -75,7 +72,7 @@ def friction_signal(model: Model, log: Log) -> FrictionSignal:
         dq=motion.dq,
         friction=tau - parts[0],
         cold=parts[1],
-        counts=(np.abs(motion.dq) >= SLOW * speed) & (speed > 1e-9),
+        counts=(np.abs(motion.dq) >= SIGN_SPEED_SHARE * speed) & (speed > 1e-9),
         log=log,
     )
 
@@ -85,7 +82,7 @@ def thermal_runs(
     logs: Log | Sequence[Log],
     joint: int,
     *,
-    width: float = BIN,
+    width: float = 10.0,
     sensor: str = "motor",
     signals: Sequence[FrictionSignal] | None = None,
 ) -> tuple[ThermalRun, ...]:
@@ -124,7 +121,7 @@ def group_by_time(parts: Sequence[FrictionSignal]) -> list[list[FrictionSignal]]
     """Puts signals, in order of time, into runs: those whose logs lie close to each other."""
     groups: list[list[FrictionSignal]] = []
     for part in parts:
-        if groups and part.t[0] - groups[-1][-1].t[-1] < FAR:
+        if groups and part.t[0] - groups[-1][-1].t[-1] < SEPARATE_RUN_GAP:
             groups[-1].append(part)
         else:
             groups.append([part])

@@ -12,13 +12,6 @@ from robots.thermal import cold_friction
 
 Array = NDArray[np.float64]
 
-# A stretch counts as one of constant speed where it keeps to its own median within this share ...
-STEADY = 0.02
-# ... for at least so many samples.
-SHORTEST = 10
-# Scaled columns this close to linear dependence are not separately determined.
-DEPENDENT = 1e-7
-
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class SingleAxis:
@@ -154,7 +147,7 @@ def sweep_friction(t: ArrayLike, q: ArrayLike, dq: ArrayLike, tau: ArrayLike, *,
     )
 
 
-def constant_speeds(dq: ArrayLike, *, steady: float = STEADY, shortest: int = SHORTEST) -> list[slice]:
+def constant_speeds(dq: ArrayLike, *, steady: float = 0.02, shortest: int = 10) -> list[slice]:
     """Finds stretches in which a velocity keeps to its median.
 
     Args:
@@ -199,7 +192,8 @@ def _least_squares(Y: Array, tau: Array, remedy: str) -> tuple[Array, Array, flo
             "the motion is too short, or gravity, inertia or friction has no influence", remedy=f"record {remedy}"
         )
     left, singular, right = np.linalg.svd(Y / scale, full_matrices=False)
-    if singular[-1] < DEPENDENT * singular[0]:
+    # Scaled columns this close to linear dependence are not separately determined.
+    if singular[-1] < 1e-7 * singular[0]:
         raise NotIdentifiableError(
             "the motion does not determine gravity, inertia and friction separately", remedy=f"record {remedy}"
         )

@@ -16,7 +16,7 @@ from robots.thermal import ThermalModel, ThermalParameter
 Array = NDArray[np.float64]
 
 # Temperatures are counted from T0 in tens of degrees.
-DEGREES = 10.0
+DEGREES_PER_COORDINATE = 10.0
 # Coordinates of parameters that may be zero, per unit.
 _SCALES = {"alpha": 0.01, "W_e": 10.0, "nu": 1.0}
 
@@ -72,7 +72,9 @@ class Layout:
         """Collects coordinates (P,) from parameters, start temperatures and surroundings [degC]."""
         parts = [[to_coordinate(p, values[p.name]) for p in self.kind.parameters]]
         for start, around in zip(starts, ambients, strict=True):
-            parts.append([*((np.asarray(start) - self.T0) / DEGREES), (around - self.T0) / DEGREES])
+            parts.append(
+                [*((np.asarray(start) - self.T0) / DEGREES_PER_COORDINATE), (around - self.T0) / DEGREES_PER_COORDINATE]
+            )
         return np.concatenate([np.asarray(part, dtype=np.float64) for part in parts])
 
     def values_at(self, coordinates: Array) -> dict[str, float]:
@@ -82,11 +84,11 @@ class Layout:
 
     def start_at(self, coordinates: Array, run: int) -> Array:
         """Gives a run's start temperatures (z,) [degC]."""
-        return self.T0 + DEGREES * coordinates[self.start_slots(run)]
+        return self.T0 + DEGREES_PER_COORDINATE * coordinates[self.start_slots(run)]
 
     def ambient_at(self, coordinates: Array, run: int) -> float:
         """Gives a run's surroundings [degC] where they were not measured."""
-        return self.T0 + DEGREES * float(coordinates[self.ambient_slot(run)])
+        return self.T0 + DEGREES_PER_COORDINATE * float(coordinates[self.ambient_slot(run)])
 
     def bounds(self) -> tuple[Array, Array]:
         """Gives the least and greatest coordinates (P,)."""

@@ -15,11 +15,6 @@ from estimation.uncertainty import Part, covariance, white_noise_covariance
 
 Array = NDArray[np.float64]
 
-# Directions in which the information is weaker by this much are not determined at all.
-FAINT = 1e-10
-# Standard error of a coordinate in an undetermined direction: a factor of e^100 of a positive parameter.
-UNKNOWN = 100.0
-
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Information:
@@ -64,7 +59,8 @@ def gather(
     ratios = np.sqrt(np.maximum(np.diag(honest), 0.0) / np.maximum(np.diag(white), 1e-300))
     which = np.flatnonzero(free)
     full = np.zeros((problem.size, problem.size))
-    full[np.ix_(which, which)] = honest + UNKNOWN**2 * lost @ lost.T
+    # Standard error of a coordinate in an undetermined direction: a factor of e^100 of a positive parameter.
+    full[np.ix_(which, which)] = honest + 100.0**2 * lost @ lost.T
     return Information(
         covariance=full,
         colour=max(1.0, float(np.median(ratios))) if len(ratios) else 1.0,
@@ -82,7 +78,8 @@ def _inverse(matrix: Array) -> tuple[Array, Array]:
     """Inverts the information except for undetermined directions, which are returned as columns."""
     scale = np.sqrt(np.maximum(np.diag(matrix), 1e-300))
     values, vectors = np.linalg.eigh(matrix / scale[:, None] / scale)
-    known = values > FAINT * max(float(values[-1]), 1e-300)
+    # Directions in which the information is weaker by this much are not determined at all.
+    known = values > 1e-10 * max(float(values[-1]), 1e-300)
     directions = vectors / scale[:, None]
     lost = directions[:, ~known]
     return (directions[:, known] / values[known]) @ directions[:, known].T, lost / np.abs(lost).max(

@@ -14,9 +14,7 @@ from estimation.thermal.runs.thermal_run import ThermalRun
 
 Array = NDArray[np.float64]
 
-DEGREE = 3
-# More changes of the power than this are no stages of an experiment but a motion: its steps are merged.
-MOST_STEPS = 240
+COLLOCATION_DEGREE = 3
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -42,11 +40,11 @@ class MeshSettings:
 
 def radau() -> tuple[Array, Array]:
     """Gives the Radau points with zero in front (d + 1,), and the derivatives D (d + 1, d) of the Lagrange basis."""
-    points = np.array([0.0, *casadi.collocation_points(DEGREE, "radau")])
-    D = np.empty((DEGREE + 1, DEGREE))
-    for j in range(DEGREE + 1):
+    points = np.array([0.0, *casadi.collocation_points(COLLOCATION_DEGREE, "radau")])
+    D = np.empty((COLLOCATION_DEGREE + 1, COLLOCATION_DEGREE))
+    for j in range(COLLOCATION_DEGREE + 1):
         basis = np.poly1d([1.0])
-        for r in range(DEGREE + 1):
+        for r in range(COLLOCATION_DEGREE + 1):
             if r != j:
                 basis *= np.poly1d([1.0, -points[r]]) / (points[j] - points[r])
         D[j] = np.polyval(np.polyder(basis), points[1:])
@@ -112,8 +110,10 @@ def _edges(run: ThermalRun, settings: MeshSettings) -> Array:
     drives = np.asarray(run.drives)[:-1]
     changes = np.flatnonzero((np.abs(np.diff(power)) > tolerance) | (np.diff(drives) != 0.0)) + 1
     longest = min(settings.longest * run.duration, settings.cap)
-    if len(changes) > MOST_STEPS:
-        return np.linspace(t[0], t[-1], min(MOST_STEPS, int(np.ceil(run.duration / settings.first))) + 1)
+    # More changes of the power than this are no stages of an experiment but a motion: its steps are merged.
+    most = 240
+    if len(changes) > most:
+        return np.linspace(t[0], t[-1], min(most, int(np.ceil(run.duration / settings.first))) + 1)
     breaks = np.concatenate([[t[0]], t[changes], [t[-1]]])
     edges = [float(t[0])]
     for start, stop in pairwise(breaks):
@@ -133,14 +133,14 @@ def _sampling(t: Array, edges: Array, points: Array) -> csr_matrix:
     interval = np.clip(np.searchsorted(edges, t, side="left") - 1, 0, len(edges) - 2)
     place = (t - edges[interval]) / np.diff(edges)[interval]
     rows, columns, values = [], [], []
-    for j in range(DEGREE + 1):
+    for j in range(COLLOCATION_DEGREE + 1):
         basis = np.ones(t.shape)
-        for r in range(DEGREE + 1):
+        for r in range(COLLOCATION_DEGREE + 1):
             if r != j:
                 basis *= (place - points[r]) / (points[j] - points[r])
         rows.append(np.arange(len(t)))
         # The start of an interval is the last Radau point of the one before.
-        columns.append(interval * DEGREE + j)
+        columns.append(interval * COLLOCATION_DEGREE + j)
         values.append(basis)
-    shape = (len(t), 1 + (len(edges) - 1) * DEGREE)
+    shape = (len(t), 1 + (len(edges) - 1) * COLLOCATION_DEGREE)
     return csr_matrix((np.concatenate(values), (np.concatenate(rows), np.concatenate(columns))), shape=shape)

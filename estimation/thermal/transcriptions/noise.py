@@ -12,13 +12,6 @@ from estimation.thermal.runs.measurements import Row
 
 Array = NDArray[np.float64]
 
-# First guesses: share of the cold friction, and degrees.
-FRICTION, TEMPERATURE = 0.01, 0.2
-# Residuals below this fraction of the first guess mean exact data without noise.
-EXACT = 1e-4
-# Gain of the log likelihood that noise in proportion to the torque must bring before it is believed.
-WORTH = 4.0
-
 
 @dataclass(frozen=True, kw_only=True)
 class NoiseLevels:
@@ -46,8 +39,9 @@ class NoiseLevels:
 def first_guess(rows: Sequence[Row]) -> NoiseLevels:
     """Gives levels to begin with."""
     relative = np.concatenate([row.relative for row in rows if row.channel == "friction"] or [np.ones(1)])
-    levels = {row.channel: TEMPERATURE for row in rows}
-    levels["friction"] = FRICTION / float(np.median(relative))
+    levels = {row.channel: 0.2 for row in rows}
+    # First guesses: degrees, and a share of the cold friction.
+    levels["friction"] = 0.01 / float(np.median(relative))
     return NoiseLevels(levels=levels)
 
 
@@ -68,8 +62,10 @@ def estimate_levels(rows: Sequence[Row], predicted: Array, parameters: int) -> N
             sizes.append(np.maximum(np.abs(seen), 0.05))
     total = sum(len(part) for parts in residuals.values() for part in parts)
     share = np.sqrt(total / max(total - parameters, 1))
+    # Residuals below this fraction of the first guess mean exact data without noise.
+    exact = 1e-4
     levels = {
-        channel: max(share * _rms(np.concatenate(parts)), EXACT * guess.levels[channel])
+        channel: max(share * _rms(np.concatenate(parts)), exact * guess.levels[channel])
         for channel, parts in residuals.items()
     }
     if "friction" not in residuals:
@@ -77,8 +73,9 @@ def estimate_levels(rows: Sequence[Row], predicted: Array, parameters: int) -> N
     plain, size = np.concatenate(residuals["friction"]), np.concatenate(sizes)
     scaled = plain / size
     gain = len(plain) * np.log(_rms(plain) / max(_rms(scaled), 1e-300)) - float(np.log(size).sum())
-    if gain > WORTH:
-        levels["friction"] = max(share * _rms(scaled), EXACT * guess.levels["friction"])
+    # Gain of the log likelihood that noise in proportion to the torque must bring before it is believed.
+    if gain > 4.0:
+        levels["friction"] = max(share * _rms(scaled), exact * guess.levels["friction"])
         return NoiseLevels(levels=levels, proportional=True)
     return NoiseLevels(levels=levels)
 

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from estimation.thermal.runs.thermal_run import ThermalRun
-from estimation.thermal.transcriptions.coordinates import DEGREES, from_coordinate
+from estimation.thermal.transcriptions.coordinates import DEGREES_PER_COORDINATE, from_coordinate
 from estimation.thermal.transcriptions.information import Information, gather
 from estimation.thermal.transcriptions.mesh import MeshSettings
 from estimation.thermal.transcriptions.noise import NoiseLevels, estimate_levels, first_guess
@@ -20,17 +20,6 @@ from robots.common.errors import SolverError
 from robots.thermal import ThermalModel
 
 Array = NDArray[np.float64]
-
-# Random guesses that are looked at for every one that is solved.
-LOOKS = 12
-# Surroundings that were not measured are those of T0, give or take so much [K].
-AMBIENT_SPREAD = 3.0
-# Surroundings of an unknown heat: they take its constant part [K].
-UNKNOWN_HEAT_SPREAD = 100.0
-# Squared distance of a start from the surroundings, in standard errors, at which a run counts as one that starts warm.
-WARM = 30.0
-# All discretisation errors together, over the noise: at this they move no number by more than 0.3 standard errors.
-FINE = 0.3
 
 
 @dataclass
@@ -59,9 +48,11 @@ class Search:
         self.levels: NoiseLevels = first_guess(self.problem.rows)
         self.weights = self.levels.weights(self.problem.rows, self.problem.measured)
         self.heat_known = self.runs[0].power is not None
-        spread = AMBIENT_SPREAD if self.heat_known else UNKNOWN_HEAT_SPREAD
+        # Surroundings that were not measured are those of T0, give or take so much [K]. Those of an unknown heat take
+        # its constant part.
+        spread = 3.0 if self.heat_known else 100.0
         unknown = np.array([run.ambient is None for run in self.runs])
-        self.prior = np.where(unknown, DEGREES / spread, 0.0)
+        self.prior = np.where(unknown, DEGREES_PER_COORDINATE / spread, 0.0)
         self.free = np.zeros(self.problem.size, dtype=bool)
         for i, parameter in enumerate(self.kind.parameters):
             self.free[i] = parameter.name not in self.structure.fixed
@@ -119,7 +110,8 @@ class Search:
 
     def search(self, starts: int, rng: np.random.Generator) -> Solution:
         """Solves from the typical values and from the best of many random ones."""
-        looks = [self.guess(None), *(self.guess(rng) for _ in range(LOOKS * (starts - 1)))]
+        # Random guesses that are looked at for every one that is solved.
+        looks = [self.guess(None), *(self.guess(rng) for _ in range(12 * (starts - 1)))]
         costs = np.array([self.cost(look) for look in looks])
         order = [0, *(np.argsort(costs[1:])[: starts - 1] + 1)]
         found = [self.solve(looks[k]) for k in order]
@@ -179,9 +171,11 @@ class Search:
             around[self.layout.ambient_slot(run)] = 1.0
         # Of the difference, in coordinates: starts less surroundings.
         pick = np.eye(self.problem.size)[slots] - around
-        spread = pick @ info.covariance @ pick.T * DEGREES**2
+        spread = pick @ info.covariance @ pick.T * DEGREES_PER_COORDINATE**2
         chi = float(gap @ np.linalg.pinv(spread, rcond=1e-10) @ gap)
-        return chi > WARM and bool(np.any(np.abs(gap) > 0.5))
+        # Squared distance of a start from the surroundings, in standard errors, at which a run counts as one that
+        # starts warm.
+        return chi > 30.0 and bool(np.any(np.abs(gap) > 0.5))
 
     def refined(self, solution: Solution) -> Solution:
         """Halves the mesh until its error is small beside the noise."""
@@ -190,7 +184,9 @@ class Search:
             states = finer.follow(solution.coordinates)
             here = self.problem.predict(solution.coordinates, solution.states)
             error = self.weights * (finer.predict(solution.coordinates, states) - here)
-            if float(np.sqrt(error @ error)) < FINE:
+            # All discretisation errors together, over the noise: at this they move no number by more than 0.3 standard
+            # errors.
+            if float(np.sqrt(error @ error)) < 0.3:
                 return solution
             self.settings, self.problem = self.settings.finer(), finer
             solution = self.solve(solution.coordinates)

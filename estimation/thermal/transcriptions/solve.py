@@ -12,11 +12,6 @@ from estimation.thermal.transcriptions.transcription import Solution, Transcript
 
 Array = NDArray[np.float64]
 
-# Weight of a time constant that is to be kept, in standard deviations of its logarithm.
-HOLD = 1e3
-# More states than these make IPOPT's steps dear, while eliminating them stays cheap.
-LONG_MEMORY = 4
-
 
 def solve(
     problem: Transcription,
@@ -44,7 +39,8 @@ def solve(
     """
     lower, upper = problem.layout.bounds()
     begin = np.where(free, np.clip(coordinates, lower + 1e-9, upper - 1e-9), coordinates)
-    if problem.state_size > LONG_MEMORY:
+    # More states than these make IPOPT's steps dear, while eliminating them stays cheap.
+    if problem.state_size > 4:
         return _solve_reduced(problem, begin, free, (weights, prior), slow)
     return problem.solve(begin, free, weights, prior, slow=slow, max_iterations=max_iterations)
 
@@ -69,11 +65,14 @@ def _solve_reduced(
             latest.update(at=moved.copy(), whole=whole, states=problem.follow(whole))
         return latest["whole"], latest["states"]
 
+    # Weight of a time constant that is to be kept, in standard deviations of its logarithm.
+    hold = 1e3
+
     def residual(moved: Array) -> Array:
         whole, states = at(moved)
         parts = [rows * (problem.predict(whole, states) - problem.measured), prior * whole[slots]]
         if slow is not None:
-            parts.append(np.array([HOLD * problem.slow_gap(whole, *slow)]))
+            parts.append(np.array([hold * problem.slow_gap(whole, *slow)]))
         return np.concatenate(parts)
 
     def slope(moved: Array) -> Array:
@@ -84,7 +83,7 @@ def _solve_reduced(
         if slow is not None:
             steps = 1e-6 * np.eye(problem.size)
             gaps = [problem.slow_gap(whole + d, *slow) - problem.slow_gap(whole - d, *slow) for d in steps]
-            parts.append(HOLD * np.array(gaps)[None, :] / 2e-6)
+            parts.append(hold * np.array(gaps)[None, :] / 2e-6)
         return np.concatenate(parts)[:, which]
 
     result = least_squares(

@@ -14,12 +14,6 @@ from robots.thermal import ThermalModel
 
 Array = NDArray[np.float64]
 
-# Surroundings that differ by less [K] between the runs say nothing of the slope of the friction.
-AMBIENT_CHANGE = 2.0
-
-# A joint has cooled down after so long [s] at no more than this share of its largest power.
-RESTED, QUIET = 120.0, 0.05
-
 
 @dataclass(frozen=True, kw_only=True)
 class Structure:
@@ -125,7 +119,8 @@ def _checked(kind: type[ThermalModel], alpha: float | None, fixed: Mapping[str, 
 
 def _surroundings_change(runs: Sequence[ThermalRun]) -> bool:
     seen = [np.asarray(run.ambient) for run in runs if run.ambient is not None]
-    return bool(seen) and float(np.nanmax(np.concatenate(seen)) - np.nanmin(np.concatenate(seen))) >= AMBIENT_CHANGE
+    # Surroundings that differ by less [K] between the runs say nothing of the slope of the friction.
+    return bool(seen) and float(np.nanmax(np.concatenate(seen)) - np.nanmin(np.concatenate(seen))) >= 2.0
 
 
 def _still(run: ThermalRun) -> bool:
@@ -134,11 +129,13 @@ def _still(run: ThermalRun) -> bool:
 
 def _cooled(run: ThermalRun, seen: NDArray[np.bool_]) -> bool:
     """Whether something was measured after a long rest of a joint that had been under power."""
-    quiet = run.held_power <= QUIET * float(run.held_power.max())
+    # At rest a joint has at most 5 % of its largest power.
+    quiet = run.held_power <= 0.05 * float(run.held_power.max())
     warmed, rested = False, 0.0
     for step, rests, known in zip(np.diff(run.t), quiet, seen[1:], strict=True):
         rested += float(step) if rests else 0.0
-        if warmed and rested >= RESTED and known:
+        # A joint has cooled down after two minutes of rest.
+        if warmed and rested >= 120.0 and known:
             return True
         if not rests:
             warmed, rested = True, 0.0

@@ -14,8 +14,8 @@ from scipy.sparse.linalg import splu
 
 from estimation.thermal.runs.measurements import rows_of
 from estimation.thermal.runs.thermal_run import ThermalRun
-from estimation.thermal.transcriptions.coordinates import DEGREES, Layout, from_coordinate
-from estimation.thermal.transcriptions.mesh import DEGREE, Mesh, MeshSettings, build_mesh, radau
+from estimation.thermal.transcriptions.coordinates import DEGREES_PER_COORDINATE, Layout, from_coordinate
+from estimation.thermal.transcriptions.mesh import COLLOCATION_DEGREE, Mesh, MeshSettings, build_mesh, radau
 from robots.common.errors import SolverError
 from robots.thermal import Inputs, ThermalModel
 
@@ -78,11 +78,16 @@ class Transcription:
 
     def _state_scale(self) -> Array:
         if self._states == len(self.kind.zones):
-            return np.full(self._states, DEGREES)
+            return np.full(self._states, DEGREES_PER_COORDINATE)
         from robots.thermal.fractional import memory_weights
 
         typical = {p.name: p.typical for p in self.kind.parameters}
-        return np.array([DEGREES, *(DEGREES / w for w in memory_weights(typical["nu"], self._states - 1))])
+        return np.array(
+            [
+                DEGREES_PER_COORDINATE,
+                *(DEGREES_PER_COORDINATE / w for w in memory_weights(typical["nu"], self._states - 1)),
+            ]
+        )
 
     def _symbolic_values(self, symbols: Any) -> dict[str, Any]:
         # Temperatures are counted from T0 in here.
@@ -92,17 +97,17 @@ class Transcription:
         """Residuals of one interval: the derivative of the polynomial less the heat balance, at each Radau point."""
         _, D = radau()
         theta = casadi.SX.sym("theta", len(self.kind.parameters))
-        first, inner = casadi.SX.sym("first", self._states), casadi.SX.sym("inner", self._states, DEGREE)
-        around, own = casadi.SX.sym("around", DEGREE), casadi.SX.sym("own")
-        third, data = casadi.SX.sym("third", DEGREE), casadi.SX.sym("data", 3)
+        first, inner = casadi.SX.sym("first", self._states), casadi.SX.sym("inner", self._states, COLLOCATION_DEGREE)
+        around, own = casadi.SX.sym("around", COLLOCATION_DEGREE), casadi.SX.sym("own")
+        third, data = casadi.SX.sym("third", COLLOCATION_DEGREE), casadi.SX.sym("data", 3)
         values = self._symbolic_values(theta)
         nodes = casadi.horzcat(first, inner)
         residuals = []
-        for j in range(DEGREE):
+        for j in range(COLLOCATION_DEGREE):
             x = [scale * inner[i, j] for i, scale in enumerate(self._scale.tolist())]
             u = Inputs(
                 data[1],
-                around[j] if mesh.ambient is not None else DEGREES * own,
+                around[j] if mesh.ambient is not None else DEGREES_PER_COORDINATE * own,
                 third[j] if mesh.T3 is not None else None,
                 data[2],
             )
@@ -121,21 +126,25 @@ class Transcription:
 
     def _build(self) -> None:
         symbols = casadi.MX.sym("coordinates", self.size)
-        counts = [self._states * DEGREE * mesh.count for mesh in self.meshes]
+        counts = [self._states * COLLOCATION_DEGREE * mesh.count for mesh in self.meshes]
         states = casadi.MX.sym("states", sum(counts))
         theta = symbols[: len(self.kind.parameters)]
         offsets = np.concatenate([[0], np.cumsum(counts)]).astype(int)
         values, zones = self._symbolic_values(theta), self._zones()
         residuals, seen = [], []
         for r, mesh in enumerate(self.meshes):
-            inner = casadi.reshape(states[int(offsets[r]) : int(offsets[r + 1])], self._states, DEGREE * mesh.count)
+            inner = casadi.reshape(
+                states[int(offsets[r]) : int(offsets[r + 1])], self._states, COLLOCATION_DEGREE * mesh.count
+            )
             starts = symbols[self.layout.start_slots(r)]
             parts = [starts[i] for i in range(len(self.kind.zones))]
             first = casadi.vertcat(*self.kind.start_state(parts, self._states))
             nodes = casadi.horzcat(first, inner)
             own = symbols[self.layout.ambient_slot(r)]
             residuals.append(casadi.vec(self._map_interval(mesh, nodes, inner, theta, own)))
-            reached = zones.map(1 + DEGREE * mesh.count)(nodes, casadi.repmat(theta, 1, 1 + DEGREE * mesh.count))
+            reached = zones.map(1 + COLLOCATION_DEGREE * mesh.count)(
+                nodes, casadi.repmat(theta, 1, 1 + COLLOCATION_DEGREE * mesh.count)
+            )
             sampling = casadi.DM(csc_matrix(mesh.sampling))
             seen.append(casadi.mtimes(sampling, reached.T))
         outputs = []
@@ -158,12 +167,12 @@ class Transcription:
 
     def _map_interval(self, mesh: Mesh, nodes: Any, inner: Any, theta: Any, own: Any) -> Any:
         K = mesh.count
-        empty = np.zeros((DEGREE, K))
+        empty = np.zeros((COLLOCATION_DEGREE, K))
         data = np.stack([np.diff(mesh.edges), mesh.power, mesh.drives])
         around = empty if mesh.ambient is None else mesh.ambient.T - self.T0
         third = empty if mesh.T3 is None else mesh.T3.T - self.T0
         return self._interval(mesh).map(K)(
-            nodes[:, : DEGREE * K : DEGREE],
+            nodes[:, : COLLOCATION_DEGREE * K : COLLOCATION_DEGREE],
             inner,
             casadi.repmat(theta, 1, K),
             around,

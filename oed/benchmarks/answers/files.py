@@ -11,7 +11,7 @@ import numpy as np
 
 from oed.benchmarks.answers.answer import Answers, Array, CaseAnswer, NamedEffect
 from oed.benchmarks.answers.entries import case_answer
-from oed.benchmarks.folders import VERSION, Benchmark, BlindCase, read_columns, read_json
+from oed.benchmarks.folders import BENCHMARK_VERSION, Benchmark, BlindCase, read_columns, read_json
 from robots.common.errors import InputError
 from robots.common.files import ResultFolder
 
@@ -117,7 +117,7 @@ def write_answers(out: ResultFolder, answers: Answers) -> None:
             np.savetxt(path, answer.torque, delimiter=",", header=header, comments="", fmt="%.9g")
     data = {
         "format": FORM,
-        "format_version": VERSION,
+        "format_version": BENCHMARK_VERSION,
         "benchmark": answers.benchmark,
         "tool": {"name": answers.tool, "version": answers.version},
         "cases": entries,

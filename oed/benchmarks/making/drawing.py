@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from oed.benchmarks.making.strata import PAIRED, Task
+from oed.benchmarks.making.strata import PAIRED_SIZE, Task
 from oed.benchmarks.taxonomy import known_parameters
 from oed.benchmarks.truth.cases import Case, Hidden, draw_case
 from oed.benchmarks.truth.machines import Machine
@@ -18,8 +18,6 @@ Array = NDArray[np.float64]
 
 OUTSIDE = "outside"
 """The name of a hidden effect that no name of the taxonomy fits."""
-
-RETRIES = 5  # further seeds for a case that no robot and no effect of its stratum can show
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -54,14 +52,15 @@ def draw(task: Task, *, size: float, noise: float, duration: float, unseen: floa
     Raises:
         InfeasibleError: no robot shows an effect of that size.
     """
-    for retry in range(RETRIES):
+    # Further seeds for a case that no robot and no effect of its stratum can show.
+    for retry in range(5):
         for effect in task.effects or (None,):
             for robot in task.robots:
                 try:
                     case = draw_case(
                         _seed(task.seed, retry),
                         hide=[effect] if effect else 2 if task.stratum == "two" else 0,
-                        size=size * (PAIRED if task.stratum == "two" else 1.0),
+                        size=size * (PAIRED_SIZE if task.stratum == "two" else 1.0),
                         kind=robot,
                         duration=duration,
                         unseen=unseen,

@@ -12,17 +12,17 @@ from tempfile import TemporaryDirectory
 
 import numpy as np
 
-from oed.benchmarks.folders import CASE as CASE_FILE
 from oed.benchmarks.folders import (
+    BENCHMARK_VERSION,
     CASE_FORMAT,
     FORMAT,
     MANIFEST,
     UNSEEN,
-    VERSION,
     Benchmark,
     default_sealed,
     read_benchmark,
 )
+from oed.benchmarks.folders import CASE as CASE_FILE
 from oed.benchmarks.folders import LOG as LOG_FILE
 from oed.benchmarks.making.drawing import Array, DrawnCase, draw
 from oed.benchmarks.making.options import MakeOptions
@@ -30,7 +30,7 @@ from oed.benchmarks.making.strata import tasks
 from oed.benchmarks.sealing import seal
 from oed.benchmarks.taxonomy import CLASSES, PARAMETERS, UNKNOWN
 from oed.benchmarks.truth.description import write_description
-from oed.benchmarks.truth.plant import CONTROL_STEP, LOG_EVERY, PAUSE
+from oed.benchmarks.truth.plant import CONTROL_STEP, LOG_EVERY, LOG_PAUSE
 from robots.common.errors import InputError
 from robots.common.files import ResultFolder, open_atomic, sha256
 from robots.common.parallel import parallel_map
@@ -99,7 +99,7 @@ def _hidden(case: DrawnCase) -> tuple[dict[str, object], np.ndarray]:
 def _manifest(identity: str, names: Sequence[str], digest: str) -> dict[str, object]:
     return {
         "format": FORMAT,
-        "format_version": VERSION,
+        "format_version": BENCHMARK_VERSION,
         "id": identity,
         "tool_version": TOOL,
         "cases": list(names),
@@ -134,7 +134,7 @@ def write_case(out: ResultFolder, name: str, case: DrawnCase) -> None:
     period = CONTROL_STEP * LOG_EVERY
     facts = {
         "format": CASE_FORMAT,
-        "format_version": VERSION,
+        "format_version": BENCHMARK_VERSION,
         "case": name,
         "joints": n,
         "robot": {
@@ -149,7 +149,7 @@ def write_case(out: ResultFolder, name: str, case: DrawnCase) -> None:
         "unseen": {
             "file": UNSEEN,
             "rows": len(case.unseen),
-            "note": f"on the log's clock, after a rest of {PAUSE:g} s; its torque is held back",
+            "note": f"on the log's clock, after a rest of {LOG_PAUSE:g} s; its torque is held back",
         },
         "sample_period": period,
         "noise": {

@@ -9,8 +9,6 @@ from oed.benchmarks.truth.kinds import KINDS
 from robots.common.errors import InputError
 from robots.common.options import Option, names
 
-SHORTEST = 10.0  # [s]: a shorter log determines no base model
-
 
 @dataclass(frozen=True, kw_only=True)
 class MakeOptions:
@@ -42,11 +40,13 @@ class MakeOptions:
         for robot in self.robots or ("",):
             if robot not in KINDS:
                 raise InputError(f"the plant has no robot {robot!r}", allowed=", ".join(KINDS))
+        # [s]: a shorter log determines no base model.
+        shortest = 10.0
         for name, value, lower, upper in (
             ("size", self.size, 1e-3, 0.2),
             ("noise", self.noise, 1e-4, 0.5),
-            ("duration", self.duration, SHORTEST, 3600.0),
-            ("unseen", self.unseen, SHORTEST, 3600.0),
+            ("duration", self.duration, shortest, 3600.0),
+            ("unseen", self.unseen, shortest, 3600.0),
         ):
             if not lower <= value <= upper:
                 raise InputError(f"{name} {value:g}", allowed=f"{lower:g} to {upper:g}")

@@ -8,7 +8,7 @@ from typing import TypeVar
 
 import numpy as np
 
-from oed.benchmarks.truth.effects import KNOWN, STRANGERS
+from oed.benchmarks.truth.effects import KNOWN, UNLISTED
 from oed.benchmarks.truth.effects.base import Effect
 
 Member = TypeVar("Member")
@@ -16,7 +16,7 @@ Member = TypeVar("Member")
 SHARES = {"nothing": 0.3, "one": 0.3, "two": 0.2, "outside": 0.2}
 """Shares of the cases, by stratum."""
 
-PAIRED = 3.0
+PAIRED_SIZE = 3.0
 """Size of each of two effects over the size of a single one: two are harder to separate."""
 
 
@@ -65,7 +65,7 @@ def tasks(cases: int, robots: Sequence[str], rng: np.random.Generator) -> Iterat
     strata = [name for name, count in counts(cases).items() for _ in range(count)]
     rng.shuffle(strata)
     seeds = rng.integers(2**62, size=cases)
-    pools = {"one": _shuffled(KNOWN, rng), "outside": _shuffled(STRANGERS, rng)}
+    pools = {"one": _shuffled(KNOWN, rng), "outside": _shuffled(UNLISTED, rng)}
     machines = _shuffled(tuple(robots), rng)
     used = dict.fromkeys(SHARES, 0)
     for number, (stratum, seed) in enumerate(zip(strata, seeds, strict=True), start=1):

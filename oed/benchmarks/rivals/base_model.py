@@ -13,14 +13,8 @@ from scipy.signal import butter, sosfiltfilt
 
 Array = NDArray[np.float64]
 
-CUT_OFF = 30.0  # of the low-pass of positions [Hz]
-BAND = 5.0  # of the low-pass of torque and columns before the fit [Hz]: above it, accelerations are poorly known
-DECIMATED = 2.5  # samples per period of the band's edge that are left
-STILL = 0.005  # velocity [rad/s] of the smooth sign of Coulomb friction; below it, filtered positions show no direction
-BESIDE = 0.25  # time [s] on both sides of a reversal in which filtered positions do not show the friction's jump
-ENDS = 0.5  # time [s] at both ends of a log where filters err
-ORDER = 4  # of the low-passes
-SMALL = 1e-3  # singular values below this fraction of the largest one are left out: they extrapolate badly
+FIT_BAND = 5.0  # of the low-pass of torque and columns before the fit [Hz]: above it, accelerations are poorly known
+LOW_PASS_ORDER = 4  # of the low-passes
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -63,7 +57,8 @@ def motion_of(t: Array, q: Array) -> Motion:
         q: positions (N, n) [rad].
     """
     period = float(np.median(np.diff(t)))
-    smooth = sosfiltfilt(butter(ORDER, 2 * period * CUT_OFF, output="sos"), q, axis=0)
+    # Low-pass of positions [Hz].
+    smooth = sosfiltfilt(butter(LOW_PASS_ORDER, 2 * period * 30.0, output="sos"), q, axis=0)
     v = np.gradient(smooth, period, axis=0, edge_order=2)
     return Motion(t=t, q=smooth, v=v, a=np.gradient(v, period, axis=0, edge_order=2))
 
@@ -76,7 +71,8 @@ def base_columns(model: pin.Model, motion: Motion) -> Array:
         columns[k, :, : 10 * n] = pin.computeJointTorqueRegressor(model, data, motion.q[k], motion.v[k], motion.a[k])
     for j in range(n):
         v, first = motion.v[:, j], 10 * n + 6 * j
-        own = (np.tanh(v / STILL), v, v * np.abs(v), v**3, motion.a[:, j], np.ones(len(v)))
+        # Below 0.005 rad/s filtered positions show no direction: the sign of Coulomb friction is smooth there.
+        own = (np.tanh(v / 0.005), v, v * np.abs(v), v**3, motion.a[:, j], np.ones(len(v)))
         columns[:, j, first : first + 6] = np.column_stack(own)
     return columns
 
@@ -88,21 +84,24 @@ def filtered(values: Array, period: float) -> Array:
         values: any rows of a log.
         period: sample period [s].
     """
-    slow = sosfiltfilt(butter(ORDER, 2 * period * BAND, output="sos"), values, axis=0)
+    slow = sosfiltfilt(butter(LOW_PASS_ORDER, 2 * period * FIT_BAND, output="sos"), values, axis=0)
     return np.asarray(slow[_kept(len(slow), period)])
 
 
 def away_from_reversals(motion: Motion) -> NDArray[np.bool_]:
-    """Flags rows (M, n), of those that `filtered` keeps, that are more than `BESIDE` from a reversal of the joint."""
+    """Flags rows (M, n), of those that `filtered` keeps, that are more than 0.25 s from a reversal of the joint."""
     turned = np.zeros(motion.v.shape, dtype=bool)
     turned[1:] = np.sign(motion.v[1:]) != np.sign(motion.v[:-1])
-    near = maximum_filter1d(turned, 2 * round(BESIDE / motion.period) + 1, axis=0)
+    # Near a reversal filtered positions do not show the friction's jump.
+    near = maximum_filter1d(turned, 2 * round(0.25 / motion.period) + 1, axis=0)
     return ~np.asarray(near)[_kept(len(turned), motion.period)]
 
 
 def _kept(rows: int, period: float) -> slice:
-    ends = round(ENDS / period)
-    return slice(ends, rows - ends, max(round(1 / (DECIMATED * BAND * period)), 1))
+    # Filters err at both ends of a log [s].
+    ends = round(0.5 / period)
+    # So many samples per period of the band's edge are left.
+    return slice(ends, rows - ends, max(round(1 / (2.5 * FIT_BAND * period)), 1))
 
 
 def fit(columns: Array, tau: Array, counted: NDArray[np.bool_], extra: Array | None = None) -> BaseFit:
@@ -120,5 +119,6 @@ def fit(columns: Array, tau: Array, counted: NDArray[np.bool_], extra: Array | N
     rows = (Y / level[:, None]).reshape(-1, Y.shape[2])[chosen]
     scale = np.sqrt((rows**2).sum(axis=0))
     scale[scale == 0] = 1.0
-    found = lstsq(rows / scale, (tau / level).reshape(-1)[chosen], cond=SMALL)[0] / scale
+    # Smaller singular values extrapolate badly and are left out.
+    found = lstsq(rows / scale, (tau / level).reshape(-1)[chosen], cond=1e-3)[0] / scale
     return BaseFit(columns=columns, parameters=found, residual=tau - Y @ found, counted=counted)

@@ -29,19 +29,10 @@ from oed.benchmarks.rivals.logs import read_motion
 
 Array = NDArray[np.float64]
 
-FALSE_ALARMS = 0.01
-"""Probability of any significant group if the base model is right."""
-
-LEAST = 0.02
+LEAST_RESIDUAL_SHARE = 0.02
 """Share of the torque RMS that an effect explains at least; chosen on a dozen cases without an effect."""
 
-MOST = 3
-"""Largest number of effects."""
-
-HALF = 0.5
-"""Share of what all groups together explain that one must explain to give the name."""
-
-SMALL, TINY = 1e-6, 1e-300
+DEPENDENT_SHARE, TINY = 1e-6, 1e-300
 
 WHOLE = ("delay",)
 """Groups that stand for an effect of the whole robot."""
@@ -73,7 +64,8 @@ def by_residual_fit(case: BlindCase) -> CaseAnswer:
 
     At each joint the residual, whitened by an autoregressive model, is fitted by each group of columns. The group that
     explains the largest share enters the model, which is fitted again, until no group is significant. A group is
-    significant by an F test with Bonferroni's correction for all groups and joints, if it explains at least `LEAST`.
+    significant by an F test with Bonferroni's correction for all groups and joints, if it explains at least
+    `LEAST_RESIDUAL_SHARE`.
 
     Args:
         case: the public part of the case.
@@ -93,7 +85,8 @@ def by_residual_fit(case: BlindCase) -> CaseAnswer:
     ]
     picks: list[Pick] = []
     found = base
-    while len(picks) < MOST:
+    # Largest number of effects.
+    while len(picks) < 3:
         best = _best(found, level, listed, picks)
         if best is None:
             break
@@ -106,7 +99,8 @@ def by_residual_fit(case: BlindCase) -> CaseAnswer:
         other = columns @ base.parameters
         named_groups = [dict(groups(unseen, other, j, gear)) for j, gear in enumerate(gears)]
         columns = np.concatenate([columns, _chosen(picks, named_groups)], axis=2)
-    named = [pick for pick in picks if pick.of_possible >= HALF]
+    # Share of what all groups together explain that one must explain to give the name.
+    named = [pick for pick in picks if pick.of_possible >= 0.5]
     return CaseAnswer(
         verdict="nothing" if not picks else "effects" if named else "unexplained",
         effects=tuple(
@@ -125,7 +119,8 @@ def _best(found: BaseFit, level: Array, listed: list[list[tuple[str, Array]]], p
         for pick in _explained(found, level[j], j, candidates)
         if used.isdisjoint({pick.name, (pick.name, pick.j)})
     ]
-    significant = [pick for pick in tried if pick.p_value * len(tried) < FALSE_ALARMS and pick.size >= LEAST]
+    # Probability of any significant group if the base model is right.
+    significant = [pick for pick in tried if pick.p_value * len(tried) < 0.01 and pick.size >= LEAST_RESIDUAL_SHARE]
     return max(significant, key=lambda pick: pick.explained, default=None)
 
 
@@ -134,7 +129,7 @@ def _explained(found: BaseFit, level: float, j: int, listed: list[tuple[str, Arr
     scaled = [(name, group / np.sqrt((group**2).mean(axis=0) + TINY)) for name, group in listed]
     together = np.concatenate([group for _, group in scaled], axis=1)
     rows = found.counted[:, j]
-    rest = residual - together @ lstsq(together[rows], residual[rows], cond=SMALL)[0]
+    rest = residual - together @ lstsq(together[rows], residual[rows], cond=DEPENDENT_SHARE)[0]
     whitener = whitening_filter(np.where(rows, rest, 0.0))
     base = found.columns[:, j]
     base = base[:, np.any(base != 0, axis=0)]
@@ -194,7 +189,7 @@ def _span(columns: Array) -> Array:
     """Computes an orthonormal basis of columns, without directions that are hardly there."""
     basis, triangle, _ = qr(columns, mode="economic", pivoting=True)
     sizes = np.abs(np.diag(triangle))
-    return np.asarray(basis[:, sizes > SMALL * max(float(sizes.max(initial=0.0)), TINY)])
+    return np.asarray(basis[:, sizes > DEPENDENT_SHARE * max(float(sizes.max(initial=0.0)), TINY)])
 
 
 def _projected(basis: Array, values: Array) -> Array:
@@ -257,9 +252,6 @@ def groups(motion: Motion, torque: Array, j: int, gear: float | None) -> Iterato
     yield "coupling", np.column_stack([column for columns in coupled for column in columns])
 
 
-ORDER = 12  # of the autoregressive model
-
-
 def autocorrelation(x: Array, lags: int) -> Array:
     """Estimates the autocorrelation at the lags 0 to ``lags``, which is 1 at lag 0."""
     centred = x - x.mean()
@@ -270,6 +262,6 @@ def autocorrelation(x: Array, lags: int) -> Array:
 
 
 def whitening_filter(x: Array) -> Array:
-    """Fits an autoregressive model by the Yule-Walker equations; returns the filter's coefficients (ORDER + 1,)."""
-    rho = autocorrelation(x, ORDER)
+    """Fits an autoregressive model by the Yule-Walker equations; returns the filter's coefficients (13,)."""
+    rho = autocorrelation(x, 12)
     return np.concatenate([[1.0], -solve_toeplitz(rho[:-1], rho[1:])])

@@ -12,14 +12,12 @@ from oed.benchmarks.rivals.base_model import away_from_reversals, base_columns, 
 from oed.benchmarks.rivals.logs import read_motion
 from oed.benchmarks.taxonomy import UNKNOWN
 
-FACTOR = 1.6
+NOISE_FACTOR = 1.6
 """Residual RMS over noise RMS above which something is wrong; chosen on a dozen cases without an effect."""
-
-NORMAL_MEDIAN = 0.6745  # median absolute value of a standard normal variable
 
 
 def by_threshold(case: BlindCase) -> CaseAnswer:
-    """Answers a case by a threshold on each joint's residual: `FACTOR` times the RMS of the noise in case.json.
+    """Answers a case by a threshold on each joint's residual: `NOISE_FACTOR` times the RMS of the noise in case.json.
 
     Args:
         case: the public part of the case.
@@ -32,7 +30,7 @@ def by_threshold(case: BlindCase) -> CaseAnswer:
     signal = np.sqrt((tau**2).mean(axis=0) / (1 + case.noise**2))
     # The median of squares is hardly affected by rows at reversals, where filtered positions err.
     ratios = typical_size(tau - columns @ found.parameters) / signal / case.noise
-    over = np.flatnonzero(ratios > FACTOR)
+    over = np.flatnonzero(ratios > NOISE_FACTOR)
     over = over[np.argsort(-ratios[over])]
     t, q, _ = read_motion(case.unseen, case.joints, torque=False)
     return CaseAnswer(
@@ -44,4 +42,5 @@ def by_threshold(case: BlindCase) -> CaseAnswer:
 
 def typical_size(residual: NDArray[np.float64]) -> NDArray[np.float64]:
     """Estimates the standard deviation (n,) of a residual (N, n) by its median absolute value."""
-    return np.asarray(np.median(np.abs(residual), axis=0) / NORMAL_MEDIAN)
+    # Median absolute value of a standard normal variable.
+    return np.asarray(np.median(np.abs(residual), axis=0) / 0.6745)

@@ -10,9 +10,6 @@ from oed.benchmarks.answers.answer import CaseAnswer, NamedEffect
 from oed.benchmarks.sealing import HiddenEffect, Truth
 from oed.benchmarks.taxonomy import UNKNOWN, class_of, known_parameters
 
-ENDS = 0.5
-"""Time [s] at both ends of an unseen motion whose prediction does not count: filters err there."""
-
 
 @dataclass(frozen=True, kw_only=True)
 class Judgement:
@@ -103,7 +100,9 @@ class Judgement:
         if self.answer is None or self.answer.torque is None:
             return None
         t, measured = self.truth.torque[:, 0], self.truth.torque[:, 1:]
-        rows = (t >= t[0] + ENDS) & (t <= t[-1] - ENDS)
+        # Time [s] at both ends of an unseen motion whose prediction does not count: filters err there.
+        ends = 0.5
+        rows = (t >= t[0] + ends) & (t <= t[-1] - ends)
         squares = ((measured - self.answer.torque)[rows] ** 2).mean(axis=0)
         return float(np.sqrt((squares / self.truth.noise**2).mean()))
 

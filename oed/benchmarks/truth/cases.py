@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 
 from oed.benchmarks.truth.dynamics import Projection, base_regressor
-from oed.benchmarks.truth.effects import KNOWN, STRANGERS, Effect
+from oed.benchmarks.truth.effects import KNOWN, UNLISTED, Effect
 from oed.benchmarks.truth.kinds import KINDS
 from oed.benchmarks.truth.machines import Machine, draw_machine
 from oed.benchmarks.truth.noise import Noise, draw_noise
@@ -21,13 +21,7 @@ from oed.benchmarks.truth.plant import Record, open_loop, parts_links, play, pro
 from oed.benchmarks.truth.references import Reference, draw_aperiodic, draw_moves, draw_periodic
 
 SEARCH_STEP = 0.008  # sample period [s] of the open-loop rides in the search for an effect's amount
-SEARCHES = 12  # largest number of steps of that search
-CLOSE = 0.02  # relative error of the visible size at which it ends
-AGREED = 0.1  # relative error of the visible size that is accepted in the closed loop
-ROUNDS = 5  # largest number of closed-loop corrections
-TOO_FAINT = 1.4  # ratio of wanted to visible size above which a case is refused
-AWAY = 0.25  # distance from the joint range, as a fraction of it, at which the loop counts as unstable
-EVERY = 2  # step between the rows that projections use
+PROJECTION_STRIDE = 2  # step between the rows that projections use
 MOTION = ("q_true", "v_true", "a_true", "sign")
 
 
@@ -64,9 +58,9 @@ class Case:
     def visible(self) -> list[float]:
         """Computes the visible size of each effect in the logs to diagnose, on the joint where it is largest."""
         level = self.level()
-        stack = [np.concatenate([getattr(r, key)[::EVERY] for r in self.logs]) for key in MOTION]
+        stack = [np.concatenate([getattr(r, key)[::PROJECTION_STRIDE] for r in self.logs]) for key in MOTION]
         projection = Projection(base_regressor(self.machine.known, *stack), level)
-        parts = [np.concatenate([r.parts[k][::EVERY] for r in self.logs]) for k in range(len(self.effects))]
+        parts = [np.concatenate([r.parts[k][::PROJECTION_STRIDE] for r in self.logs]) for k in range(len(self.effects))]
         return [float(projection.visible(part).max()) for part in parts]
 
     def level(self) -> np.ndarray:
@@ -132,7 +126,7 @@ def draw_case(
 
     effects: list[Effect] = []
     if isinstance(hide, (int, str)):
-        pool = STRANGERS if hide == "stranger" else KNOWN
+        pool = UNLISTED if hide == "stranger" else KNOWN
         for _ in range(60):
             if len(effects) == (1 if hide == "stranger" else hide):
                 break
@@ -146,7 +140,8 @@ def draw_case(
                 raise Hidden(f"{choice.__name__} cannot reach {size}")
             effects.append(found)
     noise = draw_noise(machine.n, machine.gear, rng, level=noise_level, memory=noise_memory)
-    for _ in range(ROUNDS):
+    # Largest number of closed-loop corrections.
+    for _ in range(5):
         case = Case(
             seed=seed,
             machine=machine,
@@ -164,20 +159,22 @@ def draw_case(
         if any(share <= 0 for share in shares):
             raise Hidden("nothing of it shows once the loop is closed")
         ratios = [size / share for share in shares]
-        if all(abs(ratio - 1) < AGREED for ratio in ratios):
+        # Relative error of the visible size that is accepted in the closed loop.
+        if all(abs(ratio - 1) < 0.1 for ratio in ratios):
             return case
         effects = [
             effect.of(float(np.clip(effect.amount * ratio ** (1 / effect.power), effect.smallest, effect.largest)))
             for effect, ratio in zip(effects, ratios, strict=True)
         ]
-    if max(ratios) > TOO_FAINT:
+    # A case whose wanted size is 1.4 times the visible one is refused.
+    if max(ratios) > 1.4:
         raise Hidden(f"{effects[int(np.argmax(ratios))].name} shows {size / max(ratios):.2g} at most")
     return case
 
 
 def _runs_away(machine: Machine, record: Record) -> bool:
-    """Returns whether a joint leaves its range by more than `AWAY` of it, because the position loop is unstable."""
-    reach = AWAY * (machine.upper - machine.lower)
+    """Returns whether a joint leaves its range by more than a quarter of it, because the position loop is unstable."""
+    reach = 0.25 * (machine.upper - machine.lower)
     return bool(np.any((record.q < machine.lower - reach) | (record.q > machine.upper + reach)))
 
 
@@ -210,11 +207,13 @@ def _amount(
     row = level[effect.joint - 1] if effect.joint else level.max()
     amount = 0.02 * row if np.isinf(effect.largest) else 0.01 * effect.largest
     tried: list[tuple[float, float]] = []
-    for _ in range(SEARCHES):
+    # Largest number of steps of the search for an effect's amount, ...
+    for _ in range(12):
         ride = open_loop(machine, references, [effect.of(amount)], step=SEARCH_STEP)
         shown = projection.visible(ride.parts[0])
         share = float(shown.max())
-        if abs(share / size - 1) < CLOSE:
+        # ... which ends at this relative error of the visible size.
+        if abs(share / size - 1) < 0.02:
             return amount
         if share <= 0 or (share < size and amount >= effect.largest):
             # The closed loop accelerates more, so an elastic or loose gear shows more there.

@@ -6,9 +6,6 @@ import numpy as np
 import pinocchio as pin
 from scipy.linalg import eigh
 
-# Fraction of the largest eigenvalue of the regressor's Gram matrix below which a direction counts as not excited.
-FAINT = 1e-12
-
 
 def rigid_torque(model: pin.Model, q: np.ndarray, v: np.ndarray, a: np.ndarray) -> np.ndarray:
     """Computes the inverse dynamics (N, n) [N m] by the recursive Newton-Euler algorithm."""
@@ -77,7 +74,8 @@ class Projection:
         size = np.sqrt((flat**2).sum(axis=0))
         self.scale = np.where(size > 0, size, 1.0)
         values, vectors = eigh((flat / self.scale).T @ (flat / self.scale))
-        keep = values > FAINT * values[-1]
+        # Directions with less of the largest eigenvalue of the regressor's Gram matrix count as not excited.
+        keep = values > 1e-12 * values[-1]
         self.inverse = (vectors[:, keep] / values[keep]) @ vectors[:, keep].T
 
     def fit(self, torque: np.ndarray) -> np.ndarray:

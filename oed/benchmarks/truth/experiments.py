@@ -13,7 +13,7 @@ from oed.benchmarks.truth.cases import Case
 from oed.benchmarks.truth.dynamics import massless, rigid_torque, with_gravity, with_tool
 from oed.benchmarks.truth.effects.base import Effect
 from oed.benchmarks.truth.effects.surroundings import Tilt
-from oed.benchmarks.truth.plant import PAUSE, Record, play
+from oed.benchmarks.truth.plant import LOG_PAUSE, Record, play
 from oed.benchmarks.truth.references import Reference, Spline
 from oed.benchmarks.truth.ride import Ride
 
@@ -32,7 +32,7 @@ class Stage:
 
     t: np.ndarray
     q: np.ndarray
-    pause: float = PAUSE
+    pause: float = LOG_PAUSE
     payload: float = 0.0
     gravity: np.ndarray | None = None
 
@@ -73,8 +73,8 @@ class KnownChange(Effect):
 def follow_up(case: Case, stages: Sequence[Stage]) -> tuple[Record, ...]:
     """Simulates an experiment after a case's logs, which do not change, and returns only the new logs."""
     references = list(case.references[: case.training])
-    clock = sum(reference.duration for reference in references) + PAUSE * (len(references) - 1)
-    pauses = [PAUSE] * (len(references) - 1)
+    clock = sum(reference.duration for reference in references) + LOG_PAUSE * (len(references) - 1)
+    pauses = [LOG_PAUSE] * (len(references) - 1)
     changes = []
     turn = np.eye(3)
     for effect in case.effects:

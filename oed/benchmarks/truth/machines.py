@@ -9,10 +9,7 @@ import numpy as np
 import pinocchio as pin
 
 CATALOG = Path(__file__).parents[3] / "robots" / "catalog"
-CAD_ERROR = 0.08  # largest relative error of described masses, centres of mass and second moments
-DRIVE_ERROR = 0.15  # largest relative error of described rotor inertias
 PANDA_HAND = ("panda_finger_joint1", "panda_finger_joint2")
-LARGEST_ANGLE = 3.0  # position limit [rad] of joints with a larger range
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -72,19 +69,23 @@ def draw_machine(kind: str, rng: np.random.Generator) -> Machine:
     f4 = f2 / speed**2 * rng.uniform(-0.05, 0.1, n)
     friction = np.column_stack([f1, f2, f3, f4])
     known = np.column_stack([f1 * rng.uniform(0.7, 1.3, n), f2 * rng.uniform(0.7, 1.3, n), 0 * f1, 0 * f1])
+    # Largest relative error of described rotor inertias.
+    drive_error = 0.15
+    # Position limit [rad] of joints with a larger range.
+    largest = 3.0
     return Machine(
         name=kind,
         model=true,
         known=frame.model,
-        rotor=frame.rotor * rng.uniform(1 - DRIVE_ERROR, 1 + DRIVE_ERROR, n),
+        rotor=frame.rotor * rng.uniform(1 - drive_error, 1 + drive_error, n),
         known_rotor=frame.rotor,
         gear=frame.gear,
         friction=friction,
         known_friction=known,
         sign_width=np.full(n, rng.uniform(1e-3, 4e-3)),
         offset=f1 * rng.uniform(-0.3, 0.3, n),
-        lower=np.maximum(np.asarray(frame.model.lowerPositionLimit), -LARGEST_ANGLE),
-        upper=np.minimum(np.asarray(frame.model.upperPositionLimit), LARGEST_ANGLE),
+        lower=np.maximum(np.asarray(frame.model.lowerPositionLimit), -largest),
+        upper=np.minimum(np.asarray(frame.model.upperPositionLimit), largest),
         speed=speed,
         acceleration=frame.acceleration,
         # A natural frequency of 8 to 20 Hz, as of position loops of 10 to 30 1/s around velocity loops of 20 to 60 Hz.
@@ -95,7 +96,7 @@ def draw_machine(kind: str, rng: np.random.Generator) -> Machine:
     )
 
 
-def perturbed(model: pin.Model, rng: np.random.Generator, error: float = CAD_ERROR) -> pin.Model:
+def perturbed(model: pin.Model, rng: np.random.Generator, error: float = 0.08) -> pin.Model:
     """Draws a copy of a model with other masses, centres of mass and inertias, which are physically consistent.
 
     Args:
@@ -145,7 +146,7 @@ def _panda() -> _Frame:
 
 
 # Per joint (about z): placement xyz and rpy, mass, centre of mass, and inertia about it (Ixx Ixy Ixz Iyy Iyz Izz).
-_HALF = np.pi / 2
+_RIGHT_ANGLE = np.pi / 2
 _ER3A = (
     (
         (0, 0, 0.3215),
@@ -156,7 +157,7 @@ _ER3A = (
     ),
     (
         (0.05, 0, 0),
-        (_HALF, -_HALF, 0),
+        (_RIGHT_ANGLE, -_RIGHT_ANGLE, 0),
         5.816,
         (0.1012, -0.0008, 0.0021),
         (0.03862, -8.5e-5, 7.514e-4, 0.08974, 1.5e-5, 0.06185),
@@ -170,21 +171,21 @@ _ER3A = (
     ),
     (
         (0.07, -0.299, 0),
-        (_HALF, 0, 0),
+        (_RIGHT_ANGLE, 0, 0),
         1.976,
         (0.0004, -0.0001, -0.0773),
         (0.007817, -2e-5, -2.4e-5, 0.005972, 3.2e-5, 0.004236),
     ),
-    ((0, 0, 0), (-_HALF, 0, 0), 0.812, (0.0001, 0.0011, 0), (0.001213, -1.3e-6, 0, 0.0006024, 2.4e-6, 0.001328)),
-    ((0, -0.078, 0), (_HALF, 0, 0), 0.204, (0, 0.0002, -0.0071), (1.488e-4, 0, 0, 1.488e-4, 0, 1.488e-4)),
+    ((0, 0, 0), (-_RIGHT_ANGLE, 0, 0), 0.812, (0.0001, 0.0011, 0), (0.001213, -1.3e-6, 0, 0.0006024, 2.4e-6, 0.001328)),
+    ((0, -0.078, 0), (_RIGHT_ANGLE, 0, 0), 0.204, (0, 0.0002, -0.0071), (1.488e-4, 0, 0, 1.488e-4, 0, 1.488e-4)),
 )
 _HEAVY = (
     ((0, 0, 0.675), (0, 0, 0), 340.0, (0.12, 0.02, -0.18), (22.0, 0.8, -1.5, 26.0, 0.6, 24.0)),
-    ((0.35, 0, 0), (_HALF, -_HALF, 0), 260.0, (0.52, -0.02, 0.11), (7.0, -0.5, 0.9, 38.0, 0.2, 36.0)),
+    ((0.35, 0, 0), (_RIGHT_ANGLE, -_RIGHT_ANGLE, 0), 260.0, (0.52, -0.02, 0.11), (7.0, -0.5, 0.9, 38.0, 0.2, 36.0)),
     ((1.15, 0, 0), (0, 0, 0), 210.0, (0.10, -0.18, 0.03), (14.0, -1.1, 0.3, 9.0, -0.4, 17.0)),
-    ((0.041, -1.0, 0), (_HALF, 0, 0), 62.0, (0.004, -0.003, -0.34), (3.1, 0.02, 0.05, 2.9, -0.04, 0.9)),
-    ((0, 0, 0), (-_HALF, 0, 0), 34.0, (0.002, 0.055, 0.003), (0.46, 0.004, 0.001, 0.27, 0.006, 0.44)),
-    ((0, -0.215, 0), (_HALF, 0, 0), 96.0, (0.035, 0.02, 0.16), (2.6, 0.05, -0.14, 3.0, 0.08, 2.2)),
+    ((0.041, -1.0, 0), (_RIGHT_ANGLE, 0, 0), 62.0, (0.004, -0.003, -0.34), (3.1, 0.02, 0.05, 2.9, -0.04, 0.9)),
+    ((0, 0, 0), (-_RIGHT_ANGLE, 0, 0), 34.0, (0.002, 0.055, 0.003), (0.46, 0.004, 0.001, 0.27, 0.006, 0.44)),
+    ((0, -0.215, 0), (_RIGHT_ANGLE, 0, 0), 96.0, (0.035, 0.02, 0.16), (2.6, 0.05, -0.14, 3.0, 0.08, 2.2)),
 )
 
 

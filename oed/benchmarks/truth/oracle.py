@@ -10,16 +10,13 @@ import numpy as np
 from scipy.interpolate import make_interp_spline
 from scipy.signal import butter, sosfiltfilt
 
-from oed.benchmarks.truth.cases import EVERY, MOTION, Case
+from oed.benchmarks.truth.cases import MOTION, PROJECTION_STRIDE, Case
 from oed.benchmarks.truth.dynamics import Projection, base_regressor
 from oed.benchmarks.truth.plant import Record, measure
 from oed.benchmarks.truth.ride import Ride
 
-STEP = 0.002  # sample period [s] of the motion from logged positions
 CUT_OFFS = (10.0, 20.0, 40.0, 80.0)  # [Hz]
-ORDER = 4  # order of the low-pass
-APPROACHES = 3  # fixed-point iterations for effects on the motion itself
-BESIDE = 5  # rows on each side of a reversal that do not count
+REVERSAL_ROWS = 5  # rows on each side of a reversal that do not count
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -50,11 +47,11 @@ def ask_oracle(case: Case, counted: Sequence[np.ndarray] | None = None, *, logge
         The mean squared errors.
     """
     chosen = counted or [_away_from_reversals(record.v_true) for record in case.unseen]
-    counts = np.concatenate([rows[::EVERY] for rows in chosen])
+    counts = np.concatenate([rows[::PROJECTION_STRIDE] for rows in chosen])
     level = case.level()
 
     def rows(of: Callable[[Record], np.ndarray]) -> np.ndarray:
-        return np.concatenate([of(record)[::EVERY] for record in case.records])
+        return np.concatenate([of(record)[::PROJECTION_STRIDE] for record in case.records])
 
     Y = base_regressor(case.machine.known, *(rows(attrgetter(key)) for key in MOTION))
     y = rows(attrgetter("tau"))
@@ -69,7 +66,10 @@ def ask_oracle(case: Case, counted: Sequence[np.ndarray] | None = None, *, logge
     def beside(parts: np.ndarray) -> tuple[float, np.ndarray]:
         return errors(np.concatenate([Y, parts], axis=2))
 
-    true = [np.concatenate([record.parts[k][::EVERY] for record in case.records]) for k in range(len(case.effects))]
+    true = [
+        np.concatenate([record.parts[k][::PROJECTION_STRIDE] for record in case.records])
+        for k in range(len(case.effects))
+    ]
     tried = [beside(_parts_as_measured(case, cut_off)) for cut_off in CUT_OFFS] if logged else []
     return Oracle(
         before=errors(Y)[1],
@@ -79,22 +79,24 @@ def ask_oracle(case: Case, counted: Sequence[np.ndarray] | None = None, *, logge
 
 
 def _away_from_reversals(v: np.ndarray) -> np.ndarray:
-    """Flags rows (N, n) more than `BESIDE` samples from a reversal."""
+    """Flags rows (N, n) more than `REVERSAL_ROWS` samples from a reversal."""
     turned = np.zeros(v.shape, dtype=bool)
     turned[1:] = np.sign(v[1:]) != np.sign(v[:-1])
     counted = np.cumsum(np.vstack([np.zeros((1, v.shape[1])), turned]), axis=0)
     rows = np.arange(len(v))
-    return counted[np.minimum(rows + BESIDE + 1, len(v))] == counted[np.maximum(rows - BESIDE, 0)]
+    return counted[np.minimum(rows + REVERSAL_ROWS + 1, len(v))] == counted[np.maximum(rows - REVERSAL_ROWS, 0)]
 
 
 def _parts_as_measured(case: Case, cut_off: float) -> np.ndarray:
     """Computes the torque of each effect (N, n, effects) on the motion from the logged positions."""
     times, motions, starts, count = [], [], [], 0
+    # Sample period [s] of the motion from logged positions.
+    step = 0.002
     for record in case.records:
         period = float(record.t[1] - record.t[0])
-        smooth = sosfiltfilt(butter(ORDER, 2 * period * cut_off, output="sos"), record.q, axis=0)
+        smooth = sosfiltfilt(butter(4, 2 * period * cut_off, output="sos"), record.q, axis=0)
         spline = make_interp_spline(record.t, smooth, k=5)
-        t = record.t[0] + np.arange(round(len(record.t) * period / STEP)) * STEP
+        t = record.t[0] + np.arange(round(len(record.t) * period / step)) * step
         motions.append([spline(np.minimum(t, record.t[-1]), nu) for nu in range(3)])
         times.append(t)
         starts.append(count)
@@ -102,7 +104,8 @@ def _parts_as_measured(case: Case, cut_off: float) -> np.ndarray:
     t = np.concatenate(times)
     seen = [np.concatenate(values) for values in zip(*motions, strict=True)]
     motion = list(seen)
-    for _ in range(APPROACHES):
+    # Fixed-point iterations for effects on the motion itself.
+    for _ in range(3):
         # An effect on the logged positions depends on the true motion, which a fixed-point iteration finds.
         ride = Ride(machine=case.machine, t=t, starts=tuple(starts), q=motion[0], v=motion[1], a=motion[2])
         _, wrong = measure(ride, case.effects)
@@ -111,5 +114,5 @@ def _parts_as_measured(case: Case, cut_off: float) -> np.ndarray:
         if np.abs(off[0]).max() == 0.0:
             break
         motion = [values + more for values, more in zip(motion, off, strict=True)]
-    index = np.concatenate([np.searchsorted(t, r.t[::EVERY] - STEP / 2) for r in case.records])
+    index = np.concatenate([np.searchsorted(t, r.t[::PROJECTION_STRIDE] - step / 2) for r in case.records])
     return np.stack([part[np.minimum(index, len(t) - 1)] for part in ride.parts], axis=2)

@@ -18,11 +18,7 @@ from oed.benchmarks.truth.ride import Ride, friction_of
 
 CONTROL_STEP = 0.001  # [s]
 LOG_EVERY = 4  # control steps per logged sample
-LEAD = 1.0  # time [s] before each log in which the loop settles
-PAUSE = 20.0  # default pause between logs [s]
-SMOOTHING = 0.012  # low-pass of the loop's error [s] if an effect moves links relative to their motors
-NEAR_STILL = 6.0  # velocity, in widths of the smooth sign, below which Newton steps are needed
-NEWTON_STEPS = 6
+LOG_PAUSE = 20.0  # default pause between logs [s]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -51,7 +47,7 @@ def play(
     noise: Noise,
     rng: np.random.Generator,
     *,
-    pause: float | Sequence[float] = PAUSE,
+    pause: float | Sequence[float] = LOG_PAUSE,
 ) -> list[Record]:
     """Simulates references one after the other on one clock, with pauses [s] at rest between them."""
     pauses = np.broadcast_to(np.asarray(pause, dtype=float), (len(references) - 1,))
@@ -129,7 +125,12 @@ def parts_links(effect: Effect) -> bool:
 
 
 def open_loop(
-    machine: Machine, references: Sequence[Reference], effects: Sequence[Effect], *, pause: float = PAUSE, step: float
+    machine: Machine,
+    references: Sequence[Reference],
+    effects: Sequence[Effect],
+    *,
+    pause: float = LOG_PAUSE,
+    step: float,
 ) -> Ride:
     """Simulates a ride that follows its references exactly, and measures it; a cheap way to find an effect's size."""
     times, starts, start, count = [], [], 0.0, 0
@@ -160,8 +161,10 @@ def _closed_loop(
     For each joint m (e'' + 2 d w e' + w^2 e) = required torque - feed-forward torque.
     """
     times, wanted, starts, count = [], [], [], 0
+    # Time [s] before each log in which the loop settles.
+    lead_time = 1.0
     for reference, clock in zip(references, clocks, strict=True):
-        t = np.arange(round((reference.duration + LEAD) / CONTROL_STEP)) * CONTROL_STEP - LEAD
+        t = np.arange(round((reference.duration + lead_time) / CONTROL_STEP)) * CONTROL_STEP - lead_time
         wanted.append(reference.at(t))
         times.append(t + clock)
         starts.append(count)
@@ -182,9 +185,10 @@ def _closed_loop(
     inertia = _inertia(machine, q)
     error = _loop_error(ride, smooth_part, inertia)
     if any(parts_links(effect) for effect in effects):
-        error = [ride.smooth(values, SMOOTHING) for values in error]
-    keep = np.concatenate([np.arange(run.start + round(LEAD / CONTROL_STEP), run.stop) for run in ride.runs])
-    lead = round(LEAD / CONTROL_STEP)
+        # Low-pass of the loop's error [s], as an effect moves links relative to their motors.
+        error = [ride.smooth(values, 0.012) for values in error]
+    keep = np.concatenate([np.arange(run.start + round(lead_time / CONTROL_STEP), run.stop) for run in ride.runs])
+    lead = round(lead_time / CONTROL_STEP)
     return Ride(
         machine=machine,
         t=ride.t[keep],
@@ -220,8 +224,9 @@ def _loop_error(ride: Ride, unforeseen: np.ndarray, inertia: np.ndarray) -> list
                 # Solve c v' + g tanh(v' / width) = x for the joint's new velocity v'. From the solution with a linear
                 # ramp for tanh, Newton's steps converge from one side, because tanh has one sign of curvature there.
                 real = x / (c + g / width) if abs(x) <= c * width + g else (x - g if x > 0 else x + g) / c
-                if abs(real) < NEAR_STILL * width:
-                    for _ in range(NEWTON_STEPS):
+                # Within six widths of the smooth sign Newton steps are needed.
+                if abs(real) < 6.0 * width:
+                    for _ in range(6):
                         sign = math.tanh(real / width)
                         real -= (c * real + g * sign - x) / (c + g / width * (1 - sign * sign))
                 new = v - real

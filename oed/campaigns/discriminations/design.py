@@ -19,7 +19,7 @@ from estimation.diagnosis.hypothesis_tests.hypotheses import Hypothesis
 from estimation.diagnosis.hypothesis_tests.problem import Problem
 from oed.campaigns.discriminations.discrimination import Discrimination, DiscriminationScore
 from oed.campaigns.discriminations.motions import ExperimentBuilder, Run
-from oed.campaigns.discriminations.probabilities import STEP, Discriminator, require_separable
+from oed.campaigns.discriminations.probabilities import EVALUATION_STEP, Discriminator, require_separable
 from oed.experiments.checks import velocity_share
 from robots.base_parameters import find_base_parameters
 from robots.collision import Surroundings
@@ -33,12 +33,8 @@ from robots.terms.effects import EFFECTS, EXPERIMENTS
 
 Array = NDArray[np.float64]
 
-REFERENCES = 6
-"""Largest number of random reference motions; the most informative one is used."""
-SHARE = 0.02
+NOISE_SHARE = 0.02
 """Noise as a share of each joint's torque RMS, where it is not stated."""
-SHARP = 1e-3
-"""Velocity [rad/s or m/s] at which the planned model's friction turns round."""
 
 
 def discriminate(
@@ -85,18 +81,20 @@ def discriminate(
     if not (np.isfinite(size) and 0.0 < size <= 1.0):
         raise InputError(f"found the size {size}", allowed="above 0, up to 1")
     velocity_fraction = velocity_share(robot, velocity_fraction)
-    model = default_model(robot, friction=friction, velocity_scale=SHARP)
+    # Velocity [rad/s or m/s] at which the planned model's friction turns round.
+    model = default_model(robot, friction=friction, velocity_scale=1e-3)
     builder = ExperimentBuilder(find_base_parameters(model), home=home, velocity_fraction=velocity_fraction, seed=seed)
     reference = builder.runs()[0]
     base = builder.base.model
     if level is None:
         m, nominal = reference.motion, np.nan_to_num(base.nominal)
-        level = SHARE * np.sqrt(np.mean(base.torque(m.q, m.dq, m.ddq, nominal) ** 2, axis=0))
+        level = NOISE_SHARE * np.sqrt(np.mean(base.torque(m.q, m.dq, m.ddq, nominal) ** 2, axis=0))
     problem = _planned(reference, level, builder)
     pair = _choose(problem, places, reference)
     judge = Discriminator(problem, pair, size)
     best = judge("reference", (reference,))
-    for draw in range(1, REFERENCES):
+    # Largest number of random reference motions; the most informative one is used.
+    for draw in range(1, 6):
         other = ExperimentBuilder(builder.base, home=home, velocity_fraction=velocity_fraction, seed=seed + draw)
         drawn = judge("reference", other.runs())
         if drawn.merit > best.merit:
@@ -163,10 +161,10 @@ def _level(noise: ArrayLike | None, robot: Robot) -> Array | None:
 
 
 def _planned(reference: Run, level: Array, builder: ExperimentBuilder) -> Problem:
-    """Poses the diagnosis of the reference motion at `STEP`, the white part of the noise averaged over each step."""
-    part = reference.parts(STEP)[0]
+    """Poses the diagnosis of the reference motion at `EVALUATION_STEP`, white noise averaged over each step."""
+    part = reference.parts(EVALUATION_STEP)[0]
     sensors = Sensors()
-    every = max(round(STEP / builder.period), 1)
+    every = max(round(EVALUATION_STEP / builder.period), 1)
     share = sensors.coloured_share
     kept = (1.0 - share) / every + share
     thinned = Sensors(coloured_share=share / kept, correlation_time=sensors.correlation_time)
@@ -199,7 +197,7 @@ def _choose(problem: Problem, places: list[tuple[str, int | None]], reference: R
         if len(options) == 1:
             return pair
         try:
-            merit = Discriminator(problem, pair, SHARE)("reference", (reference,)).energy
+            merit = Discriminator(problem, pair, NOISE_SHARE)("reference", (reference,)).energy
         except NotIdentifiableError as error:
             failed = error
             continue

@@ -21,11 +21,6 @@ from robots.regressor import default_model
 from robots.robot import Robot
 from robots.signals import Motion
 
-PAUSE = 1.0
-"""Between two motions on one clock [s]."""
-NAMED = 0.02
-"""Size at which effects are counted as named, over the joint's torque RMS."""
-
 
 @dataclass(frozen=True, kw_only=True)
 class DetectionLimits(Record):
@@ -48,7 +43,8 @@ class DetectionLimits(Record):
     def summary(self) -> str:
         """Writes the limits as a table."""
         hidden = sum(not np.isfinite(limit.detectable) for limit in self.limits)
-        named = sum(limit.attributable <= NAMED for limit in self.limits)
+        # Size at which effects are counted as named, over the joint's torque RMS.
+        named = sum(limit.attributable <= 0.02 for limit in self.limits)
         lines = [
             f"{len(self.limits)} pairs of effect and joint: {named} would be found and named at 2 % of the joint's "
             f"torque RMS, {hidden} cannot be found with this motion at any size",
@@ -112,7 +108,8 @@ def detection_limits(
         beyond = [e.effect if e.joint is None else f"{e.effect} of joint {e.joint}" for e in model.extensions]
     placed: list[Motion] = []
     for motion in motions:
-        start = float(placed[-1].t[-1]) + PAUSE if placed else 0.0
+        # A second passes between two motions on one clock.
+        start = float(placed[-1].t[-1]) + 1.0 if placed else 0.0
         placed.append(Motion(motion.t - motion.t[0] + start, motion.q, motion.dq, motion.ddq))
     (progress or SILENT).start("all effects, all joints", None)
     found = planned_limits(torque_model, parameters, placed, noise=Sensors(torque_noise=max(noise, 1e-4)))

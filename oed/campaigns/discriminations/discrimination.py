@@ -27,9 +27,6 @@ from robots.version import VERSION
 
 Array = NDArray[np.float64]
 
-_SURE = 0.95
-"""Chance from which an experiment counts as sure."""
-
 
 @dataclass(frozen=True, kw_only=True)
 class DiscriminationScore(Record):
@@ -247,10 +244,11 @@ class Discrimination(
     def remarks(self) -> tuple[Finding, ...]:
         """What is not known of collisions, conditions, and how sure the decision is."""
         text = f"The experiment gives the right decision with {100 * self.resolves:.0f} % probability only."
+        # Chance from which an experiment counts as sure.
         return (
             *freedom_findings(self.freedom),
             *findings_of("experiment.note", self.warnings),
-            *findings_of("experiment.unsure", [text] if self.resolves < _SURE else []),
+            *findings_of("experiment.unsure", [text] if self.resolves < 0.95 else []),
         )
 
     def _save_beside(self, folder: Path, *, force: bool) -> None:

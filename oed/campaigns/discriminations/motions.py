@@ -30,22 +30,10 @@ from robots.signals import Motion
 
 Array = NDArray[np.float64]
 
-RESERVE = 0.9
+USED_LIMIT_SHARE = 0.9
 """Share of each limit that stages use: the rest is for what a controller makes of the samples."""
-HARMONICS, CYCLE, PERIODS = 5, 10.0, 2
-"""Of the reference: two periods of 10 s."""
-WIDEST = np.pi
-"""Half the range [rad] that is used of a joint that turns without end."""
-KNOTS = 0.01
-"""About the distance of the knots of stages [s]."""
-STILL = 30
-"""Knots of rest at either end of a stage: its spline's ringing falls by 3.7 a knot, to nothing."""
-SLOWER, TRIES = 1.15, 12
+SLOWDOWN, SLOWDOWN_TRIES = 1.15, 12
 """A stage that passes a limit of torque is made slower by this factor, so often at most."""
-LONG = 10.0
-"""A rest of more seconds is not counted as data: nothing but heat changes in it."""
-PAYLOAD_SHARE = 0.05
-"""Payload as a share of the arm's mass, where its rating is not known."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -80,7 +68,8 @@ class Run:
         begin, pause = 0, 0.0
         for number, entry in enumerate([*table, None]):
             length = 0.0 if entry is None else float(edges[number + 1] - edges[number]) * self.sequence.period
-            if entry is not None and (entry["part"] != "rest" or length <= LONG):
+            # A rest of more seconds is not counted as data: nothing but heat changes in it.
+            if entry is not None and (entry["part"] != "rest" or length <= 10.0):
                 continue
             m = self.motion.slice(begin, int(edges[number]) + 1)
             if len(m) > 2 * every:
@@ -110,11 +99,12 @@ class ExperimentBuilder:
         self.limits = replace(self.robot.limits, velocity=velocity_fraction * self.robot.limits.velocity)
         self.home = rest_pose(self.limits, home)
         self.usable = finite_limits(self.limits).scaled(
-            velocity=RESERVE, acceleration=RESERVE, jerk=RESERVE / 2, torque=RESERVE
+            velocity=USED_LIMIT_SHARE, acceleration=USED_LIMIT_SHARE, jerk=USED_LIMIT_SHARE / 2, torque=USED_LIMIT_SHARE
         )
         lower, upper = self._range()
         self.series = self._reference(lower, upper, np.random.default_rng(seed))
-        step = self.period * max(round(KNOTS / self.period), 1)
+        # About the distance of the knots of stages [s].
+        step = self.period * max(round(0.01 / self.period), 1)
         self.room = MotionRange(
             robot=self.robot,
             lower=lower,
@@ -199,7 +189,9 @@ class ExperimentBuilder:
     def _fitted(self, motion: Motion) -> PiecewisePolynomial:
         """Makes a stage as slow as its limits ask for."""
         step = float(motion.t[1] - motion.t[0])
-        q = np.concatenate([np.repeat(motion.q[:1], STILL, axis=0), motion.q, np.repeat(motion.q[-1:], STILL, axis=0)])
+        # Knots of rest at either end of a stage: its spline's ringing falls by 3.7 a knot, to nothing.
+        still = 30
+        q = np.concatenate([np.repeat(motion.q[:1], still, axis=0), motion.q, np.repeat(motion.q[-1:], still, axis=0)])
         t = step * np.arange(len(q))
         spline = CubicSpline(t, q, bc_type="clamped")
         u = self.usable
@@ -210,7 +202,7 @@ class ExperimentBuilder:
             float(np.max(needed[1] / u.acceleration)) ** 0.5,
             float(np.max(needed[2] / u.jerk)) ** (1 / 3),
         )
-        for _ in range(TRIES):
+        for _ in range(SLOWDOWN_TRIES):
             duration = round_up(slower * float(t[-1]), self.period)
             scaled: Array = np.asarray(t * (duration / float(t[-1])), dtype=np.float64)
             pieces = CubicSpline(scaled, q, bc_type="clamped").c  # (4, K, n), highest power first
@@ -219,12 +211,12 @@ class ExperimentBuilder:
             )
             if self._torque_kept(trajectory.motion(self.period)):
                 break
-            slower *= SLOWER
+            slower *= SLOWDOWN
         return trajectory
 
     def _move(self, kind: str, start: Array, end: Array) -> list[Segment]:
         speed = 1.0
-        for _ in range(TRIES):
+        for _ in range(SLOWDOWN_TRIES):
             limits = self.usable.scaled(velocity=speed, acceleration=speed**2, jerk=speed**3)
             planned = plan_move(limits, start, end, period=self.period)
             if planned is None:
@@ -232,7 +224,7 @@ class ExperimentBuilder:
             pieces = PiecewisePolynomial(breakpoints=planned.breakpoints, coefficients=planned.coefficients)
             if self._torque_kept(pieces.motion(self.period)):
                 break
-            speed /= SLOWER
+            speed /= SLOWDOWN
         return [Segment(kind=kind, trajectory=pieces)]
 
     def _torque_kept(self, motion: Motion) -> bool:
@@ -244,12 +236,15 @@ class ExperimentBuilder:
 
     def _reference(self, lower: Array, upper: Array, random: np.random.Generator) -> FourierSeries:
         """Draws a Fourier series at rest at its ends, each joint as large as its limits allow."""
-        frequency = 1.0 / round_up(CYCLE, self.period)
-        rest = rest_basis(HARMONICS, frequency)
+        # A period of about 10 s.
+        frequency = 1.0 / round_up(10.0, self.period)
+        harmonics = 5
+        rest = rest_basis(harmonics, frequency)
         free = random.standard_normal((self.robot.n, rest.shape[1]))
         free[:, 0] = 0.0
-        wave = FourierSeries.from_coefficients(free @ rest.T, frequency, PERIODS)
-        count = 50 * HARMONICS
+        repeats = 2
+        wave = FourierSeries.from_coefficients(free @ rest.T, frequency, repeats)
+        count = 50 * harmonics
         k = wave.sample(np.arange(count) / (count * frequency))
         u = self.usable
         scale = np.min(
@@ -264,14 +259,14 @@ class ExperimentBuilder:
         # A hundredth less: extremes lie between the samples.
         scale *= 0.99
         middle = (upper + lower) / 2 - scale * (k.q.max(axis=0) + k.q.min(axis=0)) / 2
-        for _ in range(3 * TRIES):
+        for _ in range(3 * SLOWDOWN_TRIES):
             rows = scale[:, None] * (free @ rest.T)
             rows[:, 0] = middle
-            series = FourierSeries.from_coefficients(rows, frequency, PERIODS)
+            series = FourierSeries.from_coefficients(rows, frequency, repeats)
             if self._torque_kept(series.motion(self.period)):
                 return series
-            scale = scale / SLOWER
-            middle = self.home + (middle - self.home) / SLOWER
+            scale = scale / SLOWDOWN
+            middle = self.home + (middle - self.home) / SLOWDOWN
         raise InfeasibleError(
             "no reference motion around the home pose respects the torque limits of the nominal dynamics",
             remedy="choose another home pose (--home), or correct the robot's torque limits or dynamics",
@@ -283,13 +278,16 @@ class ExperimentBuilder:
 
     def _range(self) -> tuple[Array, Array]:
         limits: Limits = self.limits
-        lower = np.where(np.isfinite(limits.lower), limits.lower, self.home - WIDEST)
-        upper = np.where(np.isfinite(limits.upper), limits.upper, self.home + WIDEST)
-        inset = (1 - RESERVE) / 2 * (upper - lower)
+        # Half the range [rad] that is used of a joint that turns without end.
+        widest = np.pi
+        lower = np.where(np.isfinite(limits.lower), limits.lower, self.home - widest)
+        upper = np.where(np.isfinite(limits.upper), limits.upper, self.home + widest)
+        inset = (1 - USED_LIMIT_SHARE) / 2 * (upper - lower)
         return lower + inset, upper - inset
 
     def _payload(self) -> float:
         """The mass of a payload that the robot carries well [kg], as the diagnosis chooses it."""
         if self.robot.payload:
             return 0.8 * self.robot.payload
-        return max(PAYLOAD_SHARE * float(np.nansum(self.robot.inertia[:, 0])), 0.1)
+        # Payload as a share of the arm's mass, where its rating is not known.
+        return max(0.05 * float(np.nansum(self.robot.inertia[:, 0])), 0.1)

@@ -20,16 +20,8 @@ from robots.common.errors import NotIdentifiableError
 
 Array = NDArray[np.float64]
 
-STEP = 0.01
+EVALUATION_STEP = 0.01
 """About the step [s] at which effects are evaluated; the white part of the noise is averaged over it."""
-SHAPES = 4
-"""Shapes of each effect, spread over its grid: those it may have, and with which it may imitate the other."""
-MIXTURES = 8
-"""Mixtures of an effect's coefficients."""
-VISIBLE = 1e-3
-"""Share of an effect's energy that must be left beside the base model for its size to be measured there."""
-ALIAS = 1e-6
-"""Share of an effect's energy below which what is left of it is rounding."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,7 +44,7 @@ class Discriminator:
 
     def __call__(self, kind: str, runs: tuple[Run, ...]) -> DiscriminationScore:
         """Judges an experiment by the worse of the two truths, each the median over its shapes and mixtures."""
-        gram = self.grams.of([part for run in runs for part in run.parts(STEP)])
+        gram = self.grams.of([part for run in runs for part in run.parts(EVALUATION_STEP)])
         energies: list[float] = []
         shares: list[float] = []
         alone: list[float] = []
@@ -98,7 +90,8 @@ def instances(problem: Problem, hypothesis: Hypothesis, size: float) -> list[Ins
             f"a single motion cannot show {hypothesis.label}",
             remedy=f"suitable experiments: {kinds}; record several logs and run oed diagnose",
         )
-    count = min(len(grid), SHAPES)
+    # Shapes of each effect, spread over its grid: those it may have, and with which it may imitate the other.
+    count = min(len(grid), 4)
     chosen = [grid[round((k + 0.5) * len(grid) / count - 0.5)] for k in range(count)]
     rms = np.maximum(np.sqrt(np.mean(problem.recording.tau**2, axis=0)), 1e-9)
     N = len(problem.recording)
@@ -106,6 +99,8 @@ def instances(problem: Problem, hypothesis: Hypothesis, size: float) -> list[Ins
     base = orthonormal(base, FAINT)
     random = np.random.default_rng(0)
     found = []
+    # Share of an effect's energy that must be left beside the base model for its size to be measured there.
+    visible_share = 1e-3
     for shape in chosen:
         joints, columns = problem.columns_of(hypothesis, shape)
         X = np.zeros((N, problem.n, columns[0].shape[1]))
@@ -115,15 +110,16 @@ def instances(problem: Problem, hypothesis: Hypothesis, size: float) -> list[Ins
         shows = (flat - base @ (base.T @ flat)).reshape(X.shape)
         raw = float(np.square(X).sum(axis=(0, 2)).max())
         # If the base model absorbs the effect in the reference motion, the size refers to the effect's whole torque.
-        torque = shows if np.square(shows).sum(axis=(0, 2)).max() > VISIBLE * raw else X
+        torque = shows if np.square(shows).sum(axis=(0, 2)).max() > visible_share * raw else X
         grams = np.einsum("njk,njl->jkl", torque, torque) / N
         gram = max(grams, key=lambda g: float(np.trace(g)))
         values, vectors = np.linalg.eigh(gram)
-        kept = values > VISIBLE * max(float(values[-1]), 1e-12)
+        kept = values > visible_share * max(float(values[-1]), 1e-12)
         if not kept.any() or values[-1] <= 1e-12:
             continue
         root = vectors[:, kept] / np.sqrt(values[kept])
-        draws = random.standard_normal((MIXTURES if kept.sum() > 1 else 1, int(kept.sum())))
+        # Mixtures of an effect's coefficients.
+        draws = random.standard_normal((8 if kept.sum() > 1 else 1, int(kept.sum())))
         mixtures = size * (draws / np.linalg.norm(draws, axis=1)[:, None]) @ root.T
         found.append(Instance(hypothesis, shape, mixtures[0], mixtures))
     if not found:
@@ -146,8 +142,10 @@ def require_separable(pair: tuple[Hypothesis, Hypothesis], judged: Sequence[Disc
         f"tried: {tried}. Use a known payload with its centre off the last joint's axis, or an additional "
         "measurement: joint torque, temperature, or position behind the gear"
     )
+    # Share of an effect's energy below which what is left of it is rounding.
+    alias = 1e-6
     for at, hypothesis in enumerate(pair):
-        if max(j.visible[at] for j in possible) < ALIAS:
+        if max(j.visible[at] for j in possible) < alias:
             raise NotIdentifiableError(
                 (
                     f"{hypothesis.label} cannot be distinguished from a change of the base model's parameters by any "
@@ -156,7 +154,7 @@ def require_separable(pair: tuple[Hypothesis, Hypothesis], judged: Sequence[Disc
                 remedy=remedy,
             )
     for at, hypothesis in enumerate(pair):
-        if max(j.shares[at] for j in possible) < ALIAS:
+        if max(j.shares[at] for j in possible) < alias:
             raise NotIdentifiableError(
                 (
                     f"no experiment of the catalogue distinguishes {hypothesis.label} from {pair[1 - at].label} with "

@@ -22,11 +22,6 @@ from robots.terms.effects import EXPERIMENTS
 
 Array = NDArray[np.float64]
 
-BEGINS = 1e-3
-"""A motion has begun where a joint is so far from its first position [rad or m]."""
-ALIKE = 0.05
-"""Two motions are one where they differ by less than this share of each joint's range."""
-
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class PlannedRun:
@@ -176,16 +171,20 @@ def repeats(logged: Motion, played: Motion) -> bool:
         logged: of a log, smoothed, perhaps cut at its end.
         played: the trajectory.
     """
-    if logged.n != played.n or np.abs(logged.q[0] - played.q[0]).max() > ALIKE:
+    # Two motions are one where they differ by less than this share of each joint's range.
+    alike = 0.05
+    if logged.n != played.n or np.abs(logged.q[0] - played.q[0]).max() > alike:
         return False
-    begins = [float(m.t[int(np.argmax(np.abs(m.q - m.q[0]).max(axis=1) > BEGINS))]) for m in (logged, played)]
+    # A motion has begun where a joint is so far from its first position [rad or m].
+    begins_at = 1e-3
+    begins = [float(m.t[int(np.argmax(np.abs(m.q - m.q[0]).max(axis=1) > begins_at))]) for m in (logged, played)]
     t = logged.t - begins[0] + begins[1]
     rows = (t >= played.t[0]) & (t <= played.t[-1])
     if t[rows].size < 2 or np.ptp(t[rows]) < 0.5 * played.duration:
         return False
     expected = np.column_stack([np.interp(t[rows], played.t, x) for x in played.q.T])
     away = np.abs(logged.q[rows] - expected).max(axis=0)
-    return bool((away <= np.maximum(ALIKE * np.ptp(played.q, axis=0), BEGINS)).all())
+    return bool((away <= np.maximum(alike * np.ptp(played.q, axis=0), begins_at)).all())
 
 
 def _require_free(bodies: CollisionModel, runs: Sequence[PlannedRun]) -> None:

@@ -125,10 +125,6 @@ class Player:
         return folder / f"{name}_{attempt}.csv"
 
 
-SLOW = 0.2
-"""Share of the velocity limits: a person may stand near a robot that was stopped."""
-
-
 def move_home(robot: Robot, pose: Array, home: Array, bodies: CollisionModel | None) -> Motion | None:
     """Plans a slow move home on a way that is proved free of collisions.
 
@@ -144,7 +140,9 @@ def move_home(robot: Robot, pose: Array, home: Array, bodies: CollisionModel | N
     Raises:
         InfeasibleError: no way is proved free, or the robot stands outside its position limits.
     """
-    limits = robot.limits.scaled(velocity=SLOW, acceleration=SLOW**2, jerk=SLOW**3)
+    # Share of the velocity limits: a person may stand near a robot that was stopped.
+    speed_share = 0.2
+    limits = robot.limits.scaled(velocity=speed_share, acceleration=speed_share**2, jerk=speed_share**3)
     if bodies is None or not bodies.pairs:
         return _along((pose, home), limits, robot.period)
     for way in CollisionFreeRanges(bodies, home).ways(pose, home):

@@ -12,7 +12,7 @@ from pathlib import Path
 from oed.campaigns.result import CAMPAIGN, Campaign
 from oed.campaigns.runs.player import INTERRUPTED, Player
 from oed.campaigns.runs.result import CampaignRun
-from oed.campaigns.runs.stage_progress import TURN, StageProgress
+from oed.campaigns.runs.stage_progress import PROGRESS_PERIOD, StageProgress
 from oed.campaigns.runs.state import LOGS, RUN, RecordedStage, RunState, run_lock
 from oed.campaigns.timetable import Slot
 from oed.controllers import Endpoint, StreamOptions
@@ -21,9 +21,6 @@ from robots.common.errors import InputError, OedError
 from robots.common.files import sha256
 from robots.common.progress import SILENT, Progress
 from robots.robot import Robot
-
-CELL = 20
-"""Bytes of a number in a log, at most."""
 
 
 def run_campaign(
@@ -161,7 +158,7 @@ class _Run:
         """Waits until a time in seconds since 1970, which is at a time of the timetable [s]."""
         while (left := until - time.time()) > 0:
             self.progress.update(max(planned - left * self.speed - self.origin, 0.0), "rest")
-            time.sleep(min(left, TURN))
+            time.sleep(min(left, PROGRESS_PERIOD))
 
     def _play_stage(self, number: int, slot: Slot) -> None:
         assert slot.stage is not None
@@ -233,7 +230,8 @@ class _Run:
         """Refuses a disk that the logs will not fit on."""
         robot = self.campaign.robot
         seconds = sum(slot.duration for slot in self.played[first:])
-        needed = int(seconds / robot.period) * (1 + 3 * robot.n) * CELL
+        # A number in a log takes 20 bytes at most.
+        needed = int(seconds / robot.period) * (1 + 3 * robot.n) * 20
         free = shutil.disk_usage(self.folder).free
         if needed > free:
             raise InputError(

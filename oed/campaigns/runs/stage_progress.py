@@ -6,7 +6,7 @@ import time
 
 from robots.common.progress import Progress
 
-TURN = 0.5
+PROGRESS_PERIOD = 0.5
 """While the robot rests, the progress is updated so often [s]."""
 
 
@@ -76,6 +76,6 @@ def rest(until: float, progress: Progress, title: str) -> None:
     try:
         while (left := until - time.time()) > 0:
             progress.update(whole - left)
-            time.sleep(min(left, TURN))
+            time.sleep(min(left, PROGRESS_PERIOD))
     finally:
         progress.finish()

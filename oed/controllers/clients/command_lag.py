@@ -9,11 +9,8 @@ from robots.signals import Motion
 
 Array = NDArray[np.float64]
 
-LONGEST, STEP = 0.4, 0.002
-"""Lags up to so much are looked at, in such steps [s]."""
-
-MOVES = 1e-3
-"""A joint whose plan has less spread has no lag that could be seen [rad or m]."""
+LAG_STEP = 0.002
+"""Step of the lags that are compared [s]."""
 
 
 class CommandLag:
@@ -27,12 +24,14 @@ class CommandLag:
     """
 
     def __init__(self, motion: Motion) -> None:
-        self._lags: Array = np.arange(0.0, LONGEST + STEP / 2, STEP)
-        count = max(int(np.ceil(motion.duration / STEP)), 1) + 1
-        times = motion.t[0] + STEP * np.arange(count)
+        # Longest lag that is compared [s].
+        self._lags: Array = np.arange(0.0, 0.4 + LAG_STEP / 2, LAG_STEP)
+        count = max(int(np.ceil(motion.duration / LAG_STEP)), 1) + 1
+        times = motion.t[0] + LAG_STEP * np.arange(count)
         self._plan = np.column_stack([np.interp(times, motion.t, motion.q[:, j]) for j in range(motion.n)])
         self._misfit = np.zeros((len(self._lags), motion.n))
-        self._moves = np.ptp(motion.q, axis=0) > MOVES
+        # A joint whose plan has less spread has no lag that could be seen [rad or m].
+        self._moves = np.ptp(motion.q, axis=0) > 1e-3
         self.rows = 0
 
     def see(self, executed: float, q: Array) -> None:
@@ -42,7 +41,7 @@ class CommandLag:
             executed: time of the trajectory whose command is executed [s].
             q: positions (n,) [rad or m].
         """
-        places = np.clip((executed - self._lags) / STEP, 0, len(self._plan) - 1)
+        places = np.clip((executed - self._lags) / LAG_STEP, 0, len(self._plan) - 1)
         left = np.minimum(places.astype(int), len(self._plan) - 2)
         share = (places - left)[:, None]
         plan = (1 - share) * self._plan[left] + share * self._plan[left + 1]
@@ -61,7 +60,7 @@ class CommandLag:
                 # The misfit is a parabola around its minimum.
                 before, here, after = misfit[best - 1 : best + 2]
                 found.append(
-                    round(float(self._lags[best] + STEP * (before - after) / (before - 2 * here + after) / 2), 5)
+                    round(float(self._lags[best] + LAG_STEP * (before - after) / (before - 2 * here + after) / 2), 5)
                 )
             else:
                 found.append(float(self._lags[best]))

@@ -14,13 +14,11 @@ from robots.signals import Motion
 
 Array = NDArray[np.float64]
 
-STANDS = 0.3
+STANDING_TIME = 0.3
 """How long the robot must stand at the end [s]."""
 
-STANDS_WITHOUT_STATUS = 1.0
-"""The same where the controller reports no state of motion [s]: points may be left in its buffer."""
-
-TURN = 0.02
+STANDING_TIME_WITHOUT_STATUS = 1.0
+"""How long it must stand where the controller reports no state of motion [s]: points may be left in its buffer."""
 
 
 class Ending:
@@ -58,7 +56,7 @@ class Ending:
             reports = status is not None and status.in_motion >= 0
             there = self._away(self._final) <= self._tolerance
             begun = self._moved or not self._travels
-            stands = rest > (STANDS if reports else STANDS_WITHOUT_STATUS)
+            stands = rest > (STANDING_TIME if reports else STANDING_TIME_WITHOUT_STATUS)
             if there and begun and stands and not (status is not None and status.in_motion == 1):
                 return
             if rest > self._longest_rest:
@@ -71,7 +69,7 @@ class Ending:
                     joint=joint + 1 if self._moved else None,
                     remedy="check drives, mode and the running program at the controller",
                 )
-            time.sleep(TURN)
+            time.sleep(0.02)
 
     @property
     def _moved(self) -> bool:

@@ -19,19 +19,11 @@ from oed.exports.simple_message import FullPoint, MessageError, Point
 from robots.robot import Robot
 from robots.signals import Motion
 
-CYCLE = 0.004
-"""Of the controller [s]."""
-
-APPROACH = 1.0
+APPROACH_TIME = 1.0
 """Time in which the robot is brought from where it stands to the first point [s]."""
 
-HOLDS = 0.5
-"""How long a stopped robot is held, before nothing more is answered [s]."""
 
-DECELERATION = 5.0
-"""Of a stop, where the robot's description has no limit [rad/s2]."""
-
-TURN = 0.005
+GUIDE_POLL_PERIOD = 0.005
 
 
 class GuidePlayer(Sender):
@@ -59,7 +51,8 @@ class GuidePlayer(Sender):
         self.traffic = traffic
         self._form = EgmForm(axes=robot.axes)
         acceleration = robot.limits.acceleration
-        self._deceleration = np.where(np.isfinite(acceleration), acceleration, DECELERATION)
+        # A stop of a robot whose description has no limit [rad/s2].
+        self._deceleration = np.where(np.isfinite(acceleration), acceleration, 5.0)
         self._number = 0
         self._start: float | None = None
         self._begin: Array | None = None
@@ -71,8 +64,8 @@ class GuidePlayer(Sender):
 
     def see(self, stamp: float, q: Array) -> None:
         """Takes a row of feedback; see `Sender.see`."""
-        if self._elapsed > APPROACH and self._stopping is None:
-            self._lag.see(self._elapsed - APPROACH, q)
+        if self._elapsed > APPROACH_TIME and self._stopping is None:
+            self._lag.see(self._elapsed - APPROACH_TIME, q)
 
     def start(self) -> None:
         """Begins to answer: the robot is brought to the first point."""
@@ -92,21 +85,24 @@ class GuidePlayer(Sender):
                 last, changed = self._elapsed, now
             elif now - changed > self._options.patience:
                 raise NoReplyError(f"{self._link.place} has not asked for a position for {now - changed:.1f} s")
-            place = (self._elapsed - APPROACH) / (self._motion.period or CYCLE)
+            # The controller's cycle [s], unless the motion has one.
+            place = (self._elapsed - APPROACH_TIME) / (self._motion.period or 0.004)
             self.traffic.sent = int(np.clip(np.floor(place + 1e-6) + 1, 0, count))
             advance(self.traffic.sent)
-            time.sleep(TURN)
+            time.sleep(GUIDE_POLL_PERIOD)
 
     def stop(self) -> bool:
         """Brings the robot to rest, then answers nothing more; says whether it stands."""
         if self._stopping is None:
             self._stopping = time.monotonic()
-        longest = HOLDS + float((np.abs(self._speed) / self._deceleration).max(initial=0.0))
+        # How long a stopped robot is held, before nothing more is answered [s].
+        holds = 0.5
+        longest = holds + float((np.abs(self._speed) / self._deceleration).max(initial=0.0))
         while time.monotonic() - self._stopping < longest and self._recorder.error is None:
-            time.sleep(TURN)
+            time.sleep(GUIDE_POLL_PERIOD)
         self._link.answer = None
         quiet = time.monotonic() - self._recorder.rest_since
-        self.traffic.stopped = self._recorder.error is None and quiet > HOLDS / 5
+        self.traffic.stopped = self._recorder.error is None and quiet > holds / 5
         return self.traffic.stopped
 
     def _answer(self, data: bytes) -> bytes | None:
@@ -135,13 +131,13 @@ class GuidePlayer(Sender):
     def _planned(self, elapsed: float) -> Array:
         motion = self._motion
         assert self._begin is not None
-        if elapsed < APPROACH:
-            s = elapsed / APPROACH
+        if elapsed < APPROACH_TIME:
+            s = elapsed / APPROACH_TIME
             share = s**3 * (10 - 15 * s + 6 * s**2)
             found: Array = self._begin + share * (motion.q[0] - self._begin)
             return found
         t = motion.t - motion.t[0]
-        place = min(elapsed - APPROACH, float(t[-1]))
+        place = min(elapsed - APPROACH_TIME, float(t[-1]))
         right = min(int(np.searchsorted(t, place, side="right")), len(t) - 1)
         left = max(right - 1, 0)
         share = (place - t[left]) / (t[right] - t[left]) if right > left else 0.0

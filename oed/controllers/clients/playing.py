@@ -32,11 +32,11 @@ from oed.controllers.recording.recorder import Recorder
 from oed.controllers.recording.recording import with_rows
 from oed.controllers.recording.reported_joints import require_no_further_joints, warn_of_other_robot
 from oed.controllers.rtde.link import RtdeLink, ScriptLink
-from oed.controllers.rtde.packages import JOINTS as UR_JOINTS
+from oed.controllers.rtde.packages import UR_JOINTS
 from oed.exports.forms.base import require_joints
 from oed.exports.forms.sampling import at_cycle
 from oed.exports.simple_message import JointPosition, trajectory_points
-from oed.exports.simple_message.kinds import JOINTS
+from oed.exports.simple_message.kinds import MESSAGE_JOINTS
 from oed.exports.trajectory_checks import check_trajectory
 from robots.common.errors import InputError, OedError
 from robots.common.progress import SILENT, Progress
@@ -45,12 +45,6 @@ from robots.signals import Motion
 from robots.version import VERSION
 
 CLEAR = "clear it at the controller, move the robot to the start of the trajectory, and play it again"
-
-CLOSES = 0.1
-"""How long a link that is closed at once is waited for [s]."""
-
-PINGS = 9
-"""Pings from which the delay is measured."""
 
 
 def stream(
@@ -103,8 +97,8 @@ def stream(
     options = options or StreamOptions()
     metadata = metadata or {}
     check_trajectory(motion, robot, metadata, file)
-    if motion.n > JOINTS:
-        raise InputError(f"{motion.n} joints", file=file, allowed=f"up to {JOINTS}, as simple_message has")
+    if motion.n > MESSAGE_JOINTS:
+        raise InputError(f"{motion.n} joints", file=file, allowed=f"up to {MESSAGE_JOINTS}, as simple_message has")
     tolerances(robot, options.tolerance)
     most = None if options.driver is None else options.driver.most
     if most is not None and len(motion) > most:
@@ -158,9 +152,11 @@ def stream(
                 link = state if guided else links.enter_context(open_link(endpoint, endpoint.motion_port))
                 # A port that serves another client closes the link, or says something.
                 if not guided:
-                    link.receive(CLOSES)
+                    # How long a link that is closed at once is waited for [s].
+                    link.receive(0.1)
                 requests = _sender(link, state, motion, robot, endpoint, options, recorder, traffic)
-                for number in range(PINGS if options.ping else 0):
+                # Pings from which the delay is measured.
+                for number in range(9 if options.ping else 0):
                     requests.ping(None if number else max(options.patience, endpoint.connect_time))
             if not options.ignore_status and status_problem(recorder.status) is not None:
                 # The error of an interrupted motion ends with the link of the next client.

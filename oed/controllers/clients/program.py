@@ -19,34 +19,25 @@ from oed.controllers.clients.traffic import Traffic
 from oed.controllers.errors import ControllerError, NoReplyError
 from oed.controllers.recording.recorder import Recorder
 from oed.controllers.rtde.link import ScriptLink
-from oed.exports.forms.urscript import GAIN, LOOKAHEAD, SETTLES, start_check
+from oed.exports.forms.urscript import SERVO_GAIN, SERVO_LOOKAHEAD, SERVO_SETTLING, start_check
 from oed.exports.simple_message import FullPoint, Point
 from robots.common.errors import OedError
 from robots.robot import Robot
 from robots.signals import Motion
 
-SCALE = 100_000_000
+STEPS_PER_RADIAN = 100_000_000
 """Points travel as whole numbers of 4 bytes; one is so many parts of a radian."""
 
-TOKENS = 2**20
+COUNTS_PER_TOKEN = 2**20
 """Points of a run are counted from a multiple of this number, another one each time."""
 
-CONNECTS = 5.0
+CONNECT_TIMEOUT = 5.0
 """How long the program may take to connect back [s]."""
 
-STOPS = 3.0
-"""How long a robot may take to stand after a stop [s]."""
-
-ENDED = 0.5
-"""A program that is reported as ended for so long has ended [s]."""
-
-AHEAD = 0.2
+SENT_AHEAD = 0.2
 """Points are sent so long before they are executed [s]: later a network may be, and sooner a robot stops by itself."""
 
-TURN = 0.002
-
-DECELERATION = 5.0
-"""Of a stop, where the robot's description has no limit [rad/s2]."""
+PROGRAM_POLL_PERIOD = 0.002
 
 PROGRAM = """\
 def oed_stream():
@@ -118,10 +109,11 @@ class ProgramPlayer(Sender):
         self._period = motion.period or 0.0
         self._first = motion.q[0]
         self._count = len(motion)
-        self._token = TOKENS * random.randrange(1, 1000)
+        self._token = COUNTS_PER_TOKEN * random.randrange(1, 1000)
         acceleration = robot.limits.acceleration
         finite = acceleration[np.isfinite(acceleration)]
-        self._deceleration = float(finite.min()) if finite.size else DECELERATION
+        # A stop of a robot whose description has no limit [rad/s2].
+        self._deceleration = float(finite.min()) if finite.size else 5.0
         self._points: socket.socket | None = None
         self._listener: socket.socket | None = None
         self._finished = False
@@ -131,7 +123,7 @@ class ProgramPlayer(Sender):
     def played(self) -> int:
         """Points that the program has executed, those that hold the end included."""
         count = self._recorder.played - self._token
-        return count if 0 <= count < TOKENS else 0
+        return count if 0 <= count < COUNTS_PER_TOKEN else 0
 
     def see(self, stamp: float, q: Array) -> None:
         """Takes a row of feedback; see `Sender.see`."""
@@ -151,11 +143,11 @@ class ProgramPlayer(Sender):
             ControllerError: it does not connect.
         """
         self._listener = socket.create_server((self._host, 0))
-        self._listener.settimeout(TURN)
+        self._listener.settimeout(PROGRAM_POLL_PERIOD)
         port = self._listener.getsockname()[1]
         self.traffic.begun = True
         self._link.run(self._program(port))
-        end = time.monotonic() + CONNECTS
+        end = time.monotonic() + CONNECT_TIMEOUT
         while time.monotonic() < end:
             self._recorder.check()
             self._link.drain()
@@ -165,22 +157,23 @@ class ProgramPlayer(Sender):
                 self._points.setblocking(False)
                 return
         raise ControllerError(
-            f"the program on the controller does not connect to {self._host}:{port} for {CONNECTS:g} s",
+            f"the program on the controller does not connect to {self._host}:{port} for {CONNECT_TIMEOUT:g} s",
             remedy="set the controller to remote control, see its messages, and let it through the firewall of this "
             "computer",
         )
 
     def stream(self, points: Iterable[FullPoint | Point], watch: Watch, advance: Advance, longest_step: float) -> None:
-        """Sends points, each `AHEAD` of its time; see `Sender.stream`."""
+        """Sends points, each `SENT_AHEAD` of its time; see `Sender.stream`."""
         assert self._points is not None
         data = deque(
-            struct.pack(">7i", 1, *(round(q * SCALE) for q in point.positions[: len(self._first)])) for point in points
+            struct.pack(">7i", 1, *(round(q * STEPS_PER_RADIAN) for q in point.positions[: len(self._first)]))
+            for point in points
         )
         # The robot follows later: the end is held until it is there.
-        total = len(data) + int(np.ceil(SETTLES / self._period))
+        total = len(data) + int(np.ceil(SERVO_SETTLING / self._period))
         data.extend([data[-1]] * (total - len(data)))
         data.append(struct.pack(">7i", 0, *[0] * 6))
-        ahead = int(np.ceil(AHEAD / self._period))
+        ahead = int(np.ceil(SENT_AHEAD / self._period))
         sent, rest, last, changed, ended = 0, b"", 0, time.monotonic(), None
         while True:
             watch()
@@ -200,7 +193,8 @@ class ProgramPlayer(Sender):
             status = self._recorder.status
             runs = status is None or status.in_motion == 1
             ended = None if runs else (ended or now)
-            if ended is not None and now - ended > ENDED:
+            # A program that is reported as ended for so long has ended [s].
+            if ended is not None and now - ended > 0.5:
                 raise ControllerError(
                     f"the program on the controller ended after point {self.traffic.sent}",
                     remedy="see its messages: a stop at the controller, a limit, another program or another start pose "
@@ -211,7 +205,7 @@ class ProgramPlayer(Sender):
                     f"no point was executed for {now - changed:.1f} s after point {self.traffic.sent}",
                     remedy="check the controller and the network",
                 )
-            time.sleep(TURN)
+            time.sleep(PROGRAM_POLL_PERIOD)
 
     def stop(self) -> bool:
         """Replaces the program by one that stops the robot; says whether it stands."""
@@ -224,14 +218,15 @@ class ProgramPlayer(Sender):
         with suppress(OedError):
             if not self._finished:
                 self._link.run(STOP.format(deceleration=self._deceleration))
-            end = time.monotonic() + STOPS
+            # How long a robot may take to stand after a stop [s].
+            end = time.monotonic() + 3.0
             while time.monotonic() < end and recorder.error is None:
                 self._link.drain()
                 status, quiet = recorder.status, time.monotonic() - recorder.rest_since
                 if status is not None and status.in_motion != 1 and quiet > self.WAITS:
                     self.traffic.stopped = True
                     return True
-                time.sleep(TURN)
+                time.sleep(PROGRAM_POLL_PERIOD)
         return False
 
     def _put(self, data: bytes) -> bytes:
@@ -248,17 +243,17 @@ class ProgramPlayer(Sender):
             return b""
 
     def _program(self, port: int) -> str:
-        joints = ", ".join(f"point[{place}] / {SCALE}" for place in range(2, 8))
+        joints = ", ".join(f"point[{place}] / {STEPS_PER_RADIAN}" for place in range(2, 8))
         return PROGRAM.format(
             token=self._token,
             check="\n".join(start_check(self._first, self._options.start_tolerance)),
             host=self._host,
             port=port,
-            first=CONNECTS,
+            first=CONNECT_TIMEOUT,
             patience=self.WAITS,
             joints=joints,
             period=self._period,
-            lookahead=LOOKAHEAD,
-            gain=GAIN,
+            lookahead=SERVO_LOOKAHEAD,
+            gain=SERVO_GAIN,
             deceleration=self._deceleration,
         )

@@ -31,17 +31,8 @@ from oed.exports.simple_message import (
 )
 from robots.common.errors import OedError
 
-STOPS = 5
-"""How often a stop that is not confirmed is sent."""
-
-BUSY = 0.002
-"""A driver that is busy with a point is asked again after so long [s]."""
-
-STARTS = 10.0
+START_TIMEOUT = 10.0
 """How long drives may take to get power [s]."""
-
-TURN = 0.02
-"""Longest wait between two looks at what else happens [s]."""
 
 
 class Requests(Channel, Sender):
@@ -68,7 +59,7 @@ class Requests(Channel, Sender):
             return
         order = MotionControl(robot_id=self._options.robot_id, command=Command.START)
         self._put(self._form.encode(Frame(order, Comm.REQUEST)))
-        end = time.monotonic() + STARTS
+        end = time.monotonic() + START_TIMEOUT
         while (left := end - time.monotonic()) > 0:
             frame = self._received(left)
             reply = None if frame is None else frame.message
@@ -80,7 +71,7 @@ class Requests(Channel, Sender):
                     remedy="clear it at the controller: remote and play mode, no alarm, no emergency stop",
                 )
         raise ControllerError(
-            f"{driver.title} does not answer its start command for {STARTS:g} s",
+            f"{driver.title} does not answer its start command for {START_TIMEOUT:g} s",
             remedy="check the motion port and --driver",
         )
 
@@ -178,9 +169,11 @@ class Requests(Channel, Sender):
             order = Point(sequence=Special.STOP, positions=(), velocity=0.0, duration=0.0)
         data = self._form.encode(Frame(order, Comm.REQUEST))
         # By UDP the late reply to a point, without a body, looks like that to a stop that is lost.
-        doubtful = 0 if self.link.reliable else min(self._unanswered, STOPS - 1)
+        # How often a stop that is not confirmed is sent.
+        tries = 5
+        doubtful = 0 if self.link.reliable else min(self._unanswered, tries - 1)
         with suppress(OedError):
-            for _ in range(1 if self.link.reliable else STOPS):
+            for _ in range(1 if self.link.reliable else tries):
                 self._put(data)
                 end = time.monotonic() + (0.5 if self.link.reliable else self._options.reply_time)
                 while (left := end - time.monotonic()) > 0:
@@ -223,10 +216,12 @@ class Requests(Channel, Sender):
         self.traffic.sent += 1
 
     def _next_turn(self, waiting: OrderedDict[int, Request]) -> float:
+        # Longest wait between two looks at what else happens [s].
+        turn = 0.02
         if self.link.reliable:
-            return TURN
+            return turn
         oldest = min(request.sent for request in waiting.values())
-        return min(TURN, max(0.0, oldest + self._options.reply_time - time.monotonic()))
+        return min(turn, max(0.0, oldest + self._options.reply_time - time.monotonic()))
 
     def _answered(self, frame: Frame, waiting: OrderedDict[int, Request]) -> int | None:
         """Gives the number of the point that a reply confirms; None for one that confirms none."""
@@ -246,7 +241,8 @@ class Requests(Channel, Sender):
                 remedy="see its display: a limit, an error, a lost point or an empty buffer are usual causes",
             )
         if answer.verdict == Verdict.BUSY:
-            time.sleep(BUSY)
+            # A driver that is busy with a point is asked again after so long [s].
+            time.sleep(0.002)
             self._put(waiting[number].data)
             waiting[number].tries += 1
             return None

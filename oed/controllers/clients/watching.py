@@ -15,29 +15,20 @@ from robots.signals import Motion
 
 Array = NDArray[np.float64]
 
-RADIANS, METRES = 0.05, 0.02
-"""Usual tolerance of a joint that turns or slides [rad or m]."""
+USUAL_ANGLE_TOLERANCE = 0.05
+"""Usual tolerance of a joint that turns [rad]."""
 
-LASTS = 0.05
-"""A distance beyond the tolerance counts once it lasts [s]: a message that came late shows an old position."""
-
-STEP = 0.005
+PLAN_STEP = 0.005
 """Between two lags that are compared, and between two samples of the plan [s]."""
 
-LAG = 0.1
+LARGEST_LAG = 0.1
 """A joint lags behind the first movement, or leads it, by no more than this [s]: drives follow later, clocks jitter."""
 
-DRIFT = 5e-4
+CLOCK_DRIFT = 5e-4
 """The clocks of plan and controller differ by no more than this share."""
 
-MEMORY = 10.0
-"""The lag is that of the last seconds [s]."""
-
-SPAN, SPEED = 0.05, 0.004
-"""The robot moves if it is faster than this [rad/s or m/s] over a span of time [s]."""
-
-MOVED = 0.2
-"""Share of the tolerance that a movement must reach, so that it is no sag or noise."""
+SPEED_SPAN = 0.05
+"""Time over which the robot's speed is measured [s]."""
 
 
 def tolerances(robot: Robot, given: float | tuple[float, ...] | None) -> Array:
@@ -51,7 +42,8 @@ def tolerances(robot: Robot, given: float | tuple[float, ...] | None) -> Array:
         InputError: another number of values.
     """
     if given is None:
-        return np.array([METRES if joint.kind == "prismatic" else RADIANS for joint in robot.chain.joints])
+        # A joint that slides has 0.02 m.
+        return np.array([0.02 if joint.kind == "prismatic" else USUAL_ANGLE_TOLERANCE for joint in robot.chain.joints])
     values = np.atleast_1d(np.asarray(given, dtype=float))
     if values.size not in (1, robot.n):
         raise InputError(f"{values.size} tolerances", allowed=f"one, or {robot.n}, as {robot.name} has joints")
@@ -69,8 +61,8 @@ class Watch(ABC):
 
     def __init__(self, motion: Motion, tolerance: Array, unit: list[str]) -> None:
         self._tolerance, self._unit = tolerance, unit
-        count = max(int(np.ceil(motion.duration / STEP)), 1) + 1
-        times = motion.t[0] + STEP * np.arange(count)
+        count = max(int(np.ceil(motion.duration / PLAN_STEP)), 1) + 1
+        times = motion.t[0] + PLAN_STEP * np.arange(count)
         self._plan = np.column_stack([np.interp(times, motion.t, motion.q[:, j]) for j in range(motion.n)])
         self._since = np.full(motion.n, np.inf)
 
@@ -94,7 +86,8 @@ class Watch(ABC):
         wanted, times = found
         away = np.abs(q - wanted)
         beyond = away > self._tolerance
-        lasting = beyond & (s - self._since >= LASTS)
+        # A distance beyond the tolerance counts once it lasts [s]: a message that came late shows an old position.
+        lasting = beyond & (s - self._since >= 0.05)
         self._since = np.where(beyond, np.minimum(self._since, s), np.inf)
         if not lasting.any():
             return
@@ -129,11 +122,11 @@ class TimedWatch(Watch):
         self._rate = rate
         self._onset = _Onset(tolerance)
         planned = _Onset(tolerance, np.zeros(motion.n))
-        planned.see(-SPAN, self._plan[0])
-        starts = (planned.see(STEP * k, q) for k, q in enumerate(self._plan))
+        planned.see(-SPEED_SPAN, self._plan[0])
+        starts = (planned.see(PLAN_STEP * k, q) for k, q in enumerate(self._plan))
         self._begins = next((start for start in starts if start is not None), None)
         self._duration = motion.duration
-        self._reach = LAG
+        self._reach = LARGEST_LAG
         self._lags: Array = np.zeros(1)
         self._misfit: Array = np.zeros((1, motion.n))
         self._zero: float | None = None
@@ -143,9 +136,9 @@ class TimedWatch(Watch):
         """Begins at the time (zero) at which the plan begins on the feedback's clock [s]."""
         self._zero, self._last = zero, s
         # The first movement is seen late by a message or two.
-        self._reach = LAG + 2 * self._onset.step
-        count = int(np.ceil((self._reach + DRIFT * self._duration) / STEP))
-        self._lags = STEP * np.arange(-count, count + 1, dtype=np.float64)
+        self._reach = LARGEST_LAG + 2 * self._onset.step
+        count = int(np.ceil((self._reach + CLOCK_DRIFT * self._duration) / PLAN_STEP))
+        self._lags = PLAN_STEP * np.arange(-count, count + 1, dtype=np.float64)
         # Lags that fit equally well, as of a joint that stands: the one of the start counts.
         self._misfit = np.outer(1e-6 * self._lags**2, np.ones(self._plan.shape[1]))
 
@@ -160,15 +153,18 @@ class TimedWatch(Watch):
         assert self._zero is not None
         now = s - self._zero
         times = now - self._lags
-        places = np.clip(times / STEP, 0, len(self._plan) - 1)
+        places = np.clip(times / PLAN_STEP, 0, len(self._plan) - 1)
         left = np.minimum(places.astype(int), len(self._plan) - 2)
         share = (places - left)[:, None]
         plan = (1 - share) * self._plan[left] + share * self._plan[left + 1]
-        self._misfit *= np.exp((self._last - s) / MEMORY)
+        # The lag is that of the last seconds [s].
+        self._misfit *= np.exp((self._last - s) / 10.0)
         self._last = s
         # A message that came late counts no more than one at the edge.
         self._misfit += np.minimum(np.abs(q - plan), self._tolerance / 5) ** 2
-        best = np.where(np.abs(self._lags)[:, None] <= self._reach + DRIFT * now, self._misfit, np.inf).argmin(axis=0)
+        best = np.where(np.abs(self._lags)[:, None] <= self._reach + CLOCK_DRIFT * now, self._misfit, np.inf).argmin(
+            axis=0
+        )
         joints = np.arange(len(q))
         return plan[best, joints], times[best]
 
@@ -192,12 +188,12 @@ class PathWatch(Watch):
         super().__init__(motion, tolerance, unit)
         # A controller without time knows no rest between points.
         moves = np.append(True, np.abs(np.diff(self._plan, axis=0)).max(axis=1) > 1e-6)
-        self._times, self._plan = STEP * np.flatnonzero(moves), self._plan[moves]
+        self._times, self._plan = PLAN_STEP * np.flatnonzero(moves), self._plan[moves]
         self._reached = 0
 
     def _nearest(self, s: float, q: Array) -> tuple[Array, Array] | None:
-        first = max(0, self._reached - int(self.BACK / STEP))
-        piece = self._plan[first : self._reached + int(self.AHEAD / STEP)]
+        first = max(0, self._reached - int(self.BACK / PLAN_STEP))
+        piece = self._plan[first : self._reached + int(self.AHEAD / PLAN_STEP)]
         away = (np.abs(piece - q) / self._tolerance).max(axis=1)
         nearest = first + int((away <= away.min() + self.CLOSE).argmax())
         self._reached = max(self._reached, nearest)
@@ -211,7 +207,8 @@ class _Onset:
     """
 
     def __init__(self, tolerance: Array, noise: Array | None = None) -> None:
-        self._far = MOVED * np.where(np.isfinite(tolerance), tolerance, RADIANS)
+        # Share of the tolerance that a movement must reach, so that it is no sag or noise.
+        self._far = 0.2 * np.where(np.isfinite(tolerance), tolerance, USUAL_ANGLE_TOLERANCE)
         self._recent: deque[tuple[float, Array]] = deque()
         self._noise = noise
         self._rest: Array | None = None
@@ -226,7 +223,7 @@ class _Onset:
         """Takes positions (n,) at a time [s]; gives the time of the onset once it is known."""
         recent = self._recent
         recent.append((s, q))
-        while len(recent) > 2 and recent[1][0] <= s - SPAN:
+        while len(recent) > 2 and recent[1][0] <= s - SPEED_SPAN:
             recent.popleft()
         span = s - recent[0][0]
         spread = np.ptp(np.array([pose for _, pose in recent]), axis=0)
@@ -234,10 +231,11 @@ class _Onset:
             self._rest = q
         if self._noise is None:
             # The robot stands before the first point is sent.
-            if span >= SPAN:
+            if span >= SPEED_SPAN:
                 self._noise = spread
             return None
-        allowed = np.minimum(np.maximum(SPEED * max(span, SPAN), 3 * self._noise), self._far / 2)
+        # The robot moves if it is faster than 0.004 rad/s or m/s.
+        allowed = np.minimum(np.maximum(0.004 * max(span, SPEED_SPAN), 3 * self._noise), self._far / 2)
         if (spread <= allowed).all():
             self._begun, self._rest = None, q
             return None

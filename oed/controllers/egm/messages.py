@@ -13,14 +13,14 @@ from oed.controllers.rtde.feedback import StateFeedback
 from oed.exports.simple_message import Frame, MessageError, Status, Valid
 from robots.joints.controller_axes import ControllerAxes, axes_of, joints_of
 
-DATA, CORRECTION = 2, 3
+DATA_MESSAGE, CORRECTION_MESSAGE = 2, 3
 """Kinds of messages: of the robot, and of who guides it."""
 
 MOTORS_ON, MOTORS_OFF = 1, 2
-STOPPED, RUNNING = 2, 3
+GUIDING_STOPPED, GUIDING_RUNNING = 2, 3
 """States of the motion that is guided."""
 
-_VARINT, _FIXED, _BYTES, _SHORT = 0, 1, 2, 5
+_VARINT, _FIXED_64, _LENGTH_DELIMITED, _FIXED_32 = 0, 1, 2, 5
 
 
 def _varint(value: int) -> bytes:
@@ -36,11 +36,11 @@ def _number(tag: int, value: int) -> bytes:
 
 
 def _block(tag: int, content: bytes) -> bytes:
-    return _varint(tag << 3 | _BYTES) + _varint(len(content)) + content
+    return _varint(tag << 3 | _LENGTH_DELIMITED) + _varint(len(content)) + content
 
 
 def _joints(values: Sequence[float]) -> bytes:
-    return b"".join(bytes([1 << 3 | _FIXED]) + struct.pack("<d", value) for value in values)
+    return b"".join(bytes([1 << 3 | _FIXED_64]) + struct.pack("<d", value) for value in values)
 
 
 def _fields(data: bytes) -> Iterator[tuple[int, int | float | bytes]]:
@@ -70,13 +70,13 @@ def _fields(data: bytes) -> Iterator[tuple[int, int | float | bytes]]:
             tag, kind = key >> 3, key & 7
             if kind == _VARINT:
                 yield tag, varint()
-            elif kind == _FIXED:
+            elif kind == _FIXED_64:
                 yield tag, struct.unpack_from("<d", data, at)[0]
                 at += 8
-            elif kind == _SHORT:
+            elif kind == _FIXED_32:
                 yield tag, struct.unpack_from("<f", data, at)[0]
                 at += 4
-            elif kind == _BYTES:
+            elif kind == _LENGTH_DELIMITED:
                 size = varint()
                 if at + size > len(data):
                     raise MessageError("a field that is cut")
@@ -99,7 +99,7 @@ def _within(data: bytes, *path: int) -> list[int | float | bytes]:
 
 
 def robot_message(
-    number: int, time: float, axes: Sequence[float], motors: int = MOTORS_ON, guided: int = RUNNING
+    number: int, time: float, axes: Sequence[float], motors: int = MOTORS_ON, guided: int = GUIDING_RUNNING
 ) -> bytes:
     """Makes what the controller sends in each cycle.
 
@@ -110,7 +110,7 @@ def robot_message(
         motors: whether they are on.
         guided: state of the guided motion.
     """
-    header = _number(1, number) + _number(2, round(1e3 * time) & 0xFFFFFFFF) + _number(3, DATA)
+    header = _number(1, number) + _number(2, round(1e3 * time) & 0xFFFFFFFF) + _number(3, DATA_MESSAGE)
     seconds, micro = divmod(round(1e6 * time), 1_000_000)
     clock = _number(1, seconds) + _number(2, micro)
     return (
@@ -123,7 +123,7 @@ def robot_message(
 
 def guide_message(number: int, axes: Sequence[float]) -> bytes:
     """Makes the answer: where the axes shall be [deg]."""
-    return _block(1, _number(1, number) + _number(3, CORRECTION)) + _block(2, _block(1, _joints(axes)))
+    return _block(1, _number(1, number) + _number(3, CORRECTION_MESSAGE)) + _block(2, _block(1, _joints(axes)))
 
 
 def guided_axes(data: bytes) -> list[float]:
@@ -132,7 +132,7 @@ def guided_axes(data: bytes) -> list[float]:
     Raises:
         MessageError: another message.
     """
-    if _within(data, 1, 3) != [CORRECTION]:
+    if _within(data, 1, 3) != [CORRECTION_MESSAGE]:
         raise MessageError("a message that guides nothing")
     return [float(value) for value in _within(data, 2, 1, 1)]
 
@@ -156,10 +156,10 @@ class EgmForm:
         """
         axes = _within(data, 2, 1, 1)
         clock = _within(data, 2, 4, 1) + _within(data, 2, 4, 2)
-        if _within(data, 1, 3) != [DATA] or not axes or len(clock) != 2:
+        if _within(data, 1, 3) != [DATA_MESSAGE] or not axes or len(clock) != 2:
             raise MessageError("a message without the robot's joints and clock")
         motors, guided = _within(data, 4, 1), _within(data, 5, 1)
-        on, runs = motors == [MOTORS_ON], guided == [RUNNING]
+        on, runs = motors == [MOTORS_ON], guided == [GUIDING_RUNNING]
         return Frame(
             StateFeedback(
                 valid=Valid.TIME | Valid.POSITION,

@@ -11,12 +11,6 @@ from oed.controllers.links.base import Endpoint, Link
 from oed.exports.simple_message import MessageError, WireFormat
 from robots.common.errors import InputError
 
-LOCAL, PORTS = 20_000, 10_000
-"""A link that keeps its address comes from one of so many ports from the first on, below those of the system."""
-
-BUFFER = 2**22
-"""Bytes of feedback that the system may hold while we are busy."""
-
 
 class UdpLink(Link):
     """See `Link`. Bytes of later handshakes are skipped; datagrams of others never arrive.
@@ -34,10 +28,12 @@ class UdpLink(Link):
         self._first: bytes | None = None
         self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
         try:
-            self._socket.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, BUFFER)
+            # Bytes of feedback that the system may hold while we are busy.
+            self._socket.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 2**22)
             self._socket.setblocking(False)
             if endpoint.one_address:
-                self._bind(LOCAL + port % PORTS)
+                # A link that keeps its address comes from one of so many ports, below those of the system.
+                self._bind(20_000 + port % 10_000)
             try:
                 # `connect` alone has no clear error for a name that cannot be encoded.
                 found = socket.getaddrinfo(endpoint.host, port, socket.AF_INET, socket.SOCK_DGRAM)

@@ -10,7 +10,7 @@ from oed.controllers.errors import ControllerError
 from oed.controllers.recording.feedback import RANKS, Layout, MessageForm, layout_of, missing_in, stamp_of
 from oed.exports.simple_message import Message
 
-BACKWARD = 0.5
+BACKWARD_TIME = 0.5
 """If only messages older than the newest come for so long [s], the clock restarted. Late ones come between others."""
 
 
@@ -70,7 +70,7 @@ class Feed:
         self.late += 1
         if stamp < self._last:
             self._behind_since = min(self._behind_since, now)
-            if now - self._behind_since > BACKWARD:
+            if now - self._behind_since > BACKWARD_TIME:
                 raise ControllerError(f"the controller's clock went back by {self._last - stamp:.1f} s: it restarted")
         self.problem = f"its clock stands at {np.format_float_positional(self._last, trim='-')} s"
         return None

@@ -19,7 +19,7 @@ from oed.exports.simple_message import (
     shortest,
 )
 
-COARSE = 0.002
+COARSE_CLOCK_STEP = 0.002
 """Step of a clock [s] above which rows have the times of their arrival. Reals of 4 bytes reach it after 9 hours."""
 
 
@@ -119,7 +119,7 @@ def layout_of(message: Message, n: int, form: MessageForm) -> Layout | None:
         return Layout(
             kind=type(message),
             n=n,
-            stamped=Valid.TIME in valid and _step(message.time, form) <= COARSE,
+            stamped=Valid.TIME in valid and _step(message.time, form) <= COARSE_CLOCK_STEP,
             velocity=Valid.VELOCITY in valid,
             effort=effort,
             digits=digits,
@@ -158,7 +158,7 @@ def coarse_clock(message: Message, form: MessageForm) -> str:
     return (
         f"the controller's clock is at {time:.0f} s and counts in steps of {1e3 * step:.1f} ms there, as a real of 4 "
         "bytes does: rows have the times of their arrival. Its own times need a restart of the controller"
-        if step > COARSE
+        if step > COARSE_CLOCK_STEP
         else ""
     )
 

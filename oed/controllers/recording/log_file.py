@@ -19,10 +19,8 @@ from robots.common.files import open_atomic
 from robots.common.locks import close_locked, lock
 from robots.common.tables.ecsv import format_header
 
-EVERY = 0.2
+WRITING_PERIOD = 0.2
 """Rows are written after so long at the latest [s]."""
-
-BLOCK = 2**20
 
 FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
 """A disk, a quota or a file that has no room left."""
@@ -84,7 +82,7 @@ class FeedbackLog:
         self._head = self._size
 
     def append(self, t: float, values: Sequence[float]) -> None:
-        """Adds a row; it is written within `EVERY` while rows come.
+        """Adds a row; it is written within `WRITING_PERIOD` while rows come.
 
         Args:
             t: time [s].
@@ -95,7 +93,7 @@ class FeedbackLog:
         """
         self._held.append(f"{t!r},{','.join([self._number % value for value in values])}\n")
         self.rows += 1
-        if time.monotonic() - self._written > EVERY:
+        if time.monotonic() - self._written > WRITING_PERIOD:
             self.flush()
 
     def flush(self) -> None:
@@ -136,7 +134,7 @@ class FeedbackLog:
             try:
                 target.write(self._header({**self._metadata, **metadata}))
                 source.seek(self._head)
-                while block := source.read(BLOCK):
+                while block := source.read(2**20):
                     target.write(block)
             except OSError as error:
                 raise self._stopped(error) from error

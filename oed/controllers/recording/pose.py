@@ -16,10 +16,6 @@ from robots.robot import Robot
 
 Array = NDArray[np.float64]
 
-RESTS = 0.3
-"""How long the robot must stand [s]."""
-TURN = 0.02
-
 
 def require_torque(layout: Layout, endpoint: Endpoint) -> None:
     """Refuses feedback without torque.
@@ -55,8 +51,9 @@ def read_pose(robot: Robot, endpoint: Endpoint, patience: float = 2.0, *, needs_
         recorder.wait_for_feedback()
         if needs_torque:
             require_torque(recorder.layout, endpoint)
-        while time.monotonic() - recorder.rest_since < RESTS:
-            time.sleep(TURN)
+        # How long the robot must stand [s].
+        while time.monotonic() - recorder.rest_since < 0.3:
+            time.sleep(0.02)
             recorder.check()
         assert recorder.positions is not None
         return recorder.positions[: robot.n]

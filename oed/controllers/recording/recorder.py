@@ -35,14 +35,8 @@ from robots.robot import Robot
 
 Array = NDArray[np.float64]
 
-LOOK = 0.3
+FEEDBACK_TRIAL_TIME = 0.3
 """How long kinds of feedback are looked at before the best is chosen [s]."""
-
-RENEWED = 0.3
-"""How long a state is waited for that was reported after a given moment [s]: states come ten a second."""
-
-REST = 1e-5
-"""Positions that change by less are at rest [rad or m]."""
 
 
 class Recorder:
@@ -114,7 +108,7 @@ class Recorder:
                 else "check the controller's program, which sends it",
             )
         # Other kinds, and the status, may come less often.
-        time.sleep(LOOK)
+        time.sleep(FEEDBACK_TRIAL_TIME)
         self.check()
         return self.positions
 
@@ -155,7 +149,8 @@ class Recorder:
 
     def renewed_status(self) -> Status | None:
         """Waits for a state that is reported from now on; gives the last one where none comes in time."""
-        count, end = self._status_count, time.monotonic() + RENEWED
+        # How long a state is waited for that was reported after a given moment [s]: states come ten a second.
+        count, end = self._status_count, time.monotonic() + 0.3
         # The next one may have been on its way already.
         while self._status_count < count + 2 and time.monotonic() < end and self.error is None:
             time.sleep(0.01)
@@ -284,7 +279,8 @@ class Recorder:
                 f"the controller reports {len(positions)} joints, {self._robot.name} has {self._robot.n}",
                 remedy="the controller is of another robot: correct --robot",
             )
-        if self.positions is None or np.abs(positions - self.positions).max() > REST:
+        # Positions that change by less are at rest [rad or m].
+        if self.positions is None or np.abs(positions - self.positions).max() > 1e-5:
             self.rest_since = now
         self.positions, self.stamp = positions, stamp
         if self.watch is not None and self._seen is None:

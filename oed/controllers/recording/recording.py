@@ -20,8 +20,6 @@ from robots.common.records import Record
 from robots.robot import Robot
 from robots.version import VERSION
 
-TURN = 0.05
-
 
 @dataclass(frozen=True, kw_only=True)
 class Recording(Record):
@@ -101,7 +99,7 @@ def record(
         begin = time.monotonic()
         progress.start("recording", duration)
         while duration is None or time.monotonic() - begin < duration:
-            time.sleep(TURN)
+            time.sleep(0.05)
             recorder.check()
             progress.update(time.monotonic() - begin, f"{recorder.statistics.rows} rows")
         ended = "done"

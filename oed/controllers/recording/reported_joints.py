@@ -12,9 +12,6 @@ from robots.robot import Robot
 
 Array = NDArray[np.float64]
 
-BEYOND = 0.02
-"""Distance from a limit of position from which it is no rounding or overshoot [rad or m]."""
-
 
 def require_no_further_joints(unused: Array, robot: Robot) -> None:
     """Refuses a controller that reports more joints than the robot has.
@@ -63,12 +60,14 @@ def doubts_about_robot(robot: Robot, lowest: Array, highest: Array, planned: Arr
             f"joint {joints} of {robot.name} reads exactly 0 all the time: it stands at zero, or the controller has "
             f"{real} joints (check --robot)"
         )
+    # Distance from a limit of position from which it is no rounding or overshoot [rad or m].
+    beyond = 0.02
     for joint in range(n):
         lower, upper = float(robot.limits.lower[joint]), float(robot.limits.upper[joint])
-        outside = lowest[joint] if lowest[joint] < lower - BEYOND else highest[joint]
+        outside = lowest[joint] if lowest[joint] < lower - beyond else highest[joint]
         in_degrees = robot.chain.kinds[joint] == "revolute" and abs(outside) > 2 * np.pi
         cause = "be of another robot, or send degrees" if in_degrees else "be of another robot"
-        if lowest[joint] < lower - BEYOND or highest[joint] > upper + BEYOND:
+        if lowest[joint] < lower - beyond or highest[joint] > upper + beyond:
             found.append(
                 f"joint {joint + 1} is reported at {outside:.3g} {robot.limits.unit(joint)}, outside the limits of "
                 f"{robot.name} ({lower:.3g} to {upper:.3g}): the controller may {cause}. Check --robot"

@@ -6,9 +6,6 @@ from typing import Any
 
 import numpy as np
 
-LEARNING = 50
-"""Steps from which the nominal period is taken."""
-
 
 class Statistics:
     """Counts without keeping: its memory does not grow.
@@ -47,7 +44,8 @@ class Statistics:
     def _step(self, step: float) -> None:
         if self._period is None:
             self._steps.append(step)
-            if len(self._steps) >= LEARNING:
+            # Steps from which the nominal period is taken.
+            if len(self._steps) >= 50:
                 self._settle()
         else:
             self._lose(step)

@@ -12,9 +12,9 @@ from oed.controllers.links.tcp import TcpLink
 from oed.controllers.rtde.packages import (
     AS_TORQUE,
     FIELDS,
-    JOINTS,
     NOT_FOUND,
-    VERSION,
+    RTDE_VERSION,
+    UR_JOINTS,
     Command,
     Packages,
     body_format,
@@ -25,9 +25,6 @@ from oed.exports.simple_message import MessageError
 
 CYCLES = {3: 0.008}
 """Cycle of CB controllers by the first number of their version [s]."""
-
-CYCLE = 0.002
-"""Cycle of the e-series and later ones [s]."""
 
 
 class RtdeLink(TcpLink):
@@ -58,10 +55,11 @@ class RtdeLink(TcpLink):
             raise
 
     def _subscribe(self, end: float) -> None:
-        if self._asked(Command.VERSION, struct.pack(">H", VERSION), end) != b"\1":
-            raise ProtocolError(f"{self.place} has no RTDE of version {VERSION}", remedy="update the controller")
+        if self._asked(Command.VERSION, struct.pack(">H", RTDE_VERSION), end) != b"\1":
+            raise ProtocolError(f"{self.place} has no RTDE of version {RTDE_VERSION}", remedy="update the controller")
         major, minor, *_ = struct.unpack_from(">4I", self._asked(Command.CONTROLLER_VERSION, b"", end).ljust(16, b"\0"))
-        self.cycle = CYCLES.get(major, CYCLE)
+        # Cycle of the e-series and later ones [s].
+        self.cycle = CYCLES.get(major, 0.002)
         names = [*FIELDS, AS_TORQUE]
         reply = self._asked(Command.OUTPUTS, struct.pack(">d", 1 / self.cycle) + ",".join(names).encode(), end)
         types = reply[1:].decode("ascii", "replace").split(",")
@@ -76,7 +74,7 @@ class RtdeLink(TcpLink):
                 remedy="update the controller: registers from 24 on came with versions 3.9 and 5.3",
             )
         self._size = body_format(types).size
-        self._torques = b"" if names[-1] == AS_TORQUE else struct.pack(f">{JOINTS}d", *[nan] * JOINTS)
+        self._torques = b"" if names[-1] == AS_TORQUE else struct.pack(f">{UR_JOINTS}d", *[nan] * UR_JOINTS)
         if self._asked(Command.START, b"", end) != b"\1":
             raise ControllerError(f"{self.place} does not start to send", remedy="restart the controller")
 

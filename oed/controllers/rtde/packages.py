@@ -12,9 +12,9 @@ from enum import IntEnum
 
 from oed.exports.simple_message import MessageError
 
-VERSION = 2
+RTDE_VERSION = 2
 
-JOINTS = 6
+UR_JOINTS = 6
 
 PLAYED = "output_int_register_24"
 """Register in which our program counts its points; those from 24 on are for clients like this one."""

@@ -7,7 +7,7 @@ from enum import IntEnum
 from typing import Any
 
 from oed.controllers.rtde.feedback import StateFeedback
-from oed.controllers.rtde.packages import AS_TORQUE, FIELDS, JOINTS, PLAYED, body_format, opened
+from oed.controllers.rtde.packages import AS_TORQUE, FIELDS, PLAYED, UR_JOINTS, body_format, opened
 from oed.exports.simple_message import Frame, MessageError, Status, Valid
 
 TYPES = [*FIELDS.values(), FIELDS["actual_q"]]
@@ -28,10 +28,10 @@ class Safety(IntEnum):
     FAULT = 9
 
 
-RUNNING = 7
+ROBOT_RUNNING = 7
 """The robot mode in which brakes are released."""
 
-STOPPED, PLAYING = 1, 2
+PROGRAM_STOPPED, PROGRAM_PLAYING = 1, 2
 """States of a program."""
 
 
@@ -53,13 +53,13 @@ def status_of(robot_mode: int, safety_mode: int, runtime_state: int) -> UrStatus
     wrong = not (fine or stopped)
     known = {int(mode): mode.name.lower().replace("_", " ") for mode in Safety}
     return UrStatus(
-        drives_powered=int(robot_mode == RUNNING),
+        drives_powered=int(robot_mode == ROBOT_RUNNING),
         e_stopped=int(stopped),
         error_code=safety_mode if wrong else 0,
         in_error=int(wrong),
-        in_motion=int(runtime_state == PLAYING),
+        in_motion=int(runtime_state == PROGRAM_PLAYING),
         mode=-1,
-        motion_possible=int(fine and robot_mode == RUNNING),
+        motion_possible=int(fine and robot_mode == ROBOT_RUNNING),
         error=f"safety mode {safety_mode} ({known.get(safety_mode, 'unknown')})" if wrong else "",
     )
 
@@ -82,7 +82,7 @@ class RtdeForm:
             raise MessageError(f"a data package of {len(data)} bytes")
         values = iter(form.unpack(body)[1:])
         found: dict[str, Any] = {
-            name: tuple(next(values) for _ in range(JOINTS)) if kind == "VECTOR6D" else next(values)
+            name: tuple(next(values) for _ in range(UR_JOINTS)) if kind == "VECTOR6D" else next(values)
             for name, kind in zip([*FIELDS, AS_TORQUE], TYPES, strict=True)
         }
         currents, torques = found["actual_current"], found[AS_TORQUE]

@@ -13,9 +13,6 @@ from oed.controllers.virtual.robot import VirtualRobot
 
 Array = NDArray[np.float64]
 
-LAG = 0.04
-"""The arm follows its commands after about this [s], as servoj does; so long a piece of torque is computed at once."""
-
 
 @dataclass(frozen=True, slots=True)
 class ArmSample:
@@ -48,7 +45,9 @@ class Arm:
 
     def __init__(self, pose: Array, cycle: float, plant: VirtualRobot | None, fault: PathFault) -> None:
         self._cycle, self._plant, self._fault = cycle, plant, fault
-        self._size = max(round(LAG / cycle), 2)
+        # The arm follows its commands after about this [s], as servoj does; so long a piece of torque is computed at
+        # once.
+        self._size = max(round(0.04 / cycle), 2)
         self.command = np.array(pose, dtype=float)
         self.pose = self.command
         self._commands: list[Array] = [self.command] * 2

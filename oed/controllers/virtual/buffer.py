@@ -13,10 +13,6 @@ from oed.exports.simple_message import FullPoint, Point, Valid, WireFormat, shor
 Array = NDArray[np.float64]
 
 
-REST = 1e-6
-"""Speed, share of a speed, or step below which a point is one to stay at."""
-
-
 class Outcome(Enum):
     """What became of a point."""
 
@@ -144,17 +140,19 @@ class PointBuffer:
     def _stored(self, point: FullPoint | Point) -> Stored:
         n = self._n
         q = np.array(point.positions[:n])
+        # Speed, share of a speed, or step below which a point is one to stay at.
+        rest = 1e-6
         if isinstance(point, Point):
             before = self.points[-1].time if self.points else 0.0
             duration = shortest(point.duration) if self._short else point.duration
-            return Stored(before + duration if self.points else 0.0, q, None, None, point.velocity < REST)
+            return Stored(before + duration if self.points else 0.0, q, None, None, point.velocity < rest)
         dq = np.array(point.velocities[:n]) if Valid.VELOCITY in point.valid else None
         ddq = np.array(point.accelerations[:n]) if Valid.ACCELERATION in point.valid else None
         time = shortest(point.time) if self._short else point.time
         if dq is not None:
-            return Stored(time, q, dq, ddq, bool(np.abs(dq).max() < REST))
+            return Stored(time, q, dq, ddq, bool(np.abs(dq).max() < rest))
         last = self.points[-1].q if self.points else q
-        return Stored(time, q, dq, ddq, bool(np.abs(q - last).max() < REST))
+        return Stored(time, q, dq, ddq, bool(np.abs(q - last).max() < rest))
 
 
 def _given(values: list[Array | None], integral: Array, t: Array) -> Array:

@@ -14,7 +14,7 @@ from oed.controllers.virtual.fixed_packets import FixedPackets
 from oed.controllers.virtual.messages import feedback_frame, reply_frame, status_frame
 from oed.controllers.virtual.motoman import MotomanProgram
 from oed.controllers.virtual.options import ControllerOptions
-from oed.controllers.virtual.player import REPORTED, Outcome, Player
+from oed.controllers.virtual.player import Fault, Outcome, Player
 from oed.controllers.virtual.ports import Client, Port, TcpPort, UdpPort
 from oed.controllers.virtual.robot import VirtualRobot
 from oed.controllers.virtual.service import Service
@@ -40,14 +40,6 @@ Array = NDArray[np.float64]
 
 NEEDED = Valid.TIME | Valid.POSITION
 """What a point must state."""
-
-STATUS_PERIOD = 0.1
-WAITING = 256
-"""Requests that wait for room in the buffer, at most."""
-
-LONGEST_WAIT, SHORTEST_WAIT = 0.02, 0.0005
-STALL = 0.15
-"""A delay of this program beyond this [s] is no time of the controller: its clock stands still for so long."""
 
 
 class VirtualController(Service):
@@ -142,10 +134,10 @@ class VirtualController(Service):
 
     def _turn(self) -> None:
         now = time.monotonic()
-        wait = min(LONGEST_WAIT, self._due_from + self.options.feedback_period / self.options.speed - now)
+        wait = min(0.02, self._due_from + self.options.feedback_period / self.options.speed - now)
         wait = min(wait, self._network.next - now)
         ports = {sock: port for port in (self._motion, self._state) for sock in port.sockets()}
-        for sock in select.select(list(ports), [], [], max(wait, SHORTEST_WAIT))[0]:
+        for sock in select.select(list(ports), [], [], max(wait, 0.0005))[0]:
             port = ports[sock]
             for client, data in port.receive(sock, time.monotonic()):
                 self._network.send(time.monotonic(), partial(self._deliver, port, client, data))
@@ -220,7 +212,8 @@ class VirtualController(Service):
             self._external = message.positions[n : n + len(self._external)]
         outcome = self._player.put(message, time.monotonic(), streaming=frame.comm == Comm.REQUEST)
         if outcome == Outcome.FULL:
-            if len(self._waiting) < WAITING:
+            # Requests that wait for room in the buffer, at most.
+            if len(self._waiting) < 256:
                 self._waiting[client, message.sequence] = frame
             return
         self._count(int(outcome == Outcome.ACCEPTED))
@@ -241,7 +234,7 @@ class VirtualController(Service):
         if faults.silent_after is not None and count > faults.silent_after:
             self._silent = True
         if faults.error_after is not None and count > faults.error_after:
-            self._player.fail(REPORTED)
+            self._player.fail(Fault.REPORTED)
         if faults.e_stop_after is not None and count > faults.e_stop_after and self._state_now == "ready":
             self._player.stop()
             self._state_now = "e-stop"
@@ -255,7 +248,8 @@ class VirtualController(Service):
     def _advance(self, now: float) -> None:
         """Goes on with the controller's time, and sends what is due."""
         step = self.options.feedback_period / self.options.speed
-        if now - self._due_from > max(STALL, 2 * step):
+        # A delay of this program beyond this [s] is no time of the controller: its clock stands still for so long.
+        if now - self._due_from > max(0.15, 2 * step):
             self.stalled += now - self._due_from
             self._due_from = now - step
         due = int((now - self._due_from) / step + 1e-9)
@@ -274,7 +268,7 @@ class VirtualController(Service):
                 for client in list(self._state.clients):
                     self._send(self._state, client, data)
                 if self.options.status and clock >= self._status_due:
-                    self._status_due = clock + STATUS_PERIOD
+                    self._status_due = clock + 0.1
                     data = self.options.form.encode(status_frame(self._player, self._state_now))
                     for client in list(self._state.clients):
                         self._send(self._state, client, data)
@@ -282,10 +276,6 @@ class VirtualController(Service):
             waiting, self._waiting = self._waiting, {}
             for (client, _), frame in waiting.items():
                 self._handle(client, frame)
-
-
-RECORDERS = 16
-"""Clients of the state port."""
 
 
 def open_ports(options: ControllerOptions) -> tuple[Port, Port]:
@@ -303,10 +293,12 @@ def open_ports(options: ControllerOptions) -> tuple[Port, Port]:
         # The thesis' program stores the point again that it holds, and replies.
         stale = o.form.encode(Frame(Bare(kind=Kind.JOINT_TRAJ_PT_FULL), Comm.REPLY, Reply.SUCCESS)) if once else None
         motion = UdpPort(o.host, o.motion_port, o.handshake, 1, once, stale)
+    # Clients of the state port.
+    recorders = 16
     try:
         if o.transport == "tcp":
-            return motion, TcpPort(o.host, o.state_port, lambda: Splitter(o.form), RECORDERS)
-        return motion, UdpPort(o.host, o.state_port, o.handshake, 1 if once else RECORDERS, once, None)
+            return motion, TcpPort(o.host, o.state_port, lambda: Splitter(o.form), recorders)
+        return motion, UdpPort(o.host, o.state_port, o.handshake, 1 if once else recorders, once, None)
     except BaseException:
         motion.close()
         raise

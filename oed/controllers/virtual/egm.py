@@ -10,7 +10,14 @@ from contextlib import suppress
 import numpy as np
 from numpy.typing import NDArray
 
-from oed.controllers.egm.messages import MOTORS_OFF, MOTORS_ON, RUNNING, STOPPED, guided_axes, robot_message
+from oed.controllers.egm.messages import (
+    GUIDING_RUNNING,
+    GUIDING_STOPPED,
+    MOTORS_OFF,
+    MOTORS_ON,
+    guided_axes,
+    robot_message,
+)
 from oed.controllers.virtual.arm import Arm
 from oed.controllers.virtual.faults.paths import PathFault
 from oed.controllers.virtual.options import ControllerOptions
@@ -22,11 +29,8 @@ from robots.robot import Robot
 
 Array = NDArray[np.float64]
 
-CYCLE = 0.004
-"""Of the controller [s]."""
-
-STALL = 0.15
-"""A delay of this program beyond this [s] is no time of the controller."""
+EGM_CYCLE = 0.004
+"""Cycle of the controller [s]."""
 
 
 class VirtualEgm(Service):
@@ -47,7 +51,7 @@ class VirtualEgm(Service):
         self.options, self._axes, self._n = options, robot.axes, robot.n
         start = np.asarray(robot.limits.home if pose is None else pose, dtype=float)
         fault = PathFault(options.faults.path, options.faults.path_after)
-        self._arm = Arm(start, CYCLE, None, fault)
+        self._arm = Arm(start, EGM_CYCLE, None, fault)
         self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
         self._socket.bind((options.host, 0))
         self._socket.setblocking(False)
@@ -57,7 +61,9 @@ class VirtualEgm(Service):
         self.stalled = 0.0
         self._due_from = time.monotonic()
         self._motors = MOTORS_OFF if options.state in ("drives-off", "e-stop") else MOTORS_ON
-        self._guided = STOPPED if options.state in ("error", "manual") or options.faults.stuck else RUNNING
+        self._guided = (
+            GUIDING_STOPPED if options.state in ("error", "manual") or options.faults.stuck else GUIDING_RUNNING
+        )
         self._silent = False
 
     @property
@@ -68,7 +74,7 @@ class VirtualEgm(Service):
     @property
     def time(self) -> float:
         """Its clock [s]."""
-        return self._ticks * CYCLE
+        return self._ticks * EGM_CYCLE
 
     @property
     def lag(self) -> float:
@@ -84,12 +90,13 @@ class VirtualEgm(Service):
         self._socket.close()
 
     def _turn(self) -> None:
-        wait = self._due_from + CYCLE / self.options.speed - time.monotonic()
+        wait = self._due_from + EGM_CYCLE / self.options.speed - time.monotonic()
         if select.select([self._socket], [], [], min(max(wait, 0.0005), 0.02))[0]:
             with suppress(OSError):
                 self._take(self._socket.recvfrom(4096)[0])
-        now, step = time.monotonic(), CYCLE / self.options.speed
-        if now - self._due_from > STALL:
+        now, step = time.monotonic(), EGM_CYCLE / self.options.speed
+        # A delay of this program beyond this [s] is no time of the controller.
+        if now - self._due_from > 0.15:
             self.stalled += now - self._due_from
             self._due_from = now - step
         for _ in range(int((now - self._due_from) / step + 1e-9)):
@@ -108,7 +115,7 @@ class VirtualEgm(Service):
         except MessageError:
             self.malformed += 1
             return
-        if self._motors == MOTORS_ON and self._guided == RUNNING:
+        if self._motors == MOTORS_ON and self._guided == GUIDING_RUNNING:
             self._count()
             if self.points == 1:
                 self._arm.begin(self.time)
@@ -120,7 +127,7 @@ class VirtualEgm(Service):
         if faults.silent_after is not None and count > faults.silent_after:
             self._silent = True
         if faults.error_after is not None and count > faults.error_after:
-            self._guided = STOPPED
+            self._guided = GUIDING_STOPPED
         if faults.e_stop_after is not None and count > faults.e_stop_after:
             self._motors = MOTORS_OFF
         if faults.restart_after is not None and count > faults.restart_after and self._ticks > 500:

@@ -7,7 +7,7 @@ from math import isfinite
 
 from oed.exports.simple_message import Comm, Frame, Kind, MessageError, Point, WireFormat
 
-SHORT, LONG = 60, 68
+SHORT_PACKET, LONG_PACKET = 60, 68
 """Bytes of JOINT_POSITION and JOINT_TRAJ_PT."""
 
 
@@ -26,9 +26,9 @@ class FixedPackets:
         """Adds bytes and returns the packets that are whole now."""
         self._held += data
         packets = []
-        while len(self._held) >= SHORT:
+        while len(self._held) >= SHORT_PACKET:
             length, kind = struct.unpack_from(f"{self._order}2i", self._held)
-            size = LONG if kind == Kind.JOINT_TRAJ_PT and length >= LONG - 4 else SHORT
+            size = LONG_PACKET if kind == Kind.JOINT_TRAJ_PT and length >= LONG_PACKET - 4 else SHORT_PACKET
             if len(self._held) < size:
                 break
             packets.append(bytes(self._held[:size]))
@@ -43,7 +43,9 @@ class FixedPackets:
         """
         (sequence,) = struct.unpack_from(f"{self._order}i", packet, 16)
         positions = struct.unpack_from(f"{self._order}10f", packet, 20)
-        velocity, duration = struct.unpack_from(f"{self._order}2f", packet, 60) if len(packet) == LONG else (0.0, 0.0)
+        velocity, duration = (
+            struct.unpack_from(f"{self._order}2f", packet, 60) if len(packet) == LONG_PACKET else (0.0, 0.0)
+        )
         if not all(map(isfinite, (*positions, velocity, duration))):
             raise MessageError("a position that is no number")
         return Frame(Point(sequence=sequence, positions=positions, velocity=velocity, duration=duration), Comm.REQUEST)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from enum import IntEnum
 
 from oed.controllers.virtual.buffer import Outcome
 from oed.controllers.virtual.messages import motion_reply
@@ -11,8 +12,17 @@ from oed.exports.simple_message import Command, Frame, FullPoint, Message, Motio
 
 NEEDED = Valid.TIME | Valid.POSITION | Valid.VELOCITY
 
-NOT_STARTED, NOT_READY = 5008, 5000
-NO_TYPE, NO_NUMBER, NO_COMMAND, OTHER_START, LACKING = 3003, 3005, 3006, 3011, 3015
+
+class Reason(IntEnum):
+    """Why a message is refused, as the driver's replies state it."""
+
+    NO_TYPE = 3003
+    NO_NUMBER = 3005
+    NO_COMMAND = 3006
+    OTHER_START = 3011
+    LACKING = 3015
+    NOT_READY = 5000
+    NOT_STARTED = 5008
 
 
 class MotomanProgram:
@@ -32,19 +42,19 @@ class MotomanProgram:
         if isinstance(message, MotionControl):
             return self._command(message, player, ready)
         if not isinstance(message, FullPoint):
-            return motion_reply(message, Result.INVALID, NO_TYPE)
+            return motion_reply(message, Result.INVALID, Reason.NO_TYPE)
         if not (self._started and ready):
-            return motion_reply(message, Result.NOT_READY, NOT_READY if self._started else NOT_STARTED)
+            return motion_reply(message, Result.NOT_READY, Reason.NOT_READY if self._started else Reason.NOT_STARTED)
         if message.valid & NEEDED != NEEDED:
-            return motion_reply(message, Result.INVALID, LACKING)
+            return motion_reply(message, Result.INVALID, Reason.LACKING)
         if message.sequence < 0:
-            return motion_reply(message, Result.INVALID, NO_NUMBER)
+            return motion_reply(message, Result.INVALID, Reason.NO_NUMBER)
         outcome = player.put(message, time.monotonic(), streaming=True)
         if outcome == Outcome.FULL:
             return motion_reply(message, Result.BUSY)
         if outcome is None:
             player.clear_error()
-            return motion_reply(message, Result.INVALID, OTHER_START)
+            return motion_reply(message, Result.INVALID, Reason.OTHER_START)
         return motion_reply(message, Result.SUCCESS)
 
     def _command(self, message: MotionControl, player: Player, ready: bool) -> Frame:
@@ -56,5 +66,5 @@ class MotomanProgram:
             if self._started:
                 return motion_reply(message, Result.SUCCESS)
             result = Result.NOT_READY if message.command == Command.START else Result.FAILURE
-            return motion_reply(message, result, NOT_STARTED if ready else NOT_READY)
-        return motion_reply(message, Result.INVALID, NO_COMMAND)
+            return motion_reply(message, result, Reason.NOT_STARTED if ready else Reason.NOT_READY)
+        return motion_reply(message, Result.INVALID, Reason.NO_COMMAND)

@@ -14,9 +14,6 @@ from oed.exports.simple_message import DEFAULT, WireFormat
 from oed.exports.simple_message.kinds import MOTION_PORT, STATE_PORT
 from robots.common.errors import InputError
 
-CAPACITY = 100
-"""Points that the thesis' controller holds."""
-
 
 @dataclass(frozen=True, kw_only=True)
 class Faults:
@@ -112,7 +109,8 @@ class ControllerOptions:
     state_port: int = STATE_PORT
     form: WireFormat = DEFAULT
     handshake: int = HANDSHAKE
-    capacity: int = CAPACITY
+    # Points that the thesis' controller holds.
+    capacity: int = 100
     feedback: Literal["position", "feedback", "full", "torque"] = "torque"
     feedback_period: float = 0.004
     feedback_every: int = 1

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from enum import Enum
+from enum import Enum, IntEnum
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,20 +16,15 @@ from oed.exports.simple_message import FullPoint, Point, Special
 
 Array = NDArray[np.float64]
 
-LOAD = 0.1
-"""A buffer that is not full starts to play after so long [s] without a new point."""
 
-GONE = 2.0
-"""Time that waits for points waits no longer than this [s]."""
+class Fault(IntEnum):
+    """Error codes of the status message."""
 
-AHEAD = 1000
-"""Samples whose torque is computed at once, at most."""
-
-DOWNLOAD = 1_000_000
-"""Points of a downloaded trajectory, at most."""
-
-REPORTED, UNDERRUN, WRONG_START, GAP, BACKWARD = 1, 2, 3, 4, 5
-"""Error codes of the status message."""
+    REPORTED = 1
+    UNDERRUN = 2
+    WRONG_START = 3
+    GAP = 4
+    BACKWARD = 5
 
 
 class Phase(Enum):
@@ -65,7 +60,8 @@ class Player:
         self._options = options
         n = len(self.pose)
         self._stream = PointBuffer(n, options.capacity, options.form, options.replies == "bare")
-        self._download = PointBuffer(n, DOWNLOAD, options.form, False)
+        # Points of a downloaded trajectory, at most.
+        self._download = PointBuffer(n, 1_000_000, options.form, False)
         self._buffer = self._stream
         self._phase = Phase.IDLE
         self._error = 0
@@ -95,10 +91,10 @@ class Player:
 
     def clear_error(self) -> None:
         """Ends an error of a trajectory; one that was ordered stays."""
-        if self._error != REPORTED:
+        if self._error != Fault.REPORTED:
             self._error = 0
 
-    def fail(self, code: int) -> None:
+    def fail(self, code: Fault) -> None:
         """Stops with an error."""
         self.stop()
         self._error = code
@@ -133,7 +129,7 @@ class Player:
                 return None
         outcome = buffer.accept(number, point)
         if outcome in (Outcome.GAP, Outcome.BACKWARD):
-            self.fail(GAP if outcome == Outcome.GAP else BACKWARD)
+            self.fail(Fault.GAP if outcome == Outcome.GAP else Fault.BACKWARD)
             return None
         if outcome == Outcome.ACCEPTED:
             self._count(now)
@@ -150,8 +146,10 @@ class Player:
         Returns:
             What the robot does; None where time must wait for points.
         """
+        # A buffer that is not full starts to play after so long [s] without a new point.
+        load = 0.1
         if self._phase == Phase.LOADING and not self._options.faults.stuck:
-            waited = now - self._last_accepted > LOAD
+            waited = now - self._last_accepted > load
             if self._buffer.end and (self._buffer.full or waited or self._buffer is self._download):
                 self._phase, self._ticks, self._elapsed, self._last = Phase.PLAYING, 0, 0, None
                 self._path.begin()
@@ -159,7 +157,7 @@ class Player:
                     self._robot.begin(clock)
         if self._phase != Phase.PLAYING:
             return self._stand(heard)
-        if self._refilling and not self._buffer.full and now - self._last_accepted <= LOAD:
+        if self._refilling and not self._buffer.full and now - self._last_accepted <= load:
             return None
         self._refilling = False
         sample = self._next()
@@ -167,16 +165,17 @@ class Player:
             self.pose = sample.q
             return sample
         buffer = self._buffer
-        if self._options.wait_for_points and not buffer.at_rest and now - self._last_accepted < GONE:
+        # Time that waits for points waits no longer than this [s].
+        if self._options.wait_for_points and not buffer.at_rest and now - self._last_accepted < 2.0:
             # Piece by piece: one point at a time would cost a simulation each.
             self._refilling = True
             return None
         if buffer.at_rest or self._stands:
-            if now - self._last_accepted > LOAD:
+            if now - self._last_accepted > load:
                 self._phase = Phase.IDLE
                 self.played_trajectories += 1
             return self._stand(heard)
-        self.fail(UNDERRUN)
+        self.fail(Fault.UNDERRUN)
         return self._stand(heard)
 
     @property
@@ -197,7 +196,7 @@ class Player:
     def _starts_here(self, point: FullPoint | Point) -> bool:
         away = np.abs(np.array(point.positions[: len(self.pose)]) - self.pose).max()
         if away > self._options.start_tolerance:
-            self.fail(WRONG_START)
+            self.fail(Fault.WRONG_START)
         return not self._error
 
     def _put_download(self, point: FullPoint | Point, now: float) -> Outcome | None:
@@ -215,12 +214,12 @@ class Player:
             number = max(self._numbers, default=-1) + 1
             outcome = buffer.accept(number, point)
             if outcome != Outcome.ACCEPTED or buffer.end != number + 1 or not _even(buffer):
-                self.fail(GAP)
+                self.fail(Fault.GAP)
                 return None
             self._count(now)
             return outcome
         if self._buffer is not buffer or number < 0:
-            self.fail(GAP)
+            self.fail(Fault.GAP)
             return None
         most = None if self._options.driver is None else self._options.driver.most
         if most is not None and len(self._numbers) >= most - 1:
@@ -258,7 +257,8 @@ class Player:
             count -= 2
         if count <= 0:
             return
-        times: Array = (self._ticks + np.arange(min(count, AHEAD))).astype(np.float64) * period
+        # Samples whose torque is computed at once, at most.
+        times: Array = (self._ticks + np.arange(min(count, 1000))).astype(np.float64) * period
         q, dq, ddq = buffer.sample(times)
         torques = [None] * len(times) if self._robot is None else self._robot.follow(times, q, dq, ddq)
         seen = q if self._robot is None else self._robot.encoders(q)

@@ -15,12 +15,7 @@ from robots.common.errors import InputError
 Client = Hashable
 Received = list[tuple[Client, bytes]]
 
-BUFFER = 2**22
-BATCH = 256
-"""Datagrams that are taken from the system at once."""
-
-SILENCE = 5.0
-"""A client that was not heard for so long [s] may be replaced by UDP, which reports no disconnection."""
+BUFFERED_BYTES = 2**22
 
 
 class Port(ABC):
@@ -90,7 +85,7 @@ class UdpPort(Port):
     def __init__(self, host: str, number: int, handshake: int, most: int, once: bool, stale: bytes | None) -> None:
         super().__init__(most)
         self._socket = listening(host, number, socket.SOCK_DGRAM)
-        self._socket.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, BUFFER)
+        self._socket.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, BUFFERED_BYTES)
         self._byte = bytes([handshake])
         self._once, self._stale = once, stale
         self.number = self._socket.getsockname()[1]
@@ -102,7 +97,8 @@ class UdpPort(Port):
     def receive(self, ready: socket.socket, now: float) -> Received:
         """Takes the datagrams that have arrived."""
         found: Received = []
-        while len(found) < BATCH:
+        # Datagrams that are taken from the system at once.
+        while len(found) < 256:
             try:
                 data, client = self._socket.recvfrom(4096)
             except ConnectionError:
@@ -117,7 +113,8 @@ class UdpPort(Port):
         if data == self._byte and not (self._once and self.clients):
             if client not in self.clients and len(self.clients) >= self._most:
                 oldest = min(self.clients, key=lambda known: self.clients[known])
-                if now - self.clients[oldest] < SILENCE:
+                # A client that was not heard for so long [s] may be replaced by UDP, which reports no disconnection.
+                if now - self.clients[oldest] < 5.0:
                     return None
                 del self.clients[oldest]
             self.clients[client] = now
@@ -206,7 +203,7 @@ class TcpPort(Port):
             sent = self._open[client][0].send(waiting)
             del waiting[:sent]
         except BlockingIOError:
-            if len(waiting) > BUFFER:
+            if len(waiting) > BUFFERED_BYTES:
                 self.drop(client)
         except OSError:
             self.drop(client)

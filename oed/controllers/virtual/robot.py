@@ -14,9 +14,6 @@ from robots.terms.effect_bases.heat import HeatEffect
 
 Array = NDArray[np.float64]
 
-HISTORY, HEAT_HISTORY = 20.0, 60.0
-"""Effects with a memory see so much of the motion [s], effects of heat more; the plant's own heat sees everything."""
-
 
 class VirtualRobot:
     """A plant that follows its points exactly.
@@ -34,7 +31,9 @@ class VirtualRobot:
         self._rng = self._resting = np.random.default_rng(seed)
         static = all(isinstance(effect, PlantEffect) and effect.static for effect in plant.effects)
         warm = any(isinstance(getattr(effect, "term", None), HeatEffect) for effect in plant.effects)
-        self._memory = 2 if static else int((HEAT_HISTORY if warm else HISTORY) / period)
+        # Effects with a memory see so much of the motion [s], effects of heat more; the plant's own heat sees
+        # everything.
+        self._memory = 2 if static else int((60.0 if warm else 20.0) / period)
         self._pieces: list[HeatPiece] = []
         self._standing: tuple[Array, Array] | None = None
         self.begin(0.0)

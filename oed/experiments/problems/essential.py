@@ -11,9 +11,6 @@ from oed.experiments.problems.problem import FourierProblem
 from robots.base_parameters import BaseParameters
 from robots.common.errors import InputError
 
-# Random motions on which the shares are measured: enough that every joint moves in all of its range and speed.
-MOTIONS = 20
-
 
 def essential_part(problem: FourierProblem, share: float) -> BaseParameters:
     """Keeps the base parameters whose torque matters by the robot's description (thesis section 1.3).
@@ -36,7 +33,8 @@ def essential_part(problem: FourierProblem, share: float) -> BaseParameters:
     base = problem.base
     nominal = base.model.require_description("the choice of essential parameters")
     rng = np.random.default_rng(0)
-    drawn = [problem.shrunk(rng.normal(size=problem.size), 0.95, halvings=6) for _ in range(MOTIONS)]
+    # Random motions on which the shares are measured: enough that every joint moves in all of its range and speed.
+    drawn = [problem.shrunk(rng.normal(size=problem.size), 0.95, halvings=6) for _ in range(20)]
     q, dq, ddq = (np.concatenate(part) for part in zip(*map(problem.limit_states, drawn), strict=True))
     kept = base.essential(q, dq, ddq, base.from_standard(nominal), share)
     if not kept:

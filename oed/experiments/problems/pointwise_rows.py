@@ -12,7 +12,7 @@ Indices = NDArray[np.intp]
 States = tuple[Array, Array, Array]
 
 # Kept from each bound, in its own scale, for what happens between the samples.
-BETWEEN = 0.005
+MARGIN_BETWEEN_SAMPLES = 0.005
 
 
 class PointwiseRows:
@@ -53,7 +53,7 @@ class PointwiseRows:
         columns = np.nonzero(self._chosen)[1]
         lower = np.append(lower[columns], np.full(self._averaged, -np.inf))
         upper = np.append(upper[columns], np.ones(self._averaged))
-        return lower + BETWEEN, upper - BETWEEN
+        return lower + MARGIN_BETWEEN_SAMPLES, upper - MARGIN_BETWEEN_SAMPLES
 
     def values(self, z: Array) -> Array:
         """Evaluates the chosen rows."""

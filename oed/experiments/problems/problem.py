@@ -19,7 +19,7 @@ from robots.limits import Limits
 Array = NDArray[np.float64]
 
 # How far within each pointwise bound, in its own scale, a motion counts as feasible: a solver starts strictly inside.
-ROOM = 1e-3
+INNER_ROOM = 1e-3
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -108,11 +108,11 @@ class FourierProblem:
         for pose in poses:
             excess = [limit.excess(pose[None], still, still)[0] for limit in self.pointwise]
             excess += [limit.values(pose[None], still, still) - 1 for limit in self.averaged]
-            if max(e.max() for e in excess) < -ROOM:
+            if max(e.max() for e in excess) < -INNER_ROOM:
                 return pose
             labels = [label for limit in self.pointwise for label in limit.labels]
             labels += [label for limit in self.averaged for label in limit.labels]
-            broken = [labels[row] for row in np.flatnonzero(np.concatenate(excess) >= -ROOM)]
+            broken = [labels[row] for row in np.flatnonzero(np.concatenate(excess) >= -INNER_ROOM)]
         raise InfeasibleError(
             (
                 f"even at rest, in the home pose and in the middle of the ranges, {', '.join(broken[:3])} exceeds its "
@@ -192,9 +192,9 @@ class FourierProblem:
     def inside(self, z: Array, stride: int = 1) -> bool:
         """Whether all limits that are not linear hold, with some room, at every `stride`-th limit sample."""
         states = self.limit_states(z, stride)
-        if any(limit.excess(*states).max() > -ROOM for limit in self.pointwise):
+        if any(limit.excess(*states).max() > -INNER_ROOM for limit in self.pointwise):
             return False
-        return all(limit.values(*states).max() <= 1 - ROOM for limit in self.averaged)
+        return all(limit.values(*states).max() <= 1 - INNER_ROOM for limit in self.averaged)
 
     def limit_states(self, z: Array, stride: int = 1) -> tuple[Array, Array, Array]:
         """Position, velocity and acceleration (M, n) at every `stride`-th limit sample."""

@@ -26,8 +26,6 @@ Array = NDArray[np.float64]
 
 # Shares of the limits of speed and its derivatives that strokes and moves try in turn to keep the torque limits.
 SLOWER = (1.0, 0.85, 0.7, 0.5, 0.35, 0.2)
-# Fraction of an RMS limit that the optimised part may use; the moves to and from it need the rest.
-MOVES = 0.98
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -67,7 +65,8 @@ class Safety:
         rms = self.torque_rms
         if rms is None:
             return ()
-        return (TorqueRms(rms.model, rms.parameters, MOVES * rms.limit, margin=rms.margin, effects=rms.effects),)
+        # Fraction of an RMS limit that the optimised part may use; the moves to and from it need the rest.
+        return (TorqueRms(rms.model, rms.parameters, 0.98 * rms.limit, margin=rms.margin, effects=rms.effects),)
 
     def report(self, motion: Motion) -> CollisionReport | None:
         """Proves a whole motion free of collisions, or finds where it is not."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from oed.experiments.problems.pointwise_rows import BETWEEN, mean_gradients, row_gradients
+from oed.experiments.problems.pointwise_rows import MARGIN_BETWEEN_SAMPLES, mean_gradients, row_gradients
 from oed.experiments.problems.problem import FourierProblem
 
 Array = NDArray[np.float64]
@@ -18,7 +18,8 @@ class CurvedSlacks:
     """Slacks of the averaged limits, and of those pointwise limits and samples that a motion comes near.
 
     All limits at all samples decide whether a motion is within them (`values`); only some are rows, with derivatives.
-    From each bound `BETWEEN` is kept for what happens between the samples, or nine tenths of what the start keeps.
+    From each bound `MARGIN_BETWEEN_SAMPLES` is kept for what happens between the samples, or nine tenths of what the
+    start keeps.
 
     Args:
         problem: the design problem.
@@ -37,7 +38,10 @@ class CurvedSlacks:
         self._at: tuple[NDArray[np.intp], NDArray[np.intp]] = (np.zeros(0, np.intp), np.zeros(0, np.intp))
         self._last: tuple[Array, tuple[Array, Array]] | None = None
         rooms = self._rooms(start)
-        self._kept = np.minimum(BETWEEN, 0.9 * rooms[0]), np.minimum(BETWEEN, 0.9 * rooms[1])
+        self._kept = (
+            np.minimum(MARGIN_BETWEEN_SAMPLES, 0.9 * rooms[0]),
+            np.minimum(MARGIN_BETWEEN_SAMPLES, 0.9 * rooms[1]),
+        )
         self._slopes = np.zeros((0, problem.size))
         self.choose(start, NEAR)
 

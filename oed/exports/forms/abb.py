@@ -21,7 +21,7 @@ from robots.joints.controller_axes import joints_of
 from robots.robot import Robot
 from robots.signals import Motion
 
-AXES = 6
+RAPID_AXES = 6
 
 PLAY = "_play"
 """What follows the module's name in that of its procedure."""
@@ -29,16 +29,16 @@ PLAY = "_play"
 DEVICE = "OED"
 """Name of the device of transmission (UDPUC) that the controller has to have for EGM."""
 
-NEAR = 0.1
+RAPID_NEAR = 0.1
 """A guided axis has arrived within this [deg]."""
 
-STANDS = 60
+EGM_STANDING_TIME = 60
 """The guided motion ends once the robot has stood for so long [s]; pauses of a trajectory must be shorter."""
 
-WAITS = 60
+EGM_TIMEOUT = 60
 """The guided motion ends without messages for so long [s]; it waits so long for `oed stream`, too."""
 
-NAME = 32
+RAPID_NAME_LENGTH = 32
 """Characters of a name, at most."""
 
 RESERVED = reserved_words("rapid_words.txt")
@@ -62,10 +62,10 @@ class Abb(Form):
 
     def write(self, motion: Motion, robot: Robot, options: ExportOptions, suffix: str) -> bytes:
         """See `Form.write`."""
-        require_joints(robot, 1, AXES, "jointtarget")
-        require_name(options.name, NAME - len(PLAY), RESERVED, "RAPID")
+        require_joints(robot, 1, RAPID_AXES, "jointtarget")
+        require_name(options.name, RAPID_NAME_LENGTH - len(PLAY), RESERVED, "RAPID")
         points, _ = spline_points(motion)
-        axes = np.pad(axes_in_degrees(points.q, robot), ((0, 0), (0, AXES - robot.n)))
+        axes = np.pad(axes_in_degrees(points.q, robot), ((0, 0), (0, RAPID_AXES - robot.n)))
         external = ",".join(["9E9"] * 6)
         parts = pieces(len(points))
         names = ["points", *(f"points_{number}" for number in range(2, len(parts) + 1))]
@@ -117,15 +117,15 @@ class AbbEgm(Form):
 
     def write(self, motion: Motion, robot: Robot, options: ExportOptions, suffix: str) -> bytes:
         """See `Form.write`."""
-        require_joints(robot, 1, AXES, "jointtarget")
-        require_name(options.name, NAME - len(PLAY), RESERVED, "RAPID")
-        start = np.pad(axes_in_degrees(motion.q[:1], robot), ((0, 0), (0, AXES - robot.n)))[0].tolist()
-        joints, external = range(1, AXES + 1), ",".join(["9E9"] * 6)
+        require_joints(robot, 1, RAPID_AXES, "jointtarget")
+        require_name(options.name, RAPID_NAME_LENGTH - len(PLAY), RESERVED, "RAPID")
+        start = np.pad(axes_in_degrees(motion.q[:1], robot), ((0, 0), (0, RAPID_AXES - robot.n)))[0].tolist()
+        joints, external = range(1, RAPID_AXES + 1), ",".join(["9E9"] * 6)
         within, run = ("".join(f"\\J{joint}{end}" for joint in joints) for end in (":=near", ""))
         lines = [
             f"MODULE {options.name}",
             "  VAR egmident guided;",
-            f"  CONST egm_minmax near:=[-{NEAR},{NEAR}];",
+            f"  CONST egm_minmax near:=[-{RAPID_NEAR},{RAPID_NEAR}];",
             "  CONST jointtarget points{1}:=[",
             f"    [[{','.join(number(value, 7) for value in start)}],[{external}]]",
             "  ];",
@@ -133,9 +133,10 @@ class AbbEgm(Form):
             *_start(robot.n, options),
             "    EGMReset guided;",
             "    EGMGetId guided;",
-            f'    EGMSetupUC ROB_1,guided,"default","{DEVICE}"\\Joint\\CommTimeout:={WAITS};',
+            f'    EGMSetupUC ROB_1,guided,"default","{DEVICE}"\\Joint\\CommTimeout:={EGM_TIMEOUT};',
             f"    EGMActJoint guided\\Tool:=tool0{within}\\LpFilter:=0\\SampleRate:=4\\MaxSpeedDeviation:=1000;",
-            f"    EGMRunJoint guided,EGM_STOP_HOLD{run}\\CondTime:={STANDS}\\RampInTime:=0.01\\PosCorrGain:=1;",
+            f"    EGMRunJoint guided,EGM_STOP_HOLD{run}\\CondTime:={EGM_STANDING_TIME}"
+            "\\RampInTime:=0.01\\PosCorrGain:=1;",
             "    EGMReset guided;",
             "  ERROR",
             "    IF ERRNO=ERR_UDPUC_COMM THEN",

@@ -15,6 +15,7 @@ from robots.robot import Robot
 from robots.signals import Motion
 
 Array = NDArray[np.float64]
+NANOSECONDS = 1_000_000_000  # of a second
 
 
 class Form(ABC):

@@ -17,14 +17,11 @@ from robots.joints.controller_axes import axes_of
 from robots.robot import Robot
 from robots.signals import Motion
 
-ARRAY = 32_767
+LONGEST_ARRAY = 32_767
 """Elements of an array, at most."""
 
 SPACINGS = (0.2, 0.16, 0.12, 0.1, 0.08, 0.06, 0.05, 0.04)
 """Times between points of a spline [s]; shorter pieces make controllers slow down."""
-
-DEVIATION = 1e-3
-"""A spline through the points leaves the trajectory by no more than this, if a spacing allows it [rad]."""
 
 
 def require_name(name: str, most: int, reserved: Collection[str], language: str) -> None:
@@ -75,11 +72,12 @@ def spline_points(motion: Motion) -> tuple[Motion, float]:
         chosen = at_period(motion, min(spacing, motion.duration))
         spline = CubicSpline(chosen.t, chosen.q, bc_type="clamped")
         error = float(np.abs(spline(motion.t - motion.t[0]) - motion.q).max())
-        if error <= DEVIATION:
+        # A spline through the points leaves the trajectory by no more than this, if a spacing allows it [rad].
+        if error <= 1e-3:
             break
     return chosen, error
 
 
 def pieces(count: int) -> list[slice]:
     """Cuts a list into arrays that a controller takes."""
-    return [slice(first, min(first + ARRAY, count)) for first in range(0, count, ARRAY)]
+    return [slice(first, min(first + LONGEST_ARRAY, count)) for first in range(0, count, LONGEST_ARRAY)]

@@ -22,10 +22,7 @@ from robots.joints.controller_axes import joints_of
 from robots.robot import Robot
 from robots.signals import Motion
 
-NAME = 24
-"""Characters of a name, at most."""
-
-SLOW = 10
+KRL_START_PERCENT = 10
 """Speed and acceleration of the move to the start [%]."""
 
 RESERVED = reserved_words("krl_words.txt")
@@ -35,9 +32,6 @@ _LISTED = re.compile(r"^POINT(?:_\d+)?\[\d+\]=\{(.*)\}$", re.MULTILINE)
 _START = re.compile(r"^START=\{(.*)\}$", re.MULTILINE)
 _PERIOD = re.compile(r"^DECL REAL PERIOD=([\d.]+)$", re.MULTILINE)
 _STEPS = re.compile(r"^  SPTP \{(.*)\}$|^WAIT SEC ([\d.]+)$|^  TIME_BLOCK END=([\d.]+)$", re.MULTILINE)
-
-STANDS = 1e-6
-"""Points that differ by less are a rest [deg]: a spline has no piece without length."""
 
 
 class Kuka(Form):
@@ -56,7 +50,8 @@ class Kuka(Form):
     def write(self, motion: Motion, robot: Robot, options: ExportOptions, suffix: str) -> bytes:
         """See `Form.write`."""
         require_joints(robot, 1, 6, "E6AXIS")
-        require_name(options.name, NAME, RESERVED, "KRL")
+        # Characters of a name, at most.
+        require_name(options.name, 24, RESERVED, "KRL")
         lines = _program(motion, robot, options) if suffix == ".src" else _data_list(motion, robot, options)
         return "\n".join([*lines, ""]).encode()
 
@@ -109,8 +104,8 @@ def _program(motion: Motion, robot: Robot, options: ExportOptions) -> list[str]:
         "  ; The robot is not at the start: a continued program moves it there, slowly and straight",
         "  HALT",
         "ENDIF",
-        f"BAS(#VEL_PTP,{SLOW})",
-        f"BAS(#ACC_PTP,{SLOW})",
+        f"BAS(#VEL_PTP,{KRL_START_PERCENT})",
+        f"BAS(#ACC_PTP,{KRL_START_PERCENT})",
         "PTP START",
         "BAS(#VEL_PTP,100)",
         "BAS(#ACC_PTP,100)",
@@ -121,7 +116,8 @@ def _program(motion: Motion, robot: Robot, options: ExportOptions) -> list[str]:
 
 def _moves(axes: Array, period: float) -> list[str]:
     """Gives a spline for each stretch in which the robot moves, and a wait for each rest."""
-    stands = np.abs(np.diff(axes, axis=0)).max(axis=1) < STANDS
+    # Points that differ by less are a rest [deg]: a spline has no piece without length.
+    stands = np.abs(np.diff(axes, axis=0)).max(axis=1) < 1e-6
     edges = [0, *(np.flatnonzero(np.diff(stands)) + 1).tolist(), len(stands)]
     lines = []
     for first, last in itertools.pairwise(edges):

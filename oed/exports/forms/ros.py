@@ -9,12 +9,10 @@ from typing import Any, ClassVar
 import numpy as np
 import yaml
 
-from oed.exports.forms.base import Array, ExportOptions, Form
+from oed.exports.forms.base import NANOSECONDS, Array, ExportOptions, Form
 from robots.common.errors import InputError
 from robots.robot import Robot
 from robots.signals import Motion
-
-BILLION = 1_000_000_000
 
 
 class Ros(Form):
@@ -55,7 +53,7 @@ class RosGoal(Form):
 
 
 def _trajectory(motion: Motion, robot: Robot) -> dict[str, Any]:
-    nanoseconds = np.round((motion.t - motion.t[0]) * BILLION).astype(np.int64).tolist()
+    nanoseconds = np.round((motion.t - motion.t[0]) * NANOSECONDS).astype(np.int64).tolist()
     rows = zip(motion.q.tolist(), motion.dq.tolist(), motion.ddq.tolist(), nanoseconds, strict=True)
     return {
         "header": {"stamp": {"sec": 0, "nanosec": 0}, "frame_id": ""},
@@ -66,7 +64,7 @@ def _trajectory(motion: Motion, robot: Robot) -> dict[str, Any]:
                 "velocities": dq,
                 "accelerations": ddq,
                 "effort": [],
-                "time_from_start": {"sec": time // BILLION, "nanosec": time % BILLION},
+                "time_from_start": {"sec": time // NANOSECONDS, "nanosec": time % NANOSECONDS},
             }
             for q, dq, ddq, time in rows
         ],
@@ -97,7 +95,7 @@ def _points(trajectory: dict[str, Any], robot: Robot) -> tuple[Array, Array]:
         found = list(trajectory["joint_names"])
         order = [found.index(name) for name in names]
         stamps = [point["time_from_start"] for point in trajectory["points"]]
-        t = np.array([stamp["sec"] + stamp["nanosec"] / BILLION for stamp in stamps])
+        t = np.array([stamp["sec"] + stamp["nanosec"] / NANOSECONDS for stamp in stamps])
         q = np.array([point["positions"] for point in trajectory["points"]], dtype=float)
         return t, q[:, order]
     except (KeyError, TypeError, ValueError, IndexError) as error:

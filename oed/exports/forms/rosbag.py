@@ -10,15 +10,14 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from oed.exports.forms.base import Array, ExportOptions, Form
+from oed.exports.forms.base import NANOSECONDS, Array, ExportOptions, Form
 from robots.common.errors import InputError
 from robots.robot import Robot
 from robots.signals import Motion
 
 TOPIC, TYPE = "/joint_states", "sensor_msgs/msg/JointState"
-BILLION = 1_000_000_000
-VERSION = 8
-"""Of the bag's description; ROS 2 from Humble on reads it."""
+ROSBAG_VERSION = 8
+"""Version of the bag's description; ROS 2 from Humble on reads it."""
 
 
 class Rosbag(Form):
@@ -35,14 +34,16 @@ class Rosbag(Form):
             store.types[kind] for kind in (TYPE, "std_msgs/msg/Header", "builtin_interfaces/msg/Time")
         )
         names = list(robot.joint_names)
-        stamps = np.round((motion.t - motion.t[0]) * BILLION).astype(np.int64).tolist()
+        stamps = np.round((motion.t - motion.t[0]) * NANOSECONDS).astype(np.int64).tolist()
         with tempfile.TemporaryDirectory() as folder:
             bag = Path(folder) / "bag"
-            with rosbag2.Writer(bag, version=VERSION, storage_plugin=rosbag2.StoragePlugin[self.plugin]) as writer:
+            with rosbag2.Writer(
+                bag, version=ROSBAG_VERSION, storage_plugin=rosbag2.StoragePlugin[self.plugin]
+            ) as writer:
                 connection = writer.add_connection(TOPIC, TYPE, typestore=store)
                 for stamp, q, dq in zip(stamps, motion.q, motion.dq, strict=True):
                     state = message(
-                        header=header(stamp=time(sec=stamp // BILLION, nanosec=stamp % BILLION), frame_id=""),
+                        header=header(stamp=time(sec=stamp // NANOSECONDS, nanosec=stamp % NANOSECONDS), frame_id=""),
                         name=names,
                         position=q,
                         velocity=dq,
@@ -64,7 +65,7 @@ class Rosbag(Form):
                 for connection, _, raw in reader.messages(connections=chosen):
                     state = reader.deserialize(raw, connection.msgtype)
                     order = [list(state.name).index(name) for name in names]
-                    t.append(state.header.stamp.sec + state.header.stamp.nanosec / BILLION)
+                    t.append(state.header.stamp.sec + state.header.stamp.nanosec / NANOSECONDS)
                     q.append(np.asarray(state.position)[order])
         if not t:
             raise InputError(f"no messages on {TOPIC}", allowed="a bag of this form")

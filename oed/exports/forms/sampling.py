@@ -9,7 +9,7 @@ from scipy.interpolate import BPoly
 from robots.common.errors import InputError
 from robots.signals import Motion
 
-MOST = 5_000_000
+MOST_SAMPLES = 5_000_000
 """Samples of an exported trajectory, at most."""
 
 
@@ -45,8 +45,8 @@ def at_period(motion: Motion, period: float) -> Motion:
     if not 0 < period < float("inf"):
         raise InputError(f"a period of {period} s", allowed="above 0")
     count = int(np.ceil(motion.duration / period - 1e-6)) + 1
-    if count > MOST:
-        raise InputError(f"{count} samples at a period of {period:g} s", allowed=f"up to {MOST}")
+    if count > MOST_SAMPLES:
+        raise InputError(f"{count} samples at a period of {period:g} s", allowed=f"up to {MOST_SAMPLES}")
     t = motion.t - motion.t[0]
     times: NDArray[np.float64] = period * np.arange(count, dtype=np.float64)
     own = motion.period

@@ -17,11 +17,11 @@ from robots.signals import Motion
 CYCLES = {0.008: "CB", 0.002: "e-series"}
 """Cycle of the controllers [s]: a servoj takes at least one, so shorter ones play the motion too slowly."""
 
-LOOKAHEAD, GAIN = 0.1, 300
-SETTLES = 0.4
+SERVO_LOOKAHEAD, SERVO_GAIN = 0.1, 300
+SERVO_SETTLING = 0.4
 """How long the last point is held, so that the robot reaches it [s]: servoj follows 0.1 s later or more."""
 
-MOST = 1000
+MOST_PROGRAM_POINTS = 1000
 """Points of a program that all controllers have taken.
 
 The maker states no limit. Users report that programs end without a word beyond 1,000 to 2,500 moves.
@@ -60,21 +60,22 @@ class UrScript(Form):
                 "--period, or state the period of another controller in the robot's description"
             )
             warnings.warn(AssumedValueWarning(text), stacklevel=4)
-        if len(motion) > MOST:
+        if len(motion) > MOST_PROGRAM_POINTS:
             text = (
-                f"a program of {len(motion)} points: controllers have refused programs of more than {MOST} to 2,500 "
-                "moves. If yours does, use `oed stream --driver ur`, which has no limit, or a longer --period"
+                f"a program of {len(motion)} points: controllers have refused programs of more than "
+                f"{MOST_PROGRAM_POINTS} to 2,500 moves. If yours does, use `oed stream --driver ur`, which has no "
+                "limit, or a longer --period"
             )
             warnings.warn(AssumedValueWarning(text), stacklevel=4)
         # The two zeros are an acceleration and a speed that the command does not use.
-        tail = f"0, 0, {number(period)}, {number(LOOKAHEAD)}, {GAIN})"
+        tail = f"0, 0, {number(period)}, {number(SERVO_LOOKAHEAD)}, {SERVO_GAIN})"
         lines = [
             f"def {options.name}():",
             *start_check(motion.q[0], options.start_tolerance),
             *(f"  servoj({_list(row)}, {tail}" for row in motion.q),
             # The robot follows later: the end is held until it is there.
             "  waited = 0",
-            f"  while waited < {int(np.ceil(SETTLES / period))}:",
+            f"  while waited < {int(np.ceil(SERVO_SETTLING / period))}:",
             f"    servoj({_list(motion.q[-1])}, {tail}",
             "    waited = waited + 1",
             "  end",

@@ -12,7 +12,16 @@ from typing import Any, Literal
 import numpy as np
 
 from oed.exports.simple_message.errors import MessageError
-from oed.exports.simple_message.kinds import HEADER, JOINTS, LARGEST, PREFIX, Comm, Kind, Reply, Valid
+from oed.exports.simple_message.kinds import (
+    HEADER_BYTES,
+    LARGEST_MESSAGE,
+    MESSAGE_JOINTS,
+    PREFIX_BYTES,
+    Comm,
+    Kind,
+    Reply,
+    Valid,
+)
 from oed.exports.simple_message.messages import (
     Bare,
     Frame,
@@ -121,21 +130,21 @@ class WireFormat:
         if (frame.comm == Comm.REPLY) != (frame.reply != Reply.INVALID):
             raise MessageError(f"{frame.comm.name} with the reply code {frame.reply.name}")
         if isinstance(message, Bare):
-            return self._layout("").pack(HEADER, message.kind, frame.comm, frame.reply)
+            return self._layout("").pack(HEADER_BYTES, message.kind, frame.comm, frame.reply)
         numbers: list[float] = []
         for value in _fields(message):
             if isinstance(value, tuple):
-                if len(value) > JOINTS:
-                    raise MessageError(f"{len(value)} joints", allowed=f"up to {JOINTS}")
+                if len(value) > MESSAGE_JOINTS:
+                    raise MessageError(f"{len(value)} joints", allowed=f"up to {MESSAGE_JOINTS}")
                 numbers += value
-                numbers += (0.0,) * (JOINTS - len(value))
+                numbers += (0.0,) * (MESSAGE_JOINTS - len(value))
             else:
                 numbers.append(value)
         layout = self._layout(_BODIES[message.kind])
         if not all(map(isfinite, numbers)):
             raise MessageError("a number that is not finite", allowed="finite numbers")
         try:
-            return layout.pack(layout.size - PREFIX, message.kind, frame.comm, frame.reply, *numbers)
+            return layout.pack(layout.size - PREFIX_BYTES, message.kind, frame.comm, frame.reply, *numbers)
         except (struct.error, OverflowError) as error:
             raise MessageError(f"a number does not fit into its field ({error})") from error
 
@@ -146,18 +155,20 @@ class WireFormat:
             MessageError: anything else than exactly one message of a known type.
         """
         size = len(data)
-        if not PREFIX + HEADER <= size < LARGEST:
-            raise MessageError(f"{size} bytes are no message", allowed=f"{PREFIX + HEADER} to {LARGEST - 1} bytes")
-        length, kind, comm, reply = self._layout("").unpack_from(data)
-        if length + PREFIX != size:
+        if not PREFIX_BYTES + HEADER_BYTES <= size < LARGEST_MESSAGE:
             raise MessageError(
-                f"the length field says {length}, the message has {size - PREFIX} bytes", remedy=self._hint(data)
+                f"{size} bytes are no message", allowed=f"{PREFIX_BYTES + HEADER_BYTES} to {LARGEST_MESSAGE - 1} bytes"
+            )
+        length, kind, comm, reply = self._layout("").unpack_from(data)
+        if length + PREFIX_BYTES != size:
+            raise MessageError(
+                f"the length field says {length}, the message has {size - PREFIX_BYTES} bytes", remedy=self._hint(data)
             )
         if kind not in _BODIES:
             raise MessageError(f"message type {kind}", allowed=", ".join(str(int(known)) for known in _BODIES))
         if not 1 <= comm <= 3 or not 0 <= reply <= 2 or (comm == Comm.REPLY) != (reply != Reply.INVALID):
             raise MessageError(f"communication type {comm} with reply code {reply}")
-        if size == PREFIX + HEADER and kind != Kind.PING:
+        if size == PREFIX_BYTES + HEADER_BYTES and kind != Kind.PING:
             if comm != Comm.REPLY:
                 raise MessageError(f"a message of type {kind} without a body")
             return Frame(Bare(kind=kind), Comm(comm), Reply(reply))
@@ -181,7 +192,7 @@ class WireFormat:
             for size in (4, 8):
                 length, kind = struct.unpack_from("<ii" if order == "little" else ">ii", data)
                 layout = _struct(order, size, _BODIES.get(kind, ""))
-                if length + PREFIX == len(data) == layout.size and kind in _BODIES:
+                if length + PREFIX_BYTES == len(data) == layout.size and kind in _BODIES:
                     return f"the sender uses {order} byte order and reals of {size} bytes: set both so"
         return None
 
@@ -193,7 +204,7 @@ DEFAULT = WireFormat()
 @lru_cache(maxsize=64)
 def _struct(byte_order: str, real_bytes: int, body: str) -> struct.Struct:
     real = "f" if real_bytes == 4 else "d"
-    text = body.replace("r", real).replace("j", f"{JOINTS}{real}")
+    text = body.replace("r", real).replace("j", f"{MESSAGE_JOINTS}{real}")
     return struct.Struct(("<" if byte_order == "little" else ">") + "4i" + text)
 
 
@@ -207,8 +218,8 @@ def _grouped(body: str, values: tuple[Any, ...]) -> list[int | float | Reals]:
     at = 0
     for mark in body:
         if mark == "j":
-            grouped.append(values[at : at + JOINTS])
-            at += JOINTS
+            grouped.append(values[at : at + MESSAGE_JOINTS])
+            at += MESSAGE_JOINTS
         else:
             grouped.append(values[at])
             at += 1

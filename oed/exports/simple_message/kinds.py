@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from enum import IntEnum, IntFlag
 
-JOINTS = 10
+MESSAGE_JOINTS = 10
 """Reals in every array of joints; the unused ones are zero."""
 
-LARGEST = 1024
+LARGEST_MESSAGE = 1024
 """A frame is shorter than this [bytes]."""
 
-PREFIX, HEADER = 4, 12
+PREFIX_BYTES, HEADER_BYTES = 4, 12
 """Bytes of the length field, and of the three fields behind it."""
 
 MOTION_PORT, STATE_PORT = 11000, 11002

@@ -7,7 +7,7 @@ from typing import Literal
 
 import numpy as np
 
-from oed.exports.simple_message.kinds import JOINTS
+from oed.exports.simple_message.kinds import MESSAGE_JOINTS
 from oed.exports.simple_message.messages import FullPoint, Point
 from robots.common.errors import InputError
 from robots.limits import Limits
@@ -38,8 +38,8 @@ def trajectory_points(
     Raises:
         InputError: too many joints, another type, or the short type without limits.
     """
-    if motion.n > JOINTS:
-        raise InputError(f"{motion.n} joints", allowed=f"up to {JOINTS}, as simple_message has")
+    if motion.n > MESSAGE_JOINTS:
+        raise InputError(f"{motion.n} joints", allowed=f"up to {MESSAGE_JOINTS}, as simple_message has")
     if kind not in ("full", "short"):
         raise InputError(f"points of type {kind!r}", allowed="full or short")
     t = motion.t - motion.t[0]

@@ -6,7 +6,7 @@ import struct
 
 from oed.exports.simple_message.codec import WireFormat
 from oed.exports.simple_message.errors import MessageError
-from oed.exports.simple_message.kinds import HEADER, LARGEST, PREFIX
+from oed.exports.simple_message.kinds import HEADER_BYTES, LARGEST_MESSAGE, PREFIX_BYTES
 
 
 class Splitter:
@@ -29,16 +29,16 @@ class Splitter:
         """
         self._held += data
         frames = []
-        while len(self._held) >= PREFIX:
+        while len(self._held) >= PREFIX_BYTES:
             (length,) = self._length.unpack_from(self._held)
-            if not HEADER <= length < LARGEST - PREFIX:
+            if not HEADER_BYTES <= length < LARGEST_MESSAGE - PREFIX_BYTES:
                 raise MessageError(
                     f"a length field of {length}",
-                    allowed=f"{HEADER} to {LARGEST - PREFIX - 1}",
+                    allowed=f"{HEADER_BYTES} to {LARGEST_MESSAGE - PREFIX_BYTES - 1}",
                     remedy=f"the other side speaks another protocol, or its byte order is not {self._order}",
                 )
-            if len(self._held) < length + PREFIX:
+            if len(self._held) < length + PREFIX_BYTES:
                 break
-            frames.append(bytes(self._held[: length + PREFIX]))
-            del self._held[: length + PREFIX]
+            frames.append(bytes(self._held[: length + PREFIX_BYTES]))
+            del self._held[: length + PREFIX_BYTES]
         return frames

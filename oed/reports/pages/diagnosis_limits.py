@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from estimation.diagnosis.experiment_plans.detection_limits import Limit
-from oed.experiments.quality import NOISE
+from oed.experiments.quality import ASSUMED_NOISE
 from oed.reports.rendering.page import Cell, Fact, Page, Section, Table
 from oed.reports.rendering.provenance import footer
 from oed.reports.rendering.saving import save_page
@@ -15,7 +15,7 @@ from robots.common.files import ResultFolder
 from robots.common.records import findings_of
 from robots.terms.effects import EFFECTS
 
-CLEAR = NOISE
+CLEAR = ASSUMED_NOISE
 """Share of the torque below which a limit counts as small."""
 ALL = 1.0
 """Fraction of the torque from which an effect size counts as impossible."""

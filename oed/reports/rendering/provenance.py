@@ -12,9 +12,9 @@ from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
-from estimation.monitoring.findings import ABSOLUTE
 from oed.reports.rendering.command_lines import command_words, written
 from robots.common.files import sha256
+from robots.common.tables.times import YEAR_2000
 from robots.signals import Log
 from robots.version import VERSION
 
@@ -83,7 +83,7 @@ class Recording:
     @property
     def date(self) -> str:
         """When it was recorded; empty where its clock has no date."""
-        if self.start is None or not self.start >= ABSOLUTE:
+        if self.start is None or not self.start >= YEAR_2000:
             return ""
         return f"{datetime.fromtimestamp(self.start, UTC):%Y-%m-%d %H:%M} UTC"
 

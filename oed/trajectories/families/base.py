@@ -15,10 +15,8 @@ from robots.common.errors import InputError
 
 # Points between two samples at which the overshoot is measured; it bends like a parabola there, so that the largest is
 # met to a 64th.
-BETWEEN = 8
-PARABOLA = 1 + 1 / BETWEEN**2
-# Of a basis: how far its ends may be from rest, and a rate from the difference quotient, as shares of the largest.
-AT_REST, RATE = 1e-9, 1e-4
+POINTS_BETWEEN = 8
+PARABOLA = 1 + 1 / POINTS_BETWEEN**2
 
 
 class Family(ABC):
@@ -125,12 +123,12 @@ class Family(ABC):
             samples: M.
         """
         times = self.limit_times(samples)
-        fine = np.linspace(times[0], times[-1], BETWEEN * (samples - 1) + 1)
-        rising = np.arange(BETWEEN) / BETWEEN
+        fine = np.linspace(times[0], times[-1], POINTS_BETWEEN * (samples - 1) + 1)
+        rising = np.arange(POINTS_BETWEEN) / POINTS_BETWEEN
         shares = []
         for coarse, dense in zip(self.basis(times), self.basis(fine), strict=True):
             chord = (1 - rising)[:, None] * coarse[:-1, None] + rising[:, None] * coarse[1:, None]
-            apart = dense[:-1].reshape(samples - 1, BETWEEN, -1) - chord
+            apart = dense[:-1].reshape(samples - 1, POINTS_BETWEEN, -1) - chord
             inverse = np.linalg.pinv(coarse, rcond=1e-9)
             overshoot = np.abs(apart @ inverse).sum(axis=2).max()
             shares.append(float(1 / (1 + PARABOLA * overshoot)))
@@ -221,17 +219,20 @@ def check_family(family: Family) -> None:
     if not (np.allclose(basis[0][:, 0], 1.0) and not any(matrix[:, 0].any() for matrix in basis[1:])):
         raise InputError(f"the first function of {called} is not constant", allowed="one, with derivatives of zero")
     sizes = [np.abs(matrix).max() or 1.0 for matrix in basis]
-    if np.abs(basis[0][-1] - basis[0][0]).max() > AT_REST * sizes[0]:
+    # The ends of a basis are at rest, up to this share of the largest value.
+    at_rest = 1e-9
+    if np.abs(basis[0][-1] - basis[0][0]).max() > at_rest * sizes[0]:
         raise InputError(f"{called} does not end where it starts")
     for name, matrix, size in zip(("velocity", "acceleration"), basis[1:3], sizes[1:3], strict=True):
-        if np.abs(matrix[[0, -1]]).max() > AT_REST * size:
+        if np.abs(matrix[[0, -1]]).max() > at_rest * size:
             raise InputError(f"{called} is not at rest at both ends: its {name} is not zero there")
     inner = times[1:-1]
     ahead, behind = family.basis(inner + step), family.basis(inner - step)
     for order, name in enumerate(("velocity", "acceleration", "jerk"), start=1):
         quotient = (ahead[order - 1] - behind[order - 1]) / (2 * step)
         # A jerk may jump at a knot, and the quotient there is a mean of both sides.
-        wrong = np.median(np.abs(quotient - basis[order][1:-1])) > RATE * sizes[order]
+        # Rates agree with the difference quotient to this share of the largest.
+        wrong = np.median(np.abs(quotient - basis[order][1:-1])) > 1e-4 * sizes[order]
         if wrong:
             raise InputError(f"the {name} of {called} is not the derivative of what comes before it")
 

@@ -13,8 +13,8 @@ from oed.trajectories.base import Array, Kinematics
 from oed.trajectories.families.base import Family
 from robots.common.errors import InputError
 
-DEGREE = 5
-REPEATED = 3
+SPLINE_DEGREE = 5
+REPEATED_POINTS = 3
 """Equal control points at either end: they make velocity and acceleration vanish there."""
 
 
@@ -62,14 +62,14 @@ class BSpline(Family):
     @property
     def knots(self) -> Array:
         """All knots, those at the ends six times (points + 12,) [s]."""
-        inner = np.linspace(0.0, self.length, self.points + 2 * REPEATED - DEGREE + 1)
-        return np.concatenate([np.zeros(DEGREE), inner, np.full(DEGREE, self.length)])
+        inner = np.linspace(0.0, self.length, self.points + 2 * REPEATED_POINTS - SPLINE_DEGREE + 1)
+        return np.concatenate([np.zeros(SPLINE_DEGREE), inner, np.full(SPLINE_DEGREE, self.length)])
 
     def basis(self, t: ArrayLike) -> Kinematics:
         """Evaluates one and the inner B-splines by de Boor's recursion."""
         times = np.clip(np.asarray(t, dtype=np.float64), 0.0, self.length)
-        inner = np.eye(self.points + 2 * REPEATED)[:, REPEATED:-REPEATED]
-        spline = scipy.interpolate.BSpline(self.knots, inner, DEGREE)
+        inner = np.eye(self.points + 2 * REPEATED_POINTS)[:, REPEATED_POINTS:-REPEATED_POINTS]
+        spline = scipy.interpolate.BSpline(self.knots, inner, SPLINE_DEGREE)
         constant = np.zeros((len(times), 1))
         matrices = [np.hstack([constant, spline(times, nu=order)]) for order in range(4)]
         matrices[0][:, 0] = 1.0

@@ -18,10 +18,7 @@ from robots.geometry.urdf_shapes import UrdfShape, mesh_file
 
 Array = NDArray[np.float64]
 
-RIM = 24  # points of a cylinder's rim; the polygon is drawn about it, so that it encloses the circle
-THINNEST = 0.005  # m; thinner bodies get this radius, which smooth distances need
-PARTS = 3  # into which a mesh is cut at most
-GAIN = 0.75  # of the volume that another cut must leave at most
+RIM_POINTS = 24  # points of a cylinder's rim; the polygon is drawn about it, so that it encloses the circle
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -75,8 +72,10 @@ def shape_balls(shape: UrdfShape, source: str | Path) -> list[Balls]:
         balls = Balls(centres=_along(shape.size[1] / 2.0), radii=np.full(2, shape.size[0]))
     elif shape.kind == "cylinder":
         radius, length = shape.size
-        angle = 2.0 * np.pi * np.arange(RIM) / RIM
-        rim = radius / np.cos(np.pi / RIM) * np.column_stack([np.cos(angle), np.sin(angle), np.zeros(RIM)])
+        angle = 2.0 * np.pi * np.arange(RIM_POINTS) / RIM_POINTS
+        rim = (
+            radius / np.cos(np.pi / RIM_POINTS) * np.column_stack([np.cos(angle), np.sin(angle), np.zeros(RIM_POINTS)])
+        )
         centres = np.concatenate([rim + end for end in _along(length / 2.0)])
         balls = Balls(centres=centres, radii=np.zeros(len(centres)))
     else:
@@ -121,18 +120,20 @@ def _mesh_parts(vertices: Array, triangles: NDArray[np.int64]) -> list[Balls]:
     edges = along.min(), along.max()
     best = [_points(vertices[np.unique(triangles)])]
     volume = fit_capsule(best[0], polish=False).volume
-    for count in range(2, PARTS + 1):
+    # A mesh is cut into three parts at most, ...
+    for count in range(2, 4):
         cut = np.clip(((along - edges[0]) / (edges[1] - edges[0] or 1.0) * count).astype(int), 0, count - 1)
         parts = [_points(corners[cut == part].reshape(-1, 3)) for part in range(count) if (cut == part).any()]
         found = sum(fit_capsule(part, polish=False).volume for part in parts)
-        if found < GAIN * volume:
+        # ... and each cut must save a quarter of the volume.
+        if found < 0.75 * volume:
             best, volume = parts, found
     return best
 
 
 def _points(points: Array) -> Balls:
     points = np.unique(points, axis=0)
-    if len(points) > RIM:
+    if len(points) > RIM_POINTS:
         # Of a flat surface all points stay.
         with contextlib.suppress(QhullError):
             points = points[ConvexHull(points).vertices]
@@ -192,4 +193,5 @@ def _enclosing(start: Array, end: Array, balls: Balls) -> Spine:
     )
     distance = np.linalg.norm(balls.centres - start - share[:, None] * direction, axis=1)
     radius = float((distance + balls.radii).max()) * (1.0 + 1e-9)
-    return Spine(start=np.array(start), end=np.array(end), radius=max(radius, THINNEST))
+    # Smooth distances need a radius: thinner bodies get one of 5 mm.
+    return Spine(start=np.array(start), end=np.array(end), radius=max(radius, 0.005))

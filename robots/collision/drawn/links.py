@@ -13,17 +13,12 @@ from robots.collision.boxes import Box
 from robots.collision.capsules import Capsule, numbered
 from robots.collision.drawn.fitting import Balls, fit_capsule, shape_balls
 from robots.collision.drawn.shapes import BodyPair, DrawnBodies, shapes_of
-from robots.collision.pairs import POSES, always_touching, body_clearance, distinct_rows, poses_of, random_poses
+from robots.collision.pairs import SAMPLED_POSES, always_touching, body_clearance, distinct_rows, poses_of, random_poses
 from robots.common.errors import AssumedValueWarning, InputError
 from robots.geometry.urdf_shapes import UrdfShape
 from robots.robot import Robot
 
 Array = NDArray[np.float64]
-
-MOST = 4  # capsules of a body; more shapes are joined
-JOIN = 1.1  # two are joined where one capsule about both is at most so much larger
-CELL = 0.2  # poses that differ by less in the joints between two bodies count once [rad or m]
-BUILT = 0.9  # of all poses; bodies whose shapes meet in more of them touch by construction
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -91,7 +86,7 @@ def drawn_links(robot: Robot) -> DrawnLinks | None:
     known = {*parts, *(0 for _ in boxes)}
     without = ({*range(robot.n + 1)} - known) | {body for body, _ in unread}
     bodies = DrawnBodies(shapes, robot.urdf)
-    q = random_poses(robot.limits, POSES)
+    q = random_poses(robot.limits, SAMPLED_POSES)
     poses = poses_of(robot.chain, q)
     joined, apart = _met(bodies, capsules, q, poses, sorted(known - without))
     return DrawnLinks(
@@ -112,10 +107,12 @@ def _met(
     """Pairs of bodies whose shapes meet in nearly every pose, and those whose shapes meet in none."""
     joined, apart = set(), set()
     for pair in (frozenset((i, j)) for j in known for i in known if i < j):
-        rows = distinct_rows(q, pair, CELL)
+        # Poses that differ by less than 0.2 rad or m in the joints between two bodies count once.
+        rows = distinct_rows(q, pair, 0.2)
         near = body_clearance(capsules, pair, poses[rows]) < 0.0  # Capsules enclose the shapes.
         share = bodies.meet(pair, poses[rows][near]).sum() / len(rows)
-        if share > BUILT:
+        # Bodies whose shapes meet in more than 90 % of the poses touch by construction.
+        if share > 0.9:
             joined.add(pair)
         elif share == 0.0:
             apart.add(pair)
@@ -137,7 +134,8 @@ def _capsules(body: int, parts: list[tuple[str, Balls]]) -> list[Capsule]:
             for j in range(i)
         }
         i, j = min(costs, key=lambda pair: costs[pair] - sizes[pair[0]] - sizes[pair[1]])
-        if len(parts) <= MOST and costs[i, j] > JOIN * (sizes[i] + sizes[j]):
+        # A body has at most four capsules, and two are joined where one about both is at most a tenth larger.
+        if len(parts) <= 4 and costs[i, j] > 1.1 * (sizes[i] + sizes[j]):
             break
         parts[j], sizes[j] = (parts[j][0], parts[j][1].joined(parts[i][1])), costs[i, j]
         del parts[i], sizes[i]

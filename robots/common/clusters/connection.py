@@ -16,7 +16,7 @@ from robots.common.clusters.executor import ClusterExecutor
 from robots.common.clusters.tasks import missing
 from robots.common.errors import InputError
 
-ANSWER = 5.0
+ANSWER_TIMEOUT = 5.0
 """A scheduler must answer within this time [s]."""
 
 EVERYWHERE = ("robots.version.VERSION", "distributed.__version__")
@@ -59,7 +59,7 @@ def cluster(address: str) -> Iterator[ClusterExecutor]:
             with warnings.catch_warnings():
                 warnings.simplefilter("ignore")
                 _require_answer(address)
-                client = Client(address, timeout=ANSWER, set_as_default=False)
+                client = Client(address, timeout=ANSWER_TIMEOUT, set_as_default=False)
         except Exception as error:
             raise InputError(
                 f"no Dask scheduler answers at {address}",
@@ -74,7 +74,7 @@ def cluster(address: str) -> Iterator[ClusterExecutor]:
             finally:
                 executor.shutdown(wait=False, cancel_futures=True)
         finally:
-            client.close(timeout=ANSWER)
+            client.close(timeout=ANSWER_TIMEOUT)
 
 
 def _require_answer(address: str) -> None:
@@ -88,7 +88,7 @@ def _require_answer(address: str) -> None:
 
     async def shake_hands() -> None:
         options = Security().get_connection_args("client")
-        comm = await asyncio.wait_for(connect(address, timeout=ANSWER, **options), ANSWER)
+        comm = await asyncio.wait_for(connect(address, timeout=ANSWER_TIMEOUT, **options), ANSWER_TIMEOUT)
         comm.abort()
 
     # In a thread: a notebook's own has a loop that runs already.

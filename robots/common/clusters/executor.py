@@ -12,10 +12,10 @@ from robots.common.clusters.tasks import Link, missing, stop_tasks, work
 from robots.common.errors import OedError
 from robots.version import VERSION
 
-WITHOUT_WORKERS = 60.0
+WORKERLESS_TIMEOUT = 60.0
 """Work ends with an error when a cluster has had no worker for this time [s]."""
 
-LOOK = 1.0
+WORKER_CHECK_PERIOD = 1.0
 """Time between two looks at the cluster [s]."""
 
 
@@ -109,13 +109,13 @@ class ClusterExecutor(Executor):
     def _watch(self) -> None:
         """Fails what waits when the cluster has had no worker for long."""
         without = 0.0
-        while not self._over.wait(LOOK):
+        while not self._over.wait(WORKER_CHECK_PERIOD):
             try:
                 any_worker = bool(self._client.nthreads())
             except Exception:  # the connection is lost: Dask cancels what waits
                 continue
-            without = 0.0 if any_worker or not self._waiting else without + LOOK
-            if without >= WITHOUT_WORKERS:
+            without = 0.0 if any_worker or not self._waiting else without + WORKER_CHECK_PERIOD
+            if without >= WORKERLESS_TIMEOUT:
                 problem = f"the Dask scheduler at {self._address} has had no worker for {without:.0f} s"
                 for future in list(self._waiting):
                     if future.set_running_or_notify_cancel():

@@ -9,8 +9,8 @@ from pathlib import Path
 
 from robots.common.errors import InputError
 
-# Lines and bytes that are looked at.
-LINES, BYTES = 200, 2**17
+# A dialect is found from so many bytes of a file.
+DIALECT_BYTES = 2**17
 _DECIMAL_COMMA = re.compile(r'\s*"?[+-]?\d+,\d+([eE][+-]?\d+)?"?\s*')
 _DECIMAL_POINT = re.compile(r'\s*"?[+-]?\d*\.\d+([eE][+-]?\d+)?"?\s*')
 _SEPARATOR = re.compile(r"sep=(,|;|\t|\\t| )", re.IGNORECASE)
@@ -66,7 +66,7 @@ def find_dialect(header: str, rows: str, path: Path, first_row: int, stated: str
     Raises:
         InputError: decimal commas and points side by side.
     """
-    lines = rows.splitlines()[:LINES]
+    lines = rows.splitlines()[:200]
     delimiter = stated or _delimiter(header, lines)
     if delimiter == "," and not any('"' in line for line in lines[:2]):
         return PLAIN

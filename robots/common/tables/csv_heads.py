@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from robots.common.errors import InputError
-from robots.common.tables.csv_dialects import BYTES, Dialect, find_dialect, split_line, stated_delimiter
+from robots.common.tables.csv_dialects import DIALECT_BYTES, Dialect, find_dialect, split_line, stated_delimiter
 from robots.common.tables.csv_faults import check_names, encoding_error, is_number
 from robots.common.tables.ecsv import Header, parse_header
 
@@ -74,7 +74,7 @@ def read_head(data: mmap.mmap | bytes, path: Path) -> Head:
         elif row == 1 and (delimiter := stated_delimiter(line)) is not None:
             stated = delimiter
         elif line.strip():
-            beginning = data[position : position + BYTES].decode("utf-8", errors="replace")
+            beginning = data[position : position + DIALECT_BYTES].decode("utf-8", errors="replace")
             dialect = find_dialect(line, beginning, path, row + 1, stated)
             names = _split(line, dialect, path, row)
             if all(is_number(name, dialect) for name in names):

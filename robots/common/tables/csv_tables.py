@@ -16,13 +16,13 @@ import pyarrow.compute as pc
 import pyarrow.csv as pa_csv
 
 from robots.common.errors import InputError
-from robots.common.tables.csv_dialects import BYTES, Dialect, split_line
+from robots.common.tables.csv_dialects import DIALECT_BYTES, Dialect, split_line
 from robots.common.tables.csv_faults import NULLS, encoding_error, find_fault, is_number, named_twice
 from robots.common.tables.csv_heads import is_unnamed, read_head
 from robots.common.tables.ecsv import format_header
 from robots.common.tables.table import Column, Table
 
-_BLOCK = 16 * 2**20
+_BYTES_AT_A_TIME = 16 * 2**20
 _GAP = re.compile(rb"\n[ \t]*\r?\n")
 _LONE_RETURN = re.compile(rb"\r(?!\n)")
 _BLANKS = re.compile(rb"[ \t]+")
@@ -43,7 +43,7 @@ def csv_names(path: Path) -> list[str]:
     """
     with _opened(path) as data:
         # Of a long file its beginning: a return at its end may have lost its line feed.
-        _check_bytes(data[:BYTES].rstrip(b"\r"), path)
+        _check_bytes(data[:DIALECT_BYTES].rstrip(b"\r"), path)
         return [name for name in read_head(data, path).names if not is_unnamed(name)]
 
 
@@ -198,7 +198,7 @@ def _first_refused(
 ) -> int:
     """Returns where the first refused block starts: to look at each line of a long file would take minutes."""
     while start < end:
-        stop = data.find(b"\n", min(start + _BLOCK, end), end)
+        stop = data.find(b"\n", min(start + _BYTES_AT_A_TIME, end), end)
         stop = end if stop < 0 else stop + 1
         try:
             _parse(data, start, stop, names, kinds, dialect)
@@ -214,7 +214,7 @@ def _parse(
     # The parser reads the mapped file: a slice of bytes would copy it.
     table = pa_csv.read_csv(
         pa.BufferReader(pa.py_buffer(data).slice(start, end - start)),
-        read_options=pa_csv.ReadOptions(column_names=names, block_size=_BLOCK),
+        read_options=pa_csv.ReadOptions(column_names=names, block_size=_BYTES_AT_A_TIME),
         parse_options=pa_csv.ParseOptions(delimiter=dialect.delimiter, ignore_empty_lines=False),
         convert_options=pa_csv.ConvertOptions(
             column_types=kinds,

@@ -15,7 +15,8 @@ from robots.common.tables.table import Table
 FloatArray = NDArray[np.float64]
 
 _FORM = re.compile(r"\s*(\d{4}-\d{2}-\d{2}[T ])?\d{2}:\d{2}:\d{2}([.,]\d+)?\s*(Z|[+-]\d{2}:?\d{2})?\s*")
-_HOUR, _DAY = 3600.0, 86400.0
+SECONDS_PER_HOUR, SECONDS_PER_DAY = 3600.0, 86_400.0
+YEAR_2000 = 946_684_800.0  # [s since 1970]; earlier times are counted from another start
 # Spreadsheets: 3.5.2024 12:34:56,789; 5/3/2024 1:02:03.5 PM; 2024/05/03 12:34. Without a date also 34:56.7, which is
 # minutes and seconds: the form in which they write back a time with milliseconds.
 _SHEET = re.compile(
@@ -31,7 +32,7 @@ def seconds_since_1970(stamps: NDArray[np.datetime64]) -> FloatArray:
     days = whole.astype("datetime64[D]")
     since: FloatArray = (whole - days) / np.timedelta64(1, "s") + (days - np.datetime64(0, "D")) / np.timedelta64(
         1, "D"
-    ) * _DAY
+    ) * SECONDS_PER_DAY
     return since
 
 
@@ -72,7 +73,7 @@ def seconds_of(table: Table, name: str) -> FloatArray:
             values[row] = _seconds(text.strip().replace(",", "."))
         except ValueError as error:
             raise _no_time(table, name, row) from error
-    return _going_on(values, _DAY) if str(texts[0]).strip()[4:5] != "-" else values
+    return _unwrapped(values, SECONDS_PER_DAY) if str(texts[0]).strip()[4:5] != "-" else values
 
 
 def _no_time(table: Table, name: str, row: int) -> InputError:
@@ -86,7 +87,7 @@ def _no_time(table: Table, name: str, row: int) -> InputError:
     )
 
 
-def _going_on(values: FloatArray, period: float) -> FloatArray:
+def _unwrapped(values: FloatArray, period: float) -> FloatArray:
     """Adds a day or an hour wherever a clock without dates begins again."""
     again = np.concatenate([[False], np.diff(values) < -0.5 * period])
     return values + period * np.cumsum(again)
@@ -104,7 +105,7 @@ def _of_sheet(table: Table, name: str) -> FloatArray:
     texts = table.columns[name]
     hours = np.empty(len(texts))
     dates: list[tuple[int, ...]] = []
-    mark, period = "", _DAY
+    mark, period = "", SECONDS_PER_DAY
     for row, text in enumerate(texts):
         match = _sheet_parts(text) if isinstance(text, str) else None
         if match is None:
@@ -115,15 +116,15 @@ def _of_sheet(table: Table, name: str) -> FloatArray:
         if half:
             hour = hour % 12 + 12 * (half == "p")
         seconds = float((parts["seconds"] or "0").replace(",", "."))
-        hours[row] = _HOUR * hour + 60.0 * int(parts["minutes"]) + seconds
-        period = _DAY if "hours" in parts else _HOUR
+        hours[row] = SECONDS_PER_HOUR * hour + 60.0 * int(parts["minutes"]) + seconds
+        period = SECONDS_PER_DAY if "hours" in parts else SECONDS_PER_HOUR
         if parts.get("date"):
             mark = parts["mark"]
             dates.append(tuple(int(number) for number in parts["date"].split(mark)))
         if dates and len(dates) != row + 1:
             raise _no_time(table, name, row)
     if not dates:
-        return _going_on(hours, period)
+        return _unwrapped(hours, period)
     orders = ("dmy",) if mark == "." else ("mdy", "dmy")
     if dates[0][0] > 31:
         orders = ("ymd",)

@@ -14,9 +14,7 @@ from robots.terms.effects.time_delay import lateness
 
 Array = NDArray[np.float64]
 
-KNOTS = 3
-# Time [s] of the difference quotient for the change of torque per delay; friction changes sign within a sample.
-OVER = 1e-3
+DELAY_WAVES = 3
 
 
 class ClockDrift(OverTime):
@@ -30,12 +28,13 @@ class ClockDrift(OverTime):
 
     def parameters(self, robot: Robot, joint: int | None) -> tuple[Coefficient, ...]:
         """Describes the amplitude of each half wave."""
-        return tuple(Coefficient(f"delay_{k}", "s") for k in range(1, KNOTS + 1))
+        return tuple(Coefficient(f"delay_{k}", "s") for k in range(1, DELAY_WAVES + 1))
 
     def columns(self, situation: Situation, joint: int | None, shape: tuple[float, ...] = ()) -> Array:
         """Evaluates the change of torque per delay, times each half wave (N, n, KNOTS)."""
-        times = half_waves(log_time(situation), KNOTS)
-        return np.asarray(lateness(situation, OVER)[:, :, None] * times[:, None])
+        times = half_waves(log_time(situation), DELAY_WAVES)
+        # Time [s] of the difference quotient for the change of torque per delay; friction changes sign within a sample.
+        return np.asarray(lateness(situation, 1e-3)[:, :, None] * times[:, None])
 
     def describe(
         self,
@@ -47,7 +46,7 @@ class ClockDrift(OverTime):
         length: str = "rad",
     ) -> str:
         """Describes the finding in one sentence."""
-        late = half_waves(np.linspace(0.0, 1.0, 201), KNOTS) @ coefficients
+        late = half_waves(np.linspace(0.0, 1.0, 201), DELAY_WAVES) @ coefficients
         return (
             "The delay between logged torque and position changes with time, on all joints: by about "
             f"{1000 * float(np.ptp(late)):.2g} ms over the logs. Likely cause: two clocks with different rates."

@@ -25,13 +25,12 @@ MEMORIES, CREEPS, SUPPLIES = (0.1, 0.3, 1.0, 3.0), (1.0, 3.0, 10.0, 30.0), (0.03
 # Time constants [s] of grease that thins under shear.
 WORKED = (0.5, 2.0, 8.0)
 # Numbers of half waves over time, for slow changes and for changes of a dependence on position.
-KNOTS, AGEING = 8, 3
-WHIRLING = 6  # largest number of further joints in products of velocities
+TIME_WAVES, AGEING_WAVES = 8, 3
+MOST_VELOCITY_PRODUCTS = 6  # largest number of further joints in products of velocities
 # Changes of torque over which hysteresis changes sign, as fractions of the largest torque.
 STRAINS = (0.05, 0.2, 0.6)
-# A joint is at rest if its speed is below this fraction of its RMS speed for at least this time [s]. After the start
-# its torque is linear between these times [s], and zero after the last.
-STANDS, RESTS, SINCE = 0.02, 0.1, (0.0, 0.1, 0.2, 0.3, 0.5, 0.8)
+# Times [s] after the start of a motion between which the torque is linear; it is zero after the last.
+SINCE = (0.0, 0.1, 0.2, 0.3, 0.5, 0.8)
 
 
 @dataclass(frozen=True)
@@ -84,8 +83,12 @@ def _push(s: Situation, joint: int, other: int, shape: tuple[float, ...]) -> Arr
 
 
 def _whirl(s: Situation, joint: int, other: int, shape: tuple[float, ...]) -> Array:
-    columns = np.zeros((len(s), WHIRLING))
-    further = [k for k in range(s.q.shape[1]) if k + 1 not in (joint, other)][:WHIRLING] if other != joint else []
+    columns = np.zeros((len(s), MOST_VELOCITY_PRODUCTS))
+    further = (
+        [k for k in range(s.q.shape[1]) if k + 1 not in (joint, other)][:MOST_VELOCITY_PRODUCTS]
+        if other != joint
+        else []
+    )
     columns[:, : len(further)] = s.dq[:, other - 1, None] * s.dq[:, further]
     return columns
 
@@ -183,22 +186,24 @@ def _followers(s: Situation, source: Array, memories: tuple[float, ...]) -> Arra
 
 
 def _time(s: Situation, joint: int, other: int, shape: tuple[float, ...]) -> Array:
-    return half_waves(log_time(s), KNOTS)
+    return half_waves(log_time(s), TIME_WAVES)
 
 
 def _ageing(s: Situation, joint: int, other: int, shape: tuple[float, ...]) -> Array:
     q = s.q[:, joint - 1]
-    slow = half_waves(log_time(s), AGEING)
+    slow = half_waves(log_time(s), AGEING_WAVES)
     return np.hstack([slow * wave[:, None] for wave in (np.cos(q), np.sin(q))])
 
 
 def _start(s: Situation, joint: int, other: int, shape: tuple[float, ...]) -> Array:
     v = np.abs(s.dq[:, joint - 1])
-    still = v < STANDS * float(np.sqrt(np.mean(v**2)))
+    # At rest, the speed is below 2 % of the joint's RMS speed.
+    still = v < 0.02 * float(np.sqrt(np.mean(v**2)))
     columns = np.zeros((len(s), len(SINCE) - 1))
     for run in s.runs:
         t, own = s.t[run], columns[run]
-        goes = [stop for start, stop in spans(still[run]) if (stop - start) * s.period >= RESTS and stop < len(t)]
+        # A rest lasts 0.1 s at least.
+        goes = [stop for start, stop in spans(still[run]) if (stop - start) * s.period >= 0.1 and stop < len(t)]
         for start, stop in pairwise([*goes, len(t)]):
             since = t[start:stop] - t[start]
             own[start:stop] = np.column_stack([np.interp(since, SINCE, peak) for peak in np.eye(len(SINCE))[:-1]])
@@ -243,7 +248,9 @@ FAMILIES: dict[str, Family] = {
     "angles": Family(_angles, 16, "depends on its own position and that of {who} together"),
     "motion": Family(_motion, 5, "depends on the velocity of {who}"),
     "push": Family(_push, 3, "depends on the acceleration of {who}"),
-    "whirl": Family(_whirl, WHIRLING, "depends on products of the velocity of {who} and those of other joints"),
+    "whirl": Family(
+        _whirl, MOST_VELOCITY_PRODUCTS, "depends on products of the velocity of {who} and those of other joints"
+    ),
     "drag": Family(_drag, 8, "depends on its own position and the velocity of {who} together"),
     "posture": Family(_posture, 8, "depends on its own velocity and the position of {who} together"),
     "speed": Family(_speed, 6, "depends on the speed of the joint", _speed_of, "rad/s or m/s"),
@@ -263,8 +270,8 @@ FAMILIES: dict[str, Family] = {
         _hysteresis, len(STRAINS), "differs between rising and falling torque (hysteresis)", _torque_of, "N m or N"
     ),
     "supply": Family(_supply, 6, "depends on the joint's torque and the power of all joints together"),
-    "time": Family(_time, KNOTS, "changes slowly with time"),
-    "ageing": Family(_ageing, 2 * AGEING, "depends on the joint's position and changes slowly with time"),
+    "time": Family(_time, TIME_WAVES, "changes slowly with time"),
+    "ageing": Family(_ageing, 2 * AGEING_WAVES, "depends on the joint's position and changes slowly with time"),
     "start": Family(_start, len(SINCE) - 1, "differs for some time after a standstill of the joint"),
     "ringing": Family(_ringing, 4, "rings at {point} Hz, excited by the motion"),
     "vibration": Family(_vibration, 8, "vibrates at {point} Hz, independent of the motion"),

@@ -15,8 +15,8 @@ from robots.terms.effects import Coefficient, Effect, Situation
 
 Array = NDArray[np.float64]
 
-KNOTS = 5
-FEWEST = 3  # joints
+GAIN_WAVES = 5
+FEWEST_JOINTS_OF_DRIFT = 3  # joints
 
 
 class OverTime(Effect):
@@ -26,8 +26,8 @@ class OverTime(Effect):
     persistence: ClassVar[Persistence] = Persistence.TIME
 
     def joints(self, robot: Robot) -> tuple[int | None, ...]:
-        """Returns the whole robot if it has at least `FEWEST` joints; with fewer, a common change is not distinct."""
-        return (None,) if robot.n >= FEWEST else ()
+        """Returns the whole robot if it has at least three joints; with fewer, a common change is not distinct."""
+        return (None,) if robot.n >= FEWEST_JOINTS_OF_DRIFT else ()
 
 
 class GainDrift(OverTime):
@@ -41,7 +41,7 @@ class GainDrift(OverTime):
 
     def parameters(self, robot: Robot, joint: int | None) -> tuple[Coefficient, ...]:
         """Describes the relative amplitude of each half wave."""
-        return tuple(Coefficient(f"share_{k}", "1") for k in range(1, KNOTS + 1))
+        return tuple(Coefficient(f"share_{k}", "1") for k in range(1, GAIN_WAVES + 1))
 
     def columns(self, situation: Situation, joint: int | None, shape: tuple[float, ...] = ()) -> Array:
         """Evaluates the base model's torque times each half wave (N, n, KNOTS)."""
@@ -65,7 +65,7 @@ class GainDrift(OverTime):
         )
 
 
-def half_waves(x: Array, count: int = KNOTS) -> Array:
+def half_waves(x: Array, count: int = GAIN_WAVES) -> Array:
     """Evaluates the half cosine waves cos(pi k x), k = 1 ... count (N, count), of relative time x (N,) from 0 to 1."""
     return side_by_side([np.cos(np.pi * k * x) for k in range(1, count + 1)])
 

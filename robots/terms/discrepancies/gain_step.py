@@ -14,9 +14,6 @@ from robots.terms.effects import Coefficient, JointEffect, Situation
 
 Array = NDArray[np.float64]
 
-# Largest relative change; larger ones are not caused by an amplifier or sensor.
-MOST = 0.5
-
 
 class GainStep(Sudden, JointEffect):
     """tau_e = e tau_j from the time t_c on.
@@ -29,7 +26,9 @@ class GainStep(Sudden, JointEffect):
 
     def parameters(self, robot: Robot, joint: int | None) -> tuple[Coefficient, ...]:
         """Describes the relative change of the torque."""
-        return (Coefficient("share", "1", -MOST, MOST),)
+        # Largest relative change; larger ones are not caused by an amplifier or sensor.
+        most = 0.5
+        return (Coefficient("share", "1", -most, most),)
 
     def local(self, situation: Situation, joint: int, shape: tuple[float, ...] = ()) -> Array:
         """Evaluates the base model's torque after the change, zero before (N, 1)."""

@@ -13,27 +13,18 @@ from robots.terms.discrepancies.gain_drift import OverTime
 from robots.terms.effect_bases.capabilities import Persistence
 from robots.terms.effect_bases.states import spells
 from robots.terms.effects import Coefficient, JointEffect, Shape, Situation
-from robots.terms.effects.external_contact import HOLD, pulse
+from robots.terms.effects.external_contact import HOLD_HARDNESS, pulse
 
 Array = NDArray[np.float64]
 
 SPELLS = (1.5, 3.0, 6.0, 12.0)
 """Durations [s] of temporary friction in a scan."""
-MOST = 0.4
-"""Longest temporary friction, as a fraction of the data; a longer one is a lasting change."""
 SHARES = (0.05, 0.15, 0.4)
 """Durations of a periodic force in a scan, as fractions of its period."""
-TIMES = 5.0
+FEWEST_FORCE_PERIODS = 5.0
 """Least number of periods in the data."""
-BRIEFEST, SHORTEST = 0.15, 1.5
+BRIEFEST_FORCE, SHORTEST_FORCE_PERIOD = 0.15, 1.5
 """Least duration [s] of a periodic force, and its shortest period [s]."""
-PAUSED = 2.0
-"""Ratio of total to recorded time above which the logs have long pauses."""
-BIN = 0.05
-"""Bin width [s] in which forces are summed before they are folded over a period."""
-LIKE_MOTION, HIGHEST = 0.9, 5.0
-"""Fraction of the motion's power at harmonics of a period above which the motion has that period, and the highest
-frequency [Hz] that counts."""
 
 
 class IntermittentTorque(JointEffect):
@@ -60,7 +51,8 @@ class IntermittentTorque(JointEffect):
     def bounds(self, situation: Situation, joint: int | None) -> tuple[tuple[float, float], ...]:
         """Bounds the start to the data, and the duration to a fraction of it."""
         first, last = float(situation.t[0]), float(situation.t[-1])
-        return (first, last), (self.shapes[1].lower, max(MOST * len(situation) * situation.period, 1.0))
+        # Longest temporary friction, as a fraction of the data; a longer one is a lasting change.
+        return (first, last), (self.shapes[1].lower, max(0.4 * len(situation) * situation.period, 1.0))
 
     def propose(
         self, situation: Situation, joint: int | None, residual: Array, count: int = 8
@@ -81,7 +73,7 @@ class IntermittentTorque(JointEffect):
 
     def local(self, situation: Situation, joint: int, shape: tuple[float, ...] = ()) -> Array:
         """Evaluates the torque per unit of friction (N, 1)."""
-        return np.asarray((pulse(situation.t, (*shape, HOLD)) * situation.sign[:, joint - 1])[:, None])
+        return np.asarray((pulse(situation.t, (*shape, HOLD_HARDNESS)) * situation.sign[:, joint - 1])[:, None])
 
     def describe(
         self,
@@ -130,18 +122,20 @@ class PeriodicTorque(OverTime):
     def bounds(self, situation: Situation, joint: int | None) -> tuple[tuple[float, float], ...]:
         """Bounds the period, the time and the duration of the force."""
         first, last = float(situation.t[0]), float(situation.t[-1])
-        longest = max((last - first) / (TIMES - 1.0), 2 * SHORTEST)
-        return (0.5 * SHORTEST, longest), (first, last), (0.5 * BRIEFEST, 0.6 * longest)
+        longest = max((last - first) / (FEWEST_FORCE_PERIODS - 1.0), 2 * SHORTEST_FORCE_PERIOD)
+        return (0.5 * SHORTEST_FORCE_PERIOD, longest), (first, last), (0.5 * BRIEFEST_FORCE, 0.6 * longest)
 
     def propose(
         self, situation: Situation, joint: int | None, residual: Array, count: int = 8
     ) -> tuple[tuple[float, ...], ...]:
         """Ranks shapes by the force that the residual shows when folded over each period."""
         force = np.einsum("tin,tn->ti", situation.sensitivity("jacobian")[:, :3], residual)
-        bins = ((situation.t - situation.t[0]) / BIN).astype(int)
+        # Bin width [s] in which forces are summed before they are folded over a period.
+        bin_width = 0.05
+        bins = ((situation.t - situation.t[0]) / bin_width).astype(int)
         sums = np.column_stack([np.bincount(bins, weights=column) for column in force.T])
         noise = np.maximum(np.mean(sums**2, axis=0), 1e-300)
-        t = situation.t[0] + (np.arange(len(sums)) + 0.5) * BIN - _middle(situation)
+        t = situation.t[0] + (np.arange(len(sums)) + 0.5) * bin_width - _middle(situation)
         found: list[tuple[float, tuple[float, ...]]] = []
         for share in SHARES:
             parts = int(np.ceil(4 / share))
@@ -164,7 +158,7 @@ class PeriodicTorque(OverTime):
             duration = max(float(situation.t[-1] - situation.t[0]), 1.0)
             if has_long_pauses(situation):
                 return ()
-            shortest, longest = max(SHORTEST, BRIEFEST / share), duration / TIMES
+            shortest, longest = max(SHORTEST_FORCE_PERIOD, BRIEFEST_FORCE / share), duration / FEWEST_FORCE_PERIODS
             # From one period to the next in the list, the last pulse moves by its own duration.
             rates = np.arange(1.0 / longest, 1.0 / shortest, share / duration) if longest > shortest else np.zeros(0)
             return tuple(float(1.0 / rate) for rate in rates if not _with_motion(situation, rate))
@@ -197,7 +191,8 @@ class PeriodicTorque(OverTime):
 
 def has_long_pauses(situation: Situation) -> bool:
     """Returns whether the pauses between the logs are longer than the logs; no phase persists over such pauses."""
-    return float(situation.t[-1] - situation.t[0]) > PAUSED * len(situation) * situation.period
+    # Ratio of total to recorded time above which the logs have long pauses.
+    return float(situation.t[-1] - situation.t[0]) > 2.0 * len(situation) * situation.period
 
 
 def _middle(situation: Situation) -> float:
@@ -209,7 +204,8 @@ def _with_motion(situation: Situation, rate: float) -> bool:
     """Returns whether the motion repeats at a rate [Hz]: most of its power is at harmonics of that rate."""
     f, power, duration = situation.cached("power of the motion", lambda: _power(situation))
     lines = np.abs(f - np.round(f / rate) * rate) <= 1.0 / duration
-    return bool(power[lines].sum() > LIKE_MOTION)
+    # A motion with 90 % of its power at the harmonics of a period has that period.
+    return bool(power[lines].sum() > 0.9)
 
 
 def _power(situation: Situation) -> tuple[Array, Array, float]:
@@ -217,7 +213,8 @@ def _power(situation: Situation) -> tuple[Array, Array, float]:
     rows = len(situation)
     f = np.fft.rfftfreq(rows, max(situation.period, 1e-9))
     power = np.abs(np.fft.rfft(situation.dq - situation.dq.mean(axis=0), axis=0)) ** 2
-    low = f <= HIGHEST
+    # Higher frequencies [Hz] do not count.
+    low = f <= 5.0
     power = (power[low] / np.maximum(power[low].sum(axis=0), 1e-300)).mean(axis=1)
     shares = np.asarray(power / max(float(power.sum()), 1e-300))
     return np.asarray(f[low]), shares, rows * situation.period

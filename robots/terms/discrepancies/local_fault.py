@@ -16,12 +16,6 @@ Array = NDArray[np.float64]
 WIDTHS = (0.015, 0.03, 0.06, 0.12)
 """Widths (standard deviations) in a scan, as fractions of the joint's range; narrower ones are ripple, wider ones a
 spring."""
-APART = 1.5
-"""Distance between centres in a scan, in widths."""
-NARROWEST, WIDEST = 0.004, 0.2
-"""Smallest and largest width, as fractions of the joint's range."""
-BINS = 1000
-"""Number of bins over the joint's range for ranking the grid."""
 
 
 class Placed(JointEffect):
@@ -76,16 +70,18 @@ class LocalFault(Placed):
         low, reach = self.reach(situation, joint)
         if not reach:
             return ()
+        # Distance between centres in a scan, in widths.
         return tuple(
             (float(low + reach * place), share * reach)
             for share in WIDTHS
-            for place in np.arange(0.0, 1.0 + 1e-9, APART * share)
+            for place in np.arange(0.0, 1.0 + 1e-9, 1.5 * share)
         )
 
     def bounds(self, situation: Situation, joint: int | None) -> tuple[tuple[float, float], ...]:
         """Bounds the centre to the joint's range, and the width to fractions of it."""
         low, reach = self.reach(situation, joint)
-        return (low, low + reach), (NARROWEST * reach, WIDEST * reach)
+        # Smallest and largest width, as fractions of the joint's range.
+        return (low, low + reach), (0.004 * reach, 0.2 * reach)
 
     def propose(
         self, situation: Situation, joint: int | None, residual: Array, count: int = 8
@@ -99,10 +95,12 @@ class LocalFault(Placed):
         own = residual[:, joint - 1]
         q = (situation.q[:, joint - 1] - low) / reach
         turned = own * situation.sign[:, joint - 1] if self.odd else own
-        place = np.minimum((q * BINS).astype(int), BINS - 1)
-        binned = np.bincount(place, weights=turned, minlength=BINS)
-        rows = np.bincount(place, weights=own != 0, minlength=BINS)
-        middles = (np.arange(BINS) + 0.5) / BINS * reach + low
+        # Number of bins over the joint's range for ranking the grid.
+        bins = 1000
+        place = np.minimum((q * bins).astype(int), bins - 1)
+        binned = np.bincount(place, weights=turned, minlength=bins)
+        rows = np.bincount(place, weights=own != 0, minlength=bins)
+        middles = (np.arange(bins) + 0.5) / bins * reach + low
         centres, widths = np.array(grid).T
         spots = np.exp(-0.5 * ((middles - centres[:, None]) / widths[:, None]) ** 2)
         # A constant is part of the joint's offset, so only the deviation from the mean shows.

@@ -17,19 +17,12 @@ from robots.terms.effects.base_tilt import tilted_torque
 Array = NDArray[np.float64]
 
 
-CHANGES = 64
-"""Number of candidate times within the data. Only the best are scanned, because effects on all joints take much
-memory."""
-APART = 2
-"""Number of neighbours of a scanned time that are skipped, because the time is refined."""
-LEAST = 0.02
-"""Least energy of a step's torque in the ranking, as a fraction of its energy over all data."""
-
-
 class Step(Sudden):
     """Base class of effects on all joints from a time t_c on."""
 
-    moments: ClassVar[int] = CHANGES
+    # Number of candidate times within the data. Only the best are scanned, because effects on all joints take much
+    # memory.
+    moments: ClassVar[int] = 64
 
     def propose(
         self, situation: Situation, joint: int | None, residual: Array, count: int = 8
@@ -43,9 +36,11 @@ class Step(Sudden):
         products = np.einsum("tjk,tj->tk", X, residual)
         sums, size = (np.cumsum(x[::-1], axis=0)[::-1] for x in (products, np.einsum("tjk,tjk->tk", seen, seen)))
         rows = np.searchsorted(situation.t, np.ravel(grid))
-        # LEAST bounds the divisor, because the data after the last candidate times are too short for a fit.
-        scores = np.sum(sums[rows] ** 2 / np.maximum(size[rows], LEAST * size[:1] + 1e-300), axis=1)
-        return tuple(grid[i] for i in best_apart(scores, count, APART))
+        # The data after the last candidate times are too short for a fit, so a step's torque counts with 2 % of its
+        # energy over all data at least.
+        scores = np.sum(sums[rows] ** 2 / np.maximum(size[rows], 0.02 * size[:1] + 1e-300), axis=1)
+        # Number of neighbours of a scanned time that are skipped, because the time is refined.
+        return tuple(grid[i] for i in best_apart(scores, count, 2))
 
 
 def _after(columns: Array, situation: Situation, shape: tuple[float, ...]) -> Array:

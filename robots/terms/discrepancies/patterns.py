@@ -30,10 +30,10 @@ PREFIX = "pattern:"
 RINGING = tuple(float(f) for f in np.geomspace(0.5, 8.0, 13))
 # Orders per turn of the joint.
 TURNS = tuple(float(h) for h in (*range(5, 33), 40, 48, 64))
-# Highest frequencies [Hz] of an oscillating torque and of an oscillating friction; above the first are vibrations.
-SLOWEST, RUBBING = 0.6, 2.0
+# Highest frequency [Hz] of an oscillating torque; above are vibrations.
+VIBRATION_FREQUENCY = 0.6
 # Least number of periods of an oscillation in the data; fewer are a drift.
-SWINGS = 5.0
+FEWEST_OSCILLATIONS = 5.0
 SWAYING = ("vibration", "sway")
 # Effects on the whole robot.
 WHOLE: tuple[Effect, ...] = (
@@ -116,9 +116,9 @@ class Pattern(JointEffect):
         if self.kind not in SWAYING:
             return super().grid(situation, joint)
         duration = _duration(situation)
-        bottom, top = SLOWEST, min(0.15 / max(situation.period, 1e-6), 30.0)
+        bottom, top = VIBRATION_FREQUENCY, min(0.15 / max(situation.period, 1e-6), 30.0)
         if self.kind == "sway":
-            bottom, top = SWINGS / duration, self._fastest
+            bottom, top = FEWEST_OSCILLATIONS / duration, self._fastest
         return tuple((float(f),) for f in np.arange(bottom, top, 0.5 / duration))
 
     def bounds(self, situation: Situation, joint: int | None) -> tuple[tuple[float, float], ...]:
@@ -127,9 +127,9 @@ class Pattern(JointEffect):
             ((largest,),) = self.grid(situation, joint)
             return ((largest, largest),)
         if self.kind == "sway":
-            return ((SWINGS / _duration(situation), 2 * self._fastest),)
+            return ((FEWEST_OSCILLATIONS / _duration(situation), 2 * self._fastest),)
         if self.kind == "vibration":
-            return ((0.5 * SLOWEST, min(0.2 / max(situation.period, 1e-6), 50.0)),)
+            return ((0.5 * VIBRATION_FREQUENCY, min(0.2 / max(situation.period, 1e-6), 50.0)),)
         return super().bounds(situation, joint)
 
     def propose(
@@ -155,7 +155,7 @@ class Pattern(JointEffect):
     @property
     def _fastest(self) -> float:
         """Highest frequency [Hz] of an oscillation; friction may oscillate faster, as with each turn of a belt."""
-        return RUBBING if self.odd else SLOWEST
+        return 2.0 if self.odd else VIBRATION_FREQUENCY
 
     def local(self, situation: Situation, joint: int, shape: tuple[float, ...] = ()) -> Array:
         """Evaluates the functions (N, k)."""

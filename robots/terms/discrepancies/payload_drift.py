@@ -13,7 +13,7 @@ from robots.terms.effects import Coefficient, Situation
 
 Array = NDArray[np.float64]
 
-KNOTS = 3
+PAYLOAD_WAVES = 3
 _PARTS = (("mass", "kg"), ("moment_x", "kg m"), ("moment_y", "kg m"), ("moment_z", "kg m"))
 
 
@@ -28,12 +28,12 @@ class PayloadDrift(OverTime):
 
     def parameters(self, robot: Robot, joint: int | None) -> tuple[Coefficient, ...]:
         """Describes mass and first moments for each half wave."""
-        return tuple(Coefficient(f"{part}_{k}", unit) for k in range(1, KNOTS + 1) for part, unit in _PARTS)
+        return tuple(Coefficient(f"{part}_{k}", unit) for k in range(1, PAYLOAD_WAVES + 1) for part, unit in _PARTS)
 
     def columns(self, situation: Situation, joint: int | None, shape: tuple[float, ...] = ()) -> Array:
         """Evaluates the torque per inertial parameter, times each half wave (N, n, 4 KNOTS)."""
         body = situation.sensitivity("tool")[:, :, : len(_PARTS)]
-        times = half_waves(log_time(situation), KNOTS)
+        times = half_waves(log_time(situation), PAYLOAD_WAVES)
         return np.concatenate([body * wave[:, None, None] for wave in times.T], axis=2)
 
     def describe(
@@ -46,7 +46,7 @@ class PayloadDrift(OverTime):
         length: str = "rad",
     ) -> str:
         """Describes the finding in one sentence."""
-        mass = half_waves(np.linspace(0.0, 1.0, 201), KNOTS) @ coefficients[:: len(_PARTS)]
+        mass = half_waves(np.linspace(0.0, 1.0, 201), PAYLOAD_WAVES) @ coefficients[:: len(_PARTS)]
         return (
             f"The residual torque of all joints matches a payload that changes slowly with time, such as a tank that "
             f"empties: by {float(np.ptp(mass)):.2g} kg over the logs."

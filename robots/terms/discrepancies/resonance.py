@@ -6,12 +6,10 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.signal import lfilter
 
+from robots.terms.effect_bases.parameters import DAMPING_RATIO
 from robots.terms.effects import Situation
 
 Array = NDArray[np.float64]
-
-# Damping ratio. A factor of about two in it hardly matters, because the two outputs can combine to another damping.
-DAMPING = 0.05
 
 
 def resonance(situation: Situation, drive: Array, frequency: float) -> tuple[Array, Array]:
@@ -28,7 +26,8 @@ def resonance(situation: Situation, drive: Array, frequency: float) -> tuple[Arr
     omega = 2 * np.pi * frequency
     k = 2 / max(situation.period, 1e-9)
     den = np.array([k**2, -2 * k**2, k**2]) + omega**2 * np.array([1.0, 2.0, 1.0])
-    den += 2 * DAMPING * omega * k * np.array([1.0, 0.0, -1.0])
+    # A factor of about two in the damping hardly matters, because the two outputs can combine to another damping.
+    den += 2 * DAMPING_RATIO * omega * k * np.array([1.0, 0.0, -1.0])
     place, rate = np.zeros_like(drive), np.zeros_like(drive)
     for run in situation.runs:
         place[run] = lfilter(omega**2 * np.array([1.0, 2.0, 1.0]), den, drive[run], axis=0)

@@ -16,7 +16,7 @@ from robots.terms.effects import Coefficient, Situation
 
 Array = NDArray[np.float64]
 
-SESSIONS = 6
+MOST_SESSIONS = 6
 """Largest number of separate sessions; if there are more, consecutive ones are grouped."""
 
 
@@ -37,7 +37,7 @@ class SessionFriction(OverTime):
         """Describes the relative change of friction in each session after the first, per joint."""
         return tuple(
             Coefficient(f"share_{k}_of_joint_{j}", "1", -1.0, 10.0)
-            for k in range(2, SESSIONS + 1)
+            for k in range(2, MOST_SESSIONS + 1)
             for j in range(1, robot.n + 1)
         )
 
@@ -48,7 +48,7 @@ class SessionFriction(OverTime):
     def columns(self, situation: Situation, joint: int | None, shape: tuple[float, ...] = ()) -> Array:
         """Evaluates the base model's friction in each session after the first (N, n, (SESSIONS - 1) n)."""
         n = situation.robot.n
-        X = np.zeros((len(situation), n, SESSIONS - 1, n))
+        X = np.zeros((len(situation), n, MOST_SESSIONS - 1, n))
         for k, rows in enumerate(_sessions(situation)[1:]):
             for j in range(n):
                 X[rows, j, k, j] = situation.friction[rows, j]
@@ -64,7 +64,7 @@ class SessionFriction(OverTime):
         length: str = "rad",
     ) -> str:
         """Describes the finding in one sentence."""
-        shares = np.asarray(coefficients).reshape(SESSIONS - 1, -1)
+        shares = np.asarray(coefficients).reshape(MOST_SESSIONS - 1, -1)
         k, j = np.unravel_index(int(np.argmax(np.abs(shares))), shares.shape)
         most, way = shares[k, j], "more" if shares[k, j] > 0 else "less"
         return (
@@ -82,6 +82,6 @@ def _sessions(situation: Situation) -> list[slice]:
     """
     t, runs, least = situation.t, situation.runs, UNKNOWN_PAUSE - situation.period
     begins = [0, *(b.start for a, b in pairwise(runs) if t[b.start] - t[a.stop - 1] > least)]
-    bunches = np.array_split(np.arange(len(begins)), min(len(begins), SESSIONS))
+    bunches = np.array_split(np.arange(len(begins)), min(len(begins), MOST_SESSIONS))
     starts = [begins[int(bunch[0])] for bunch in bunches]
     return [slice(a, b) for a, b in pairwise((*starts, len(situation)))]

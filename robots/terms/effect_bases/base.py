@@ -21,8 +21,6 @@ if TYPE_CHECKING:
     from robots.robot import Robot
 
 Array = NDArray[np.float64]
-STOPPED = 0.02
-"""Relative distance from a limit within which a value counts as at the limit."""
 
 
 class Effect(ABC):
@@ -126,8 +124,9 @@ class Effect(ABC):
         limits = [(c.lower, c.upper) for c in described]
         if any(abs(value) < c.least for value, c in zip(coefficients, described, strict=True)):
             return False
+        # Relative distance from a limit within which a value counts as at the limit.
         return not any(
-            limit and np.isclose(value, limit, rtol=STOPPED)
+            limit and np.isclose(value, limit, rtol=0.02)
             for value, pair in zip(coefficients, limits, strict=True)
             for limit in pair
         )

@@ -16,11 +16,7 @@ Array = NDArray[np.float64]
 # Coordinates [m] of the centres of mass at which a search starts, about the flange. Finer ones change no result.
 _COORDINATES = (-0.4, -0.15, -0.05, 0.0, 0.05, 0.15, 0.4)
 # Length [m] that makes kg, kg m and kg m2 comparable: the size of a tool.
-LENGTH = 0.1
-# Information added in all directions, as a share of the largest: a direction that the data do not contain stays small.
-FAINT = 1e-12
-# Gauss-Newton steps of a centre of mass, their smallest gain (of chi-square, or as a share), and halvings of a step.
-STEPS, SMALLEST_GAIN, HALVINGS = 30, 1e-6, 8
+TOOL_LENGTH = 0.1
 
 
 def _point_masses(centres: Array) -> Array:
@@ -32,7 +28,7 @@ def _point_masses(centres: Array) -> Array:
 _CENTRES = np.array(list(product(_COORDINATES, repeat=3)))
 _UNITS = _point_masses(_CENTRES)
 # Factors that turn the parameters into kg.
-_UNIT = LENGTH ** -np.array([0.0, 1, 1, 1, 2, 2, 2, 2, 2, 2])
+_UNIT = TOOL_LENGTH ** -np.array([0.0, 1, 1, 1, 2, 2, 2, 2, 2, 2])
 _UPPER = tuple((i, j) for j in range(4) for i in range(j + 1))
 _CONE = sparse.csc_matrix([[-BASIS[k][i, j] * (1.0 if i == j else np.sqrt(2.0)) for k in range(10)] for i, j in _UPPER])
 _KIND = [clarabel.PSDTriangleConeT(4)]
@@ -65,11 +61,12 @@ def _refined(matrix: Array, target: Array, parameters: Array) -> Array:
     """Moves a point mass (10,) by Gauss-Newton steps until they gain little."""
     left = target - matrix @ parameters
     cost = float(left @ left)
-    for _ in range(STEPS):
+    # Gauss-Newton steps of a centre of mass.
+    for _ in range(30):
         if not parameters[0]:
             break
         step = np.linalg.lstsq(matrix @ point_mass_tangent(parameters), left, rcond=None)[0]
-        for halving in range(HALVINGS):
+        for halving in range(8):
             share = 0.5**halving
             centre = parameters[1:4] / parameters[0] + share * step[1:]
             trial = (parameters[0] + share * step[0]) * _point_masses(centre[None])[0]
@@ -79,7 +76,8 @@ def _refined(matrix: Array, target: Array, parameters: Array) -> Array:
         else:
             break
         gained, parameters, left, cost = cost - reached, trial, remaining, reached
-        if gained < SMALLEST_GAIN * (1.0 + cost):
+        # They end when the gain in chi-square, or its share, is below 1e-6.
+        if gained < 1e-6 * (1.0 + cost):
             break
     return parameters
 
@@ -98,7 +96,8 @@ def nearest_body(matrix: Array, target: Array) -> Array:
     """
     scaled = matrix / _UNIT
     gram = scaled.T @ scaled
-    gram += FAINT * max(float(np.trace(gram)), np.finfo(float).tiny) * np.eye(len(gram))
+    # Added in all directions: one that the data do not contain stays small.
+    gram += 1e-12 * max(float(np.trace(gram)), np.finfo(float).tiny) * np.eye(len(gram))
     cross = scaled.T @ target
     fits = [_solve(gram, sign * cross) * sign for sign in (1.0, -1.0)]
     return np.asarray(min(fits, key=lambda x: float(x @ gram @ x - 2.0 * x @ cross)) / _UNIT)
@@ -148,7 +147,7 @@ def point_mass_rows(parameters: Array) -> Array:
         parameters: (10,) of a point mass that is not zero.
     """
     mass, centre = parameters[0], parameters[1:4] / parameters[0]
-    size = abs(mass) * max(float(centre @ centre), LENGTH**2) / 3.0
+    size = abs(mass) * max(float(centre @ centre), TOOL_LENGTH**2) / 3.0
     own = np.vstack([np.zeros((4, 6)), size * np.eye(6)])
     return np.asarray(np.linalg.inv(np.hstack([point_mass_tangent(parameters), own]))[4:])
 

@@ -12,7 +12,6 @@ from robots.terms.effect_bases.base import Effect
 from robots.terms.effect_bases.experiments import EXPERIMENTS
 from robots.terms.situations.situation import situation
 
-SAMPLES, PERIOD = 200, 0.01
 _complete = subclass_check(Effect)
 
 
@@ -66,7 +65,8 @@ def _check(effect: Effect, robot: Robot) -> None:
                 f"the effect {effect.name!r} has a parameter {parameter[0]!r} without a unit",
                 allowed="a name and a unit each; the unit 1 for a pure number",
             )
-    t = PERIOD * np.arange(SAMPLES)
+    count = 200
+    t = 0.01 * np.arange(count)
     phase = 2 * np.pi * (0.5 * t[:, None] + np.arange(robot.n) / robot.n)
     model = default_model(robot, velocity_scale=0.01)
     values = np.where(np.isfinite(model.nominal), model.nominal, 0.1)
@@ -74,7 +74,7 @@ def _check(effect: Effect, robot: Robot) -> None:
     state = situation(model, values, t, 0.1 * np.sin(phase), 0.3 * np.cos(phase), -np.sin(phase))
     for shape in effect.grid(state, joint)[:1]:
         columns = np.asarray(effect.columns(state, joint, shape))
-        expected = (SAMPLES, robot.n, len(described))
+        expected = (count, robot.n, len(described))
         if columns.shape != expected:
             raise InputError(
                 f"the effect {effect.name!r} gives columns of shape {columns.shape}",

@@ -15,8 +15,6 @@ if TYPE_CHECKING:
     from robots.robot import Robot
 
 Array = NDArray[np.float64]
-LEAST = 1.01
-"""Factor on the shortest time constant below which a fitted one counts as at its bound: it does not describe heat."""
 
 
 class HeatEffect(JointEffect):
@@ -31,7 +29,9 @@ class HeatEffect(JointEffect):
 
     def is_plausible(self, robot: Robot, joint: Place, coefficients: Array, shape: tuple[float, ...] = ()) -> bool:
         """Rejects time constants at the lower bound, and friction that rises with heat if `falls` is set."""
-        slow = not shape or shape[0] > LEAST * self.shapes[0].lower
+        # Factor on the shortest time constant below which a fitted one counts as at its bound: it does not describe
+        # heat.
+        slow = not shape or shape[0] > 1.01 * self.shapes[0].lower
         warmer = self.falls and rises(robot, joint, coefficients)
         return slow and not warmer and super().is_plausible(robot, joint, coefficients)
 

@@ -25,6 +25,9 @@ STRAIGHT = {
 }
 """Unit of a shape parameter on a linear axis, by its unit on a revolute joint."""
 
+DAMPING_RATIO = 0.05
+"""Damping ratio of a resonance, unless the data show another one."""
+
 
 @dataclass(frozen=True)
 class Shape:

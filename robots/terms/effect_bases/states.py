@@ -13,12 +13,8 @@ from robots.terms.situations.situation import Situation
 
 Array = NDArray[np.float64]
 
-CHANGES = 24
+SCANNED_CHANGES = 24
 """Number of change times in a scan: a step between two of them loses at most a tenth of its energy."""
-
-
-STRAINED = 0.01
-"""Fraction of a joint's largest speed above which a log starts in motion, with fully developed friction."""
 
 
 def relaxation(situation: Situation, source: Array, time_constant: float) -> Array:
@@ -93,7 +89,8 @@ def _bristle(t: Array, q: Array, dq: Array, length: float) -> Array:
     directions = way[np.concatenate([[0], turns + 1])]
     decays = np.exp(-np.abs(np.diff(places)) / length)
     starts = np.empty(len(places))
-    z = float(directions[0]) if abs(dq[0]) > STRAINED * np.abs(dq).max() else 0.0
+    # Fraction of a joint's largest speed above which a log starts in motion, with fully developed friction.
+    z = float(directions[0]) if abs(dq[0]) > 0.01 * np.abs(dq).max() else 0.0
     for k, (direction, decay) in enumerate(zip(directions.tolist(), [*decays.tolist(), 1.0], strict=True)):
         starts[k] = z
         z = direction + (z - direction) * decay
@@ -101,7 +98,7 @@ def _bristle(t: Array, q: Array, dq: Array, length: float) -> Array:
     return directions[leg] + (starts - directions)[leg] * np.exp(-np.abs(q - places[leg]) / length)
 
 
-def change_times(situation: Situation, count: int = CHANGES) -> tuple[float, ...]:
+def change_times(situation: Situation, count: int = SCANNED_CHANGES) -> tuple[float, ...]:
     """Returns candidate times [s] of a change: `count` evenly spaced samples, and the start of each further log."""
     N = len(situation)
     inside = {int(N * (k + 0.5) / count) for k in range(count)} if 4 * count < N else set()

@@ -21,9 +21,6 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
-NEWTON, LEAST_SLOPE = 20, 0.1
-"""Number of Newton steps to invert a distorted reading, and the least slope of reading over torque in each step."""
-
 
 class Instant(NamedTuple):
     """Symbolic inputs of a static effect.
@@ -128,11 +125,12 @@ class StaticJointEffect(StaticEffect, JointEffect):
             The base model's torque (N,) for which torque plus effect equals the reading [N m or N].
         """
         torque = situation.torque.copy()
-        for _ in range(NEWTON):
+        # Newton steps; the slope of the reading over the torque stays above a tenth.
+        for _ in range(20):
             now = replace(situation, torque=torque, _cache={})
             off = torque[:, joint - 1] + self.local(now, joint, shape) @ coefficients - reading
             slope = 1.0 + self.slopes(now, joint, coefficients, shape)[:, 0]
-            torque[:, joint - 1] -= off / np.maximum(slope, LEAST_SLOPE)
+            torque[:, joint - 1] -= off / np.maximum(slope, 0.1)
         return torque[:, joint - 1]
 
     columns = JointEffect.columns

@@ -6,7 +6,7 @@ from typing import ClassVar
 
 from robots.terms.effect_bases.base import Effect, Place, Shape, Situation
 from robots.terms.effect_bases.capabilities import Persistence
-from robots.terms.effect_bases.states import CHANGES, change_times
+from robots.terms.effect_bases.states import SCANNED_CHANGES, change_times
 
 
 class Sudden(Effect):
@@ -16,7 +16,7 @@ class Sudden(Effect):
         moments: number of times within the data in a scan; the start of each further log is added.
     """
 
-    moments: ClassVar[int] = CHANGES
+    moments: ClassVar[int] = SCANNED_CHANGES
     persistence: ClassVar[Persistence] = Persistence.TIME
     shapes: ClassVar[tuple[Shape, ...]] = (
         Shape("change_time", "s", -float("inf"), float("inf"), "linear", inexact=0.02),

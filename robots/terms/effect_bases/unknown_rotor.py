@@ -13,14 +13,10 @@ from robots.terms.effect_bases.base import Shape, Situation
 
 Array = NDArray[np.float64]
 
-KNOWN = 0.0
+KNOWN_ROTOR = 0.0
 """Additional rotor inertia of a known rotor: none."""
-ROTOR = Shape("rotor_inertia", "kg m2", -np.inf, np.inf, "linear", (KNOWN,), default=KNOWN)
+ROTOR = Shape("rotor_inertia", "kg m2", -np.inf, np.inf, "linear", (KNOWN_ROTOR,), default=KNOWN_ROTOR)
 """Rotor inertia in addition to the one that is fitted or described [kg m2 or kg]."""
-DATASHEET = 0.3
-"""Relative error of a described rotor inertia: datasheets often leave out brakes, couplings and gear shafts."""
-LOOKS = 9
-"""Number of rotor inertias in `rotors_between`."""
 
 
 def unknown_rotor(situation: Situation, joint: int) -> float:
@@ -36,21 +32,22 @@ def rotor_bounds(situation: Situation, joint: int) -> tuple[float, float]:
     """
     described = float(situation.rotors[1, joint - 1])
     if described:
-        within = DATASHEET * described
+        # Relative error of a described rotor inertia: datasheets often leave out brakes, couplings and gear shafts.
+        within = 0.3 * described
         return -within, max(min(within, _least_inertia(situation, joint) - described), 0.0)
-    return KNOWN, unknown_rotor(situation, joint)
+    return KNOWN_ROTOR, unknown_rotor(situation, joint)
 
 
 def rotor_grid(situation: Situation, joint: int) -> tuple[float, ...]:
     """Lists the additional rotor inertias of a scan: zero, and half of the largest one if the rotor is unknown."""
     most = unknown_rotor(situation, joint)
-    return (KNOWN, 0.5 * most) if most else (KNOWN,)
+    return (KNOWN_ROTOR, 0.5 * most) if most else (KNOWN_ROTOR,)
 
 
 def rotors_between(situation: Situation, joint: int) -> tuple[float, ...]:
     """Lists evenly spaced additional rotor inertias over their range; empty if the rotor is known exactly."""
     low, high = rotor_bounds(situation, joint)
-    return tuple(float(rotor) for rotor in np.linspace(low, high, LOOKS)) if low < high else ()
+    return tuple(float(rotor) for rotor in np.linspace(low, high, 9)) if low < high else ()
 
 
 def is_sure(situation: Situation, joint: int) -> bool:

@@ -15,7 +15,7 @@ from robots.terms.base import force_unit, length_unit
 from robots.terms.effect_bases.base import Coefficient, Effect, Place, Shape, Situation
 from robots.terms.effect_bases.capabilities import AboveBand, AtReversals, GearLoad
 from robots.terms.effect_bases.unknown_rotor import (
-    KNOWN,
+    KNOWN_ROTOR,
     ROTOR,
     is_sure,
     load_beside,
@@ -30,35 +30,15 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
-SLOWEST = 1.0
-"""Longest time [s] in which a link that left a flank is followed until it lands."""
 SCANNED = tuple(0.006 * 1.25**k for k in range(17))
 """Crossing times [s] of a scan, up to 0.2; steps of a quarter, because impacts at wrong times explain nothing."""
 ASIDE = (-0.02, 0.0, 0.02)
 """Loads of a scan at which the link leaves its flank, as fractions of the load's RMS."""
-FARTHEST = 0.1
-"""Largest such fraction: a base model whose zero load is less certain cannot show backlash."""
-BRIEFEST, LANDS = 0.012, 0.02
+LANDING_TIME = 0.02
 """Shortest and default time [s] in which a flank stops the link. The time of an impact is known to some milliseconds,
 so predicting a shorter impact would increase the error."""
-SOFT = 0.03
-"""Landing time [s] of a scan: long, so that crossing times between those of the scan are found, too."""
-SETTLES = 0.05
-"""Time [s] after a landing before the link can leave again: the controller's response to the impact."""
-LEAST, MOST = 1 / 2, 2.0
-"""Factors on the gap from the crossing time. The size of the impacts is known to this factor; the crossing time, which
-grows with the cube root of the gap, is known better."""
-HOVERS = 0.05
+HOVERING_LOAD = 0.05
 """Fraction of its RMS that a load must exceed on the new side to count as a crossing of the scan."""
-
-INEXACT = 0.2
-"""Relative error of the formula, because links rebound differently and drives yield to the impact."""
-CROSSED = 0.1
-"""Relative error of the gap by the crossing times: the motor answers during the crossing."""
-UNEXPLAINED = 0.25
-"""Fraction of the effect that the formula may leave."""
-SMALLEST = 5e-7
-"""Half backlash below which it counts as zero [rad or m]: the roughness of teeth at a radius of 0.1 m."""
 
 
 class Backlash(Effect):
@@ -81,11 +61,12 @@ class Backlash(Effect):
     at_reversals: ClassVar[AtReversals] = AtReversals.IMPACT
     gear_load: ClassVar[GearLoad] = GearLoad.FEELS
     above_band: ClassVar[AboveBand] = AboveBand.COUNTS
+    # The motor answers during the crossing, so that the gap by the crossing times has a relative error of its own.
     shapes: ClassVar[tuple[Shape, ...]] = (
-        Shape("gap_crossed", "rad", 1e-7, 0.2, "log", inexact=CROSSED),
+        Shape("gap_crossed", "rad", 1e-7, 0.2, "log", inexact=0.1),
         Shape("crossed_at", "N m", -np.inf, np.inf, "linear", (0.0,), default=0.0),
         ROTOR,
-        Shape("landing", "s", BRIEFEST, 0.1, "log", (LANDS,), default=LANDS),
+        Shape("landing", "s", 0.012, 0.1, "log", (LANDING_TIME,), default=LANDING_TIME),
     )
     rivals: ClassVar[tuple[str, ...]] = ("joint_elasticity", "presliding_hysteresis", "load_dependent_friction")
     experiments: ClassVar[tuple[str, ...]] = ("payload", "micro_reversals")
@@ -93,12 +74,16 @@ class Backlash(Effect):
     def parameters(self, robot: Robot, joint: Place) -> tuple[Coefficient, ...]:
         """Describes half the backlash."""
         assert joint is not None
-        return (Coefficient("half_play", length_unit(robot, joint - 1), 0.0, 0.05, INEXACT, SMALLEST),)
+        # The formula errs by a fifth, because links rebound differently and drives yield to the impact. A half backlash
+        # below the roughness of teeth at a radius of 0.1 m counts as zero.
+        return (Coefficient("half_play", length_unit(robot, joint - 1), 0.0, 0.05, 0.2, 5e-7),)
 
     def ranges(self, robot: Robot, joint: Place, shape: tuple[float, ...]) -> tuple[tuple[float, float], ...]:
         """Bounds the backlash from the torque's size to within a factor of the gap from the crossing times."""
         ((lower, upper),) = super().ranges(robot, joint, shape)
-        return ((max(lower, LEAST * shape[0] / 2), min(upper, MOST * shape[0] / 2)),)
+        # The size of the impacts is known to a factor of two; the crossing time, which grows with the cube root of the
+        # gap, is known better.
+        return ((max(lower, shape[0] / 4), min(upper, shape[0])),)
 
     def grid(self, situation: Situation, joint: Place) -> tuple[tuple[float, ...], ...]:
         """Lists gaps with crossing times of 6 to 200 ms, at loads near zero; empty if the load hardly changes sign."""
@@ -111,14 +96,17 @@ class Backlash(Effect):
                 continue
             gaps = [time**3 * float(np.median(quickness)) / 6.0 for time in SCANNED]
             able = [gap for gap in gaps if self.shapes[0].lower <= gap <= self.shapes[0].upper]
-            points += [(gap, aside * size, rotor, SOFT) for gap in able for aside in ASIDE]
+            # Landing time [s] of a scan: long, so that crossing times between those of the scan are found, too.
+            points += [(gap, aside * size, rotor, 0.03) for gap in able for aside in ASIDE]
         return tuple(points)
 
     def bounds(self, situation: Situation, joint: Place) -> tuple[tuple[float, float], ...]:
         """Bounds the load at which sides change to values near zero, and the rotor inertia to its known range."""
         assert joint is not None
         gap, *_, landing = self.shapes
-        most = FARTHEST * _size(situation, joint)
+        # Largest load at which the link leaves its flank, as a fraction of the load's RMS: a base model whose zero load
+        # is less certain cannot show backlash.
+        most = 0.1 * _size(situation, joint)
         return (
             (gap.lower, gap.upper),
             (-most, most),
@@ -133,8 +121,8 @@ class Backlash(Effect):
         gap = float(np.clip(2.0 * coefficients[0], self.shapes[0].lower, self.shapes[0].upper))
         # Each parameter has its usual or its refined value; the last combination is the refined shape itself.
         assert joint is not None
-        rotors = (KNOWN,) if is_sure(situation, joint) else (KNOWN, None)
-        either = ((LANDS, None), rotors, (0.0, None), (gap, None))
+        rotors = (KNOWN_ROTOR,) if is_sure(situation, joint) else (KNOWN_ROTOR, None)
+        either = ((LANDING_TIME, None), rotors, (0.0, None), (gap, None))
         return tuple((g, z, r, lands) for lands, r, z, g in product(*either))[:-1]
 
     def other_optima(
@@ -163,7 +151,7 @@ class Backlash(Effect):
 
     def leakage(self, robot: Robot, joint: int, shape: tuple[float, ...] = ()) -> float:
         """Returns a quarter: links rebound differently, and the motor yields to the impact."""
-        return UNEXPLAINED
+        return 0.25
 
     def describe(
         self,
@@ -185,7 +173,9 @@ class Backlash(Effect):
         """Returns the gear's load."""
         assert joint is not None
         unit = force_unit(situation.robot, joint - 1)
-        return f"load of joint {joint} [{unit}]", load_beside(situation, joint, shape[2] if len(shape) > 2 else KNOWN)
+        return f"load of joint {joint} [{unit}]", load_beside(
+            situation, joint, shape[2] if len(shape) > 2 else KNOWN_ROTOR
+        )
 
 
 def _lag(t: Array, pushed: Array) -> Array:
@@ -220,7 +210,8 @@ def _lag(t: Array, pushed: Array) -> Array:
             before, after = pushed[leaves - 1], pushed[leaves]
             share = after / (after - before)
             begins, v0, x0 = (x[leaves] - share * (x[leaves] - x[leaves - 1]) for x in (t, speed, way))
-        last = t.searchsorted(t[leaves] + SLOWEST)
+        # Longest time [s] in which a link that left a flank is followed until it lands.
+        last = t.searchsorted(t[leaves] + 1.0)
         free = side + way[leaves:last] - x0 - v0 * (t[leaves:last] - begins)
         outside = np.abs(free) > 1.0
         first = int(outside.argmax())
@@ -230,7 +221,8 @@ def _lag(t: Array, pushed: Array) -> Array:
         if lands == len(t):
             break
         side = math.copysign(1.0, free[first]) if landed else -side
-        row = settled = max(int(t.searchsorted(t[lands] + SETTLES)), lands + 1)
+        # Time [s] after a landing before the link can leave again: the controller's response to the impact.
+        row = settled = max(int(t.searchsorted(t[lands] + 0.05)), lands + 1)
         lag[lands:row] = side
     return lag
 
@@ -250,12 +242,12 @@ def _size(situation: Situation, joint: int) -> float:
 def _crossings(situation: Situation, joint: int, at: float, rotor: float) -> tuple[Array, Array, Array]:
     """Finds where the load crosses a value: times [s], the new sign, and its rate over the link's inertia [rad/s3].
 
-    A crossing counts only if the load exceeds `HOVERS` before it returns. A load that stays near zero, as on a
+    A crossing counts only if the load exceeds `HOVERING_LOAD` before it returns. A load that stays near zero, as on a
     joint without gravity load at constant speed, crosses only because of errors of the motion.
     """
     load = load_beside(situation, joint, rotor) - at
     inertia = np.maximum(link_inertia(situation, joint, rotor)[:, joint - 1], 1e-12)
-    beyond = HOVERS * float(np.sqrt(np.mean(load**2))) if len(load) else 0.0
+    beyond = HOVERING_LOAD * float(np.sqrt(np.mean(load**2))) if len(load) else 0.0
     found = []
     for run in situation.runs:
         part = load[run]

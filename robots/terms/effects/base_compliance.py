@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from scipy.linalg import solve_banded
 
 from robots.terms.effect_bases.base import Coefficient, Effect, Place, Shape, Situation
+from robots.terms.effect_bases.parameters import DAMPING_RATIO
 from robots.terms.effects.base_tilt import level_axes, tilted_torque, upright
 
 if TYPE_CHECKING:
@@ -17,17 +18,9 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
-DAMPING = 0.05
-"""Damping ratio of the base's resonances, unless the data show another one."""
 SCANNED = (*(3.5 * 1.1**k for k in range(18)), 30.0, 300.0)
 """Resonances [Hz] of a scan at the log's mean inertia, up to 18 in steps of a tenth: a resonance is narrow."""
-LOWEST, HIGHEST = 2.0, 1000.0
-"""Range of the resonances [Hz]."""
-LIGHTEST = 0.02
-"""Smallest inertia about any axis in any pose, as a fraction of the largest."""
-SOFTEST, FARTHEST = 1e-3, 0.3
-"""Largest compliance [rad/(N m)], and largest tilt by the first link's own moments [rad]."""
-INEXACT = 0.07
+COMPLIANCE_ERROR = 0.07
 """Relative error of compliance and stiffness in addition to that of the data: the base rotates about a point other than
 its origin."""
 
@@ -47,10 +40,10 @@ class BaseCompliance(Effect):
     title: ClassVar[str] = "compliant base"
     whole_robot: ClassVar[bool] = True
     shapes: ClassVar[tuple[Shape, ...]] = (
-        Shape("dynamic_stiffness_1", "N m/rad", 1e-6, 1e12, "log", inexact=INEXACT),
-        Shape("dynamic_stiffness_2", "N m/rad", 1e-6, 1e12, "log", inexact=INEXACT),
+        Shape("dynamic_stiffness_1", "N m/rad", 1e-6, 1e12, "log", inexact=COMPLIANCE_ERROR),
+        Shape("dynamic_stiffness_2", "N m/rad", 1e-6, 1e12, "log", inexact=COMPLIANCE_ERROR),
         Shape("own_inertia", "kg m2", 0.0, np.inf, "linear", (0.0,), default=0.0, beside=True),
-        Shape("damping_ratio", "", 1e-3, 0.5, "log", (DAMPING,), default=DAMPING, beside=True),
+        Shape("damping_ratio", "", 1e-3, 0.5, "log", (DAMPING_RATIO,), default=DAMPING_RATIO, beside=True),
     )
     rivals: ClassVar[tuple[str, ...]] = ("joint_elasticity", "base_tilt", "spring")
     experiments: ClassVar[tuple[str, ...]] = ("multisine", "static_hold", "payload")
@@ -58,12 +51,15 @@ class BaseCompliance(Effect):
     def parameters(self, robot: Robot, joint: Place) -> tuple[Coefficient, ...]:
         """Describes the compliances about both horizontal axes, their coupling, and the first link's tilt."""
         unit = "rad/(N m)"
+        # Largest compliance [rad/(N m)], and largest tilt by the first link's own moments [rad].
+        softest = 1e-3
         compliances = (
-            Coefficient("compliance_1", unit, 0.0, SOFTEST, INEXACT),
-            Coefficient("compliance_2", unit, 0.0, SOFTEST, INEXACT),
-            Coefficient("compliance_12", unit, -SOFTEST, SOFTEST, INEXACT),
+            Coefficient("compliance_1", unit, 0.0, softest, COMPLIANCE_ERROR),
+            Coefficient("compliance_2", unit, 0.0, softest, COMPLIANCE_ERROR),
+            Coefficient("compliance_12", unit, -softest, softest, COMPLIANCE_ERROR),
         )
-        own = tuple(Coefficient(f"own_{axis}", "rad", -FARTHEST, FARTHEST) for axis in ("1", "2"))
+        farthest = 0.3
+        own = tuple(Coefficient(f"own_{axis}", "rad", -farthest, farthest) for axis in ("1", "2"))
         return (*compliances, *own) if upright(robot) else compliances
 
     def joints(self, robot: Robot) -> tuple[Place, ...]:
@@ -73,7 +69,7 @@ class BaseCompliance(Effect):
     def grid(self, situation: Situation, joint: Place) -> tuple[tuple[float, ...], ...]:
         """Lists stiffnesses for all pairs of the resonances in `SCANNED`."""
         pairs = [_stiffness(situation, f) for f in SCANNED]
-        return tuple((one[0], other[1], 0.0, DAMPING) for one, other in product(pairs, pairs))
+        return tuple((one[0], other[1], 0.0, DAMPING_RATIO) for one, other in product(pairs, pairs))
 
     def propose(
         self, situation: Situation, joint: Place, residual: Array, count: int = 8
@@ -82,16 +78,17 @@ class BaseCompliance(Effect):
         pairs = [_stiffness(situation, f) for f in SCANNED]
         shown = []
         for pair in pairs:
-            X = _torque(situation, _static(situation)[:, :, :2], (*pair, 0.0, DAMPING))
+            X = _torque(situation, _static(situation)[:, :, :2], (*pair, 0.0, DAMPING_RATIO))
             explained = np.einsum("njk,nj->k", X, residual)
             shown.append(np.maximum(explained, 0.0) ** 2 / np.maximum(np.einsum("njk,njk->k", X, X), 1e-300))
         score = np.array(shown)  # (resonances, 2)
         best = sorted(product(range(len(pairs)), repeat=2), key=lambda at: -(score[at[0], 0] + score[at[1], 1]))
-        return tuple((pairs[one][0], pairs[other][1], 0.0, DAMPING) for one, other in best[:count])
+        return tuple((pairs[one][0], pairs[other][1], 0.0, DAMPING_RATIO) for one, other in best[:count])
 
     def bounds(self, situation: Situation, joint: Place) -> tuple[tuple[float, float], ...]:
         """Bounds the stiffness to usual resonances, and the base's own inertia to the robot's."""
-        pairs = zip(_stiffness(situation, LOWEST), _stiffness(situation, HIGHEST), strict=True)
+        # Resonances from 2 to 1000 Hz.
+        pairs = zip(_stiffness(situation, 2.0), _stiffness(situation, 1000.0), strict=True)
         damping = self.shapes[3]
         return (*pairs, (0.0, float(_inertia(situation).mean(axis=0).max())), (damping.lower, damping.upper))
 
@@ -106,7 +103,7 @@ class BaseCompliance(Effect):
             inverse = np.array([second, first]) / (first * second - both**2)
             ideal = [float(np.clip(value, *bound)) for value, bound in zip(inverse, ranges, strict=True)]
             stiffness = ((ideal[0], ideal[1]), (None, None))
-        combinations = product(stiffness, (0.0, None), (DAMPING, None))
+        combinations = product(stiffness, (0.0, None), (DAMPING_RATIO, None))
         return tuple((*pair, own, damping) for pair, own, damping in combinations)[:-1]
 
     def is_plausible(self, robot: Robot, joint: Place, coefficients: Array, shape: tuple[float, ...] = ()) -> bool:
@@ -176,7 +173,8 @@ def _inertia(situation: Situation) -> Array:
     def positive() -> Array:
         own = _axes(situation) @ situation.sensitivity("base_inertia") @ _axes(situation).T
         values, vectors = np.linalg.eigh((own + own.transpose(0, 2, 1)) / 2)
-        least = LIGHTEST * max(float(values.max(initial=0.0)), 1e-9)
+        # Smallest inertia about any axis in any pose, as a fraction of the largest.
+        least = 0.02 * max(float(values.max(initial=0.0)), 1e-9)
         return np.asarray((vectors * np.maximum(values, least)[:, None]) @ vectors.transpose(0, 2, 1))
 
     return situation.cached("inertia about the base", positive)

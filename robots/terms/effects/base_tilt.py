@@ -15,13 +15,8 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
-
 # First moments [kg m] of all that rotates about a vertical first axis, along the horizontal axes at zero joint angle.
 OWN = tuple(Shape(f"own_moment_{k}", "kg m", -np.inf, np.inf, "linear", (0.0,), default=0.0, beside=True) for k in "12")
-# Their bound, as a multiple of the largest first moment that the other joints show for the same arm.
-LARGEST = 1.0
-# Start of their search, as a fraction of that bound.
-NEAR = 0.01
 
 
 class BaseTilt(Effect):
@@ -66,7 +61,9 @@ class BaseTilt(Effect):
     def complete(self, situation: Situation, joint: Place, shape: tuple[float, ...]) -> tuple[float, ...]:
         """Adds start values of the first axis' moments if they are possible; without them the angles are biased."""
         most = _largest(situation)
-        return shape if any(shape) or not most else (NEAR * most, NEAR * most)
+        # Start of the search for the own moments, as a fraction of their bound.
+        near = 0.01
+        return shape if any(shape) or not most else (near * most, near * most)
 
     def columns(self, situation: Situation, joint: Place, shape: tuple[float, ...] = ()) -> Array:
         """Evaluates the torque of all joints per angle (N, n, 2)."""
@@ -120,7 +117,7 @@ def _largest(situation: Situation) -> float:
     def shown() -> float:
         return float(np.linalg.norm(situation.sensitivity("gravity"), axis=2).max())
 
-    return LARGEST * situation.cached("largest first moment", shown)
+    return situation.cached("largest first moment", shown)
 
 
 def tilted_torque(situation: Situation) -> Array:

@@ -41,7 +41,7 @@ class CurrentClipping(JointEffect):
 
     def ranges(self, robot: Robot, joint: Place, shape: tuple[float, ...]) -> tuple[tuple[float, float], ...]:
         """Bounds the fraction that is lost; a smaller loss has another cause, such as saturation."""
-        return ((LEAST, 1.0),)
+        return ((LEAST_REMOVED_SHARE, 1.0),)
 
     def is_plausible(self, robot: Robot, joint: Place, coefficients: Array, shape: tuple[float, ...] = ()) -> bool:
         """Returns whether most of the torque is lost, at a level that a drive of the joint's rating may have.
@@ -49,8 +49,9 @@ class CurrentClipping(JointEffect):
         The upper limit of the share, one, is the expected value.
         """
         rating = 0.0 if joint is None else float(robot.limits.torque[joint - 1])
-        weak = bool(shape) and np.isfinite(rating) and shape[0] < WEAKEST * rating
-        return float(coefficients[0]) > LEAST and not weak
+        # Least level as a share of the joint's rated torque.
+        weak = bool(shape) and np.isfinite(rating) and shape[0] < 0.05 * rating
+        return float(coefficients[0]) > LEAST_REMOVED_SHARE and not weak
 
     def grid(self, situation: Situation, joint: Place) -> tuple[tuple[float, ...], ...]:
         """Lists levels that 0.15 to 40 % of the samples exceed, or the largest torque alone if it is a flat top."""
@@ -74,12 +75,13 @@ class CurrentClipping(JointEffect):
         """Returns the lowest level that the logged torque allows: noise aside, a drive delivers no more than it."""
         if situation.measured is None:
             return 1e-3
-        return max(1e-3, float(np.quantile(np.abs(situation.measured[:, joint - 1]), DELIVERED)) / ABOVE)
+        # Noise may lift 2 % of the logged torques above the level, by a fifth.
+        return max(1e-3, float(np.quantile(np.abs(situation.measured[:, joint - 1]), 0.98)) / 1.2)
 
     def _flat(self, situation: Situation, joint: int) -> float:
         """Returns the log's largest torque if it is a flat top that the modelled torque approaches, else zero."""
         measured = situation.measured
-        if measured is None or self.chance(situation, joint, measured) >= CERTAIN:
+        if measured is None or self.chance(situation, joint, measured) >= FLAT_TOP_CHANCE:
             return 0.0
         return float(np.abs(measured[:, joint - 1]).max())
 
@@ -101,16 +103,19 @@ class CurrentClipping(JointEffect):
         assert joint is not None
         flagged = np.zeros(measured.shape, dtype=bool)
         size = np.abs(measured[:, joint - 1])
-        for start, stop in _stretches(situation, size >= (1.0 - FLAT) * size.max(initial=0.0)):
+        # Relative distance from the largest torque within which a sample is at it.
+        for start, stop in _stretches(situation, size >= (1.0 - 1e-4) * size.max(initial=0.0)):
             flagged[start:stop, joint - 1] = True
-        certain = flagged.sum() >= FLAT_SAMPLES or _accident(situation, joint, measured) < CERTAIN
+        # Number of samples in flat tops above which they count without a test against chance.
+        certain = flagged.sum() >= 30 or _accident(situation, joint, measured) < FLAT_TOP_CHANCE
         return flagged if certain and size.any() else np.zeros_like(flagged)
 
     def chance(self, situation: Situation, joint: Place, measured: Array) -> float:
         """Returns the probability of the log's flat tops by chance; 1 if the modelled torque does not approach them."""
         assert joint is not None
         most, known = (float(np.abs(x[:, joint - 1]).max(initial=0.0)) for x in (measured, situation.whole))
-        return _accident(situation, joint, measured) if known > NEAR * most else 1.0
+        # Fraction of a flat top that the modelled torque must reach.
+        return _accident(situation, joint, measured) if known > 0.9 * most else 1.0
 
     def describe(
         self,
@@ -132,22 +137,10 @@ class CurrentClipping(JointEffect):
         return f"torque of joint {joint} by {name} [{unit}]", situation.whole[:, joint - 1]
 
 
-LEAST = 0.5
+LEAST_REMOVED_SHARE = 0.5
 """Least fraction of the torque beyond the level that a limit removes; the true value is one."""
-WEAKEST = 0.05
-"""Least level as a share of the joint's rated torque."""
-DELIVERED, ABOVE = 0.98, 1.2
-"""Share of the logged torques that noise may not lift above the level by more than this factor."""
-FLAT = 1e-4
-"""Relative distance from the largest torque within which a sample is at it."""
-FLAT_SAMPLES = 30
-"""Number of samples in flat tops above which they count without a test against chance."""
-EQUAL = 1e-6
-"""Difference between two samples, relative to the largest torque, below which they are equal."""
-CERTAIN = 1e-6
+FLAT_TOP_CHANCE = 1e-6
 """Probability below which flat tops are not by chance."""
-NEAR = 0.9
-"""Fraction of a flat top that the modelled torque must reach."""
 
 
 def _stretches(situation: Situation, flags: NDArray[np.bool_]) -> list[tuple[int, int]]:
@@ -174,11 +167,13 @@ def _accident(situation: Situation, joint: int, measured: Array) -> float:
 
     The reference is the frequency of runs of equal values elsewhere. A coarse torque resolution causes many of them.
     """
+    # Difference between two samples, relative to the largest torque, below which they are equal.
+    tie = 1e-6
 
     def evaluate() -> float:
         torque = measured[:, joint - 1]
-        top = np.abs(torque) >= (1.0 - EQUAL) * np.abs(torque).max(initial=0.0)
-        alike = np.abs(np.diff(torque)) <= EQUAL * np.abs(torque).max(initial=0.0)
+        top = np.abs(torque) >= (1.0 - tie) * np.abs(torque).max(initial=0.0)
+        alike = np.abs(np.diff(torque)) <= tie * np.abs(torque).max(initial=0.0)
         still = np.concatenate([[False], alike]) | np.concatenate([alike, [False]])
         others = sum(stop - start for start, stop in _stretches(situation, still & ~top))
         return float(((1.0 + others) / (1.0 + np.sum(~top))) ** len(_stretches(situation, still & top)))

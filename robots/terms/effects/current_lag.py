@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from robots.terms.base import force_unit
 from robots.terms.effect_bases.base import Coefficient, JointEffect, Place, Shape, Situation
-from robots.terms.effects.time_delay import INEXACT, SHIFT, SHORTEST, SMALL, Late, lateness, near
+from robots.terms.effects.time_delay import DELAY_ERROR, LEAST_DELAY, LEAST_SHIFT, SHIFT, Late, lateness, near
 
 if TYPE_CHECKING:
     from robots.robot import Robot
@@ -30,12 +30,12 @@ class CurrentLag(Late, JointEffect):
 
     def parameters(self, robot: Robot, joint: Place) -> tuple[Coefficient, ...]:
         """Describes the lag; a filter's lag is positive, and no drive has more than 50 ms."""
-        return (Coefficient("lag", "s", 0.0, 0.05, INEXACT, SHORTEST),)
+        return (Coefficient("lag", "s", 0.0, 0.05, DELAY_ERROR, LEAST_DELAY),)
 
     def ranges(self, robot: Robot, joint: Place, shape: tuple[float, ...]) -> tuple[tuple[float, float], ...]:
         """Bounds the lag to positive values near that of the reversals."""
         ((low, high),) = near(shape[0])
-        return ((max(low, 0.0), max(high, SMALL)),)
+        return ((max(low, 0.0), max(high, LEAST_SHIFT)),)
 
     def local(self, situation: Situation, joint: int, shape: tuple[float, ...] = ()) -> Array:
         """Evaluates the change of the joint's torque per delay (N, 1) [N m/s]."""

@@ -18,15 +18,12 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
-
-BETWEEN = 0.6  # hardness of a push between a half sine and a constant force
-HOLD = 0.1  # hardness of a nearly constant force
+PUSH_HARDNESS = 0.6  # hardness of a push between a half sine and a constant force
+HOLD_HARDNESS = 0.1  # hardness of a nearly constant force
 # A long push on a moving arm resembles a short one with constant torques while the arm moves least. Longer windows are
 # therefore tried: factors on the duration, and where in the longer window the short one lies.
 LONGER = (1.0, 2.0, 4.0, 8.0)
 FROM = (0.0, 0.5, 1.0)
-ALONE = 0.05  # fraction of the largest joint torque below which another joint counts as unloaded
-NONE = 1e-6  # ratio of force to moment, or the reverse, below which the smaller one counts as zero
 WRENCH = tuple(f"mean_{what}_{k}" for what in ("force", "moment") for k in "xyz")
 # Force F at the point r of a body: F along the base's axes, r along the body's axes.
 PLACED = tuple(f"place_{i}_force_{k}" for i in "xyz" for k in "xyz")
@@ -52,7 +49,7 @@ class ExternalContact(Effect):
     shapes: ClassVar[tuple[Shape, ...]] = (
         Shape("start", "s", -np.inf, np.inf, "linear", inexact=0.03),
         Shape("duration", "s", 0.03, 60.0, "log", (0.2, 0.5, 1.25, 3.2), 0.05),
-        Shape("hardness", "", 0.05, 2.0, "log", (BETWEEN,), 0.1, BETWEEN),
+        Shape("hardness", "", 0.05, 2.0, "log", (PUSH_HARDNESS,), 0.1, PUSH_HARDNESS),
         Shape("on_the_flange", "", 0.0, 1.0, "linear", (0.0,), default=0.0),
         Shape("on_body", "", 0.0, np.inf, "linear", (0.0,), default=0.0),
     )
@@ -82,12 +79,13 @@ class ExternalContact(Effect):
         size = np.abs(coefficients[: robot.n])
         most = int(np.argmax(size))
         pulse_only = not on_the_flange(shape) and not on_body(shape)
-        alone = pulse_only and most >= 2 and bool((size[:most] < ALONE * size[most]).all())
+        # A joint below 5 % of the largest joint torque counts as unloaded.
+        alone = pulse_only and most >= 2 and bool((size[:most] < 0.05 * size[most]).all())
         return not alone and super().is_plausible(robot, joint, coefficients, shape)
 
     def grid(self, situation: Situation, joint: Place) -> tuple[tuple[float, ...], ...]:
         """Lists windows of several durations, with starts half a duration apart."""
-        return tuple((*spell, BETWEEN, 0.0, 0.0) for spell in spells(situation, self.shapes[1].grid))
+        return tuple((*spell, PUSH_HARDNESS, 0.0, 0.0) for spell in spells(situation, self.shapes[1].grid))
 
     def bounds(self, situation: Situation, joint: Place) -> tuple[tuple[float, float], ...]:
         """Bounds the contact to the data."""
@@ -110,7 +108,7 @@ class ExternalContact(Effect):
                 (float(np.clip(start - share * (length - duration), first, last)), length, hard, 1.0, 0.0)
                 for length in dict.fromkeys(lasting)
                 for share in (FROM if length > duration else FROM[:1])
-                for hard in (hardness, HOLD)
+                for hard in (hardness, HOLD_HARDNESS)
             ),
         )
 
@@ -121,14 +119,14 @@ class ExternalContact(Effect):
         """
         start, duration = shape[:2]
         times = ((0, start - duration), (1, start + duration))
-        return tuple((k, (at, duration, HOLD, 0.0, 0.0)) for k, at in times)
+        return tuple((k, (at, duration, HOLD_HARDNESS, 0.0, 0.0)) for k, at in times)
 
     def sustained_shapes(self, situation: Situation, shape: tuple[float, ...]) -> tuple[tuple[float, ...], ...]:
         """Lists constant forces at a point of each body, over all data."""
         if on_body(shape):
             return ()
         first, last = float(situation.t[0]), float(situation.t[-1])
-        ever = (2 * first - last - 1.0, 3 * (last - first + 1.0), HOLD)
+        ever = (2 * first - last - 1.0, 3 * (last - first + 1.0), HOLD_HARDNESS)
         return tuple((*ever, 0.0, float(body + 1)) for body in range(situation.robot.n))
 
     def columns(self, situation: Situation, joint: Place, shape: tuple[float, ...] = ()) -> Array:
@@ -192,7 +190,8 @@ class ExternalContact(Effect):
             # A component that causes no joint torque is zero up to rounding.
             push, turn = (float(np.linalg.norm(part)) for part in (coefficients[:3], coefficients[3:6]))
             sizes = (("force", push, "N"), ("moment", turn, "N m"))
-            least = NONE * max(push, turn)
+            # A force below a millionth of the moment counts as none, and the reverse.
+            least = 1e-6 * max(push, turn)
             parts = [f"a {word} of {size:.3g} {unit}" for word, size, unit in sizes if size > least]
             return (
                 f"Something pushed the flange {when}, with {' and '.join(parts)}, constant (mean values, along the "
@@ -253,9 +252,9 @@ def pulse(t: Array, shape: tuple[float, ...]) -> Array:
 
     Args:
         t: time (N,) [s].
-        shape: start and duration [s], and the hardness h, by default `BETWEEN`.
+        shape: start and duration [s], and the hardness h, by default `PUSH_HARDNESS`.
     """
-    hardness = shape[2] if len(shape) > 2 else BETWEEN
+    hardness = shape[2] if len(shape) > 2 else PUSH_HARDNESS
     s = (t - shape[0]) / shape[1]
     during = (s > 0.0) & (s < 1.0)
     return np.where(during, np.sin(np.pi * np.where(during, s, 0.5)) ** hardness, 0.0)

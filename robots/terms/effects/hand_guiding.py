@@ -16,14 +16,8 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
-# Fraction of the torque below which the weight of a joint is rounding.
-NO_WEIGHT = 1e-9
-# Least fraction of the inertial torque that a guiding hand takes over.
-MOST = 0.5
-# Durations of scanned windows, as fractions of a log, and the shortest [s]; a shorter event is a contact.
-SHARES, SHORTEST = (1 / 2, 1 / 4, 1 / 8, 1 / 16), 2.0
-# Number of windows proposed for the scan; it is small because each has four columns per joint.
-PROPOSED = 3
+# Durations of scanned windows, as fractions of a log.
+SHARES = (1 / 2, 1 / 4, 1 / 8, 1 / 16)
 
 
 class HandGuiding(Effect):
@@ -50,10 +44,11 @@ class HandGuiding(Effect):
         result: list[Coefficient] = []
         for j in range(robot.n):
             force, length = force_unit(robot, j), length_unit(robot, j)
+            # Least fraction of the inertial torque that a guiding hand takes over.
             result += [
                 Coefficient(f"coulomb_by_hand_{j + 1}", force),
                 Coefficient(f"viscous_by_hand_{j + 1}", f"{force} s/{length}"),
-                Coefficient(f"inertia_by_hand_{j + 1}", "1", lower=MOST),
+                Coefficient(f"inertia_by_hand_{j + 1}", "1", lower=0.5),
                 Coefficient(f"weight_by_hand_{j + 1}", "1"),
             ]
         return tuple(result)
@@ -72,7 +67,8 @@ class HandGuiding(Effect):
         self, situation: Situation, joint: Place, residual: Array, count: int = 8
     ) -> tuple[tuple[float, ...], ...]:
         """Ranks windows by the residual's mean square, relative to the median over all windows, summed over joints."""
-        grid, count = self.grid(situation, joint), min(count, PROPOSED)
+        # Number of windows proposed for the scan; it is small because each has four columns per joint.
+        grid, count = self.grid(situation, joint), min(count, 3)
         if len(grid) <= count:
             return grid
         sums = np.concatenate([np.zeros((1, residual.shape[1])), np.cumsum(residual**2, axis=0)])
@@ -96,7 +92,8 @@ class HandGuiding(Effect):
         weight = np.einsum("njk,nk->nj", situation.sensitivity("gravity")[during], situation.gravity[during])
         moving = situation.rigid[during] - weight
         # An axis along gravity carries no weight up to rounding.
-        weight[:, np.abs(weight).max(axis=0, initial=0.0) < NO_WEIGHT * np.abs(moving).max(initial=1e-300)] = 0.0
+        # Fraction of the torque below which the weight of a joint is rounding.
+        weight[:, np.abs(weight).max(axis=0, initial=0.0) < 1e-9 * np.abs(moving).max(initial=1e-300)] = 0.0
         X = np.zeros((len(situation), n, n, 4))
         for j in range(n):
             X[during, j, j, 0] = situation.sign[during, j]
@@ -127,6 +124,7 @@ def _windows(start: float, end: float) -> list[tuple[float, float]]:
     result = []
     for share in SHARES:
         length = share * (end - start)
-        if length >= SHORTEST:
+        # A shorter event [s] is a contact.
+        if length >= 2.0:
             result += [(t, t + length) for t in np.arange(start, end - length + 1e-9, length / 4).tolist()]
     return result

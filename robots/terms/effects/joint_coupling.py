@@ -67,7 +67,8 @@ class JointCoupling(StaticEffect):
         X[inner, 0], X[outer, 0] = at.ddq[outer], at.ddq[inner]
         X[inner, 1], X[outer, 2] = at.dq[outer], at.dq[inner]
         # The sign of a sum does not follow from the two smooth signs, so it has its own smoothing width.
-        X[inner, 3] = casadi.tanh((at.dq[inner] + way * at.dq[outer]) / COULOMB_SCALE)
+        # Velocity [rad/s or m/s] of the smooth sign of the shared Coulomb friction.
+        X[inner, 3] = casadi.tanh((at.dq[inner] + way * at.dq[outer]) / 5e-3)
         X[outer, 3] = way * X[inner, 3]
         return X
 
@@ -98,7 +99,3 @@ class JointCoupling(StaticEffect):
         assert joint is not None
         unit = length_unit(situation.robot, joint - 2)
         return f"velocity of joint {joint - 1} [{unit}/s]", situation.dq[:, joint - 2]
-
-
-COULOMB_SCALE = 5e-3
-"""Velocity [rad/s or m/s] of the smooth sign of the shared Coulomb friction."""

@@ -12,27 +12,18 @@ from scipy.linalg import solve_banded
 from robots.terms.base import force_unit, length_unit
 from robots.terms.effect_bases.base import Coefficient, Effect, Place, Shape, Situation
 from robots.terms.effect_bases.capabilities import AtReversals, GearLoad
-from robots.terms.effect_bases.unknown_rotor import KNOWN, ROTOR, is_sure, load_beside, rotor_bounds, rotor_grid
+from robots.terms.effect_bases.parameters import DAMPING_RATIO
+from robots.terms.effect_bases.unknown_rotor import KNOWN_ROTOR, ROTOR, is_sure, load_beside, rotor_bounds, rotor_grid
 
 if TYPE_CHECKING:
     from robots.robot import Robot
 
 Array = NDArray[np.float64]
 
-DAMPING = 0.05
-"""Damping ratio of the resonance, unless the data show another one."""
-INEXACT = 0.05
-"""Relative error of the dynamic stiffness in addition to that of the data, by errors of inertia and damping."""
-OWN = 0.03
-"""Relative error of the compliance in addition to that of the data: the deflection also biases load and inertia."""
 SCANNED = (3.5, 4.2, 5.0, 6.0, 7.2, 8.6, 10.4, 12.5, 15.0, 18.0, 30.0, 300.0)
 """Resonances [Hz] of a scan at the log's mean inertia; dense where motions excite them, because they are narrow."""
-LIGHTEST = 0.02
-"""Smallest inertia of a joint in any pose, as a fraction of its largest."""
-APART = 5.0
+LARGEST_STIFFNESS_RATIO = 5.0
 """Largest ratio between the dynamic stiffness and the inverse compliance, which are equal for an ideal gear."""
-LOWEST, HIGHEST = 3.0, 1000.0
-"""Range of a gear's resonance [Hz]."""
 
 
 class JointElasticity(Effect):
@@ -49,10 +40,11 @@ class JointElasticity(Effect):
     title: ClassVar[str] = "joint elasticity (compliant gear)"
     at_reversals: ClassVar[AtReversals] = AtReversals.IMPACT
     gear_load: ClassVar[GearLoad] = GearLoad.FEELS
+    # Errors of inertia and damping add to the error of the dynamic stiffness.
     shapes: ClassVar[tuple[Shape, ...]] = (
-        Shape("dynamic_stiffness", "N m/rad", 1e-6, 1e12, "log", inexact=INEXACT),
+        Shape("dynamic_stiffness", "N m/rad", 1e-6, 1e12, "log", inexact=0.05),
         ROTOR,
-        Shape("damping_ratio", "", 1e-3, 0.5, "log", (DAMPING,), default=DAMPING, beside=True),
+        Shape("damping_ratio", "", 1e-3, 0.5, "log", (DAMPING_RATIO,), default=DAMPING_RATIO, beside=True),
     )
     rivals: ClassVar[tuple[str, ...]] = ("backlash", "base_compliance", "time_delay", "current_lag", "encoder_offset")
     experiments: ClassVar[tuple[str, ...]] = ("multisine", "payload")
@@ -61,21 +53,25 @@ class JointElasticity(Effect):
         """Describes the compliance; a gear has at most 0.1 rad per N m."""
         assert joint is not None
         force, length = force_unit(robot, joint - 1), length_unit(robot, joint - 1)
-        return (Coefficient("compliance", f"{length}/({force})", 0.0, 0.1, OWN),)
+        # Relative error of the compliance in addition to that of the data: the deflection also biases load and inertia.
+        return (Coefficient("compliance", f"{length}/({force})", 0.0, 0.1, 0.03),)
 
     def grid(self, situation: Situation, joint: Place) -> tuple[tuple[float, ...], ...]:
         """Lists stiffnesses for the resonances in `SCANNED`, for each rotor inertia of the scan."""
         assert joint is not None
         rotors = rotor_grid(situation, joint)
-        return tuple((_stiffness(situation, joint, f, rotor), rotor, DAMPING) for rotor in rotors for f in SCANNED)
+        return tuple(
+            (_stiffness(situation, joint, f, rotor), rotor, DAMPING_RATIO) for rotor in rotors for f in SCANNED
+        )
 
     def bounds(self, situation: Situation, joint: Place) -> tuple[tuple[float, float], ...]:
         """Bounds the stiffness to resonances of usual gears, and the rotor inertia to its known range."""
         assert joint is not None
         rotor = rotor_bounds(situation, joint)
-        softest = _stiffness(situation, joint, LOWEST, rotor[1])
+        # A gear resonates between 3 and 1000 Hz.
+        softest = _stiffness(situation, joint, 3.0, rotor[1])
         damping = self.shapes[2]
-        return (softest, _stiffness(situation, joint, HIGHEST, rotor[0])), rotor, (damping.lower, damping.upper)
+        return (softest, _stiffness(situation, joint, 1000.0, rotor[0])), rotor, (damping.lower, damping.upper)
 
     def likely(
         self, situation: Situation, joint: Place, shape: tuple[float, ...], coefficients: Array
@@ -85,13 +81,15 @@ class JointElasticity(Effect):
         stiffness: tuple[float | None, ...] = (None,)
         if coefficients[0] > 0:
             stiffness = (float(np.clip(1.0 / coefficients[0], *self.bounds(situation, joint)[0])), None)
-        rotors: tuple[float | None, ...] = (KNOWN,) if is_sure(situation, joint) else (KNOWN, None)
-        return tuple(product(stiffness, rotors, (DAMPING, None)))[:-1]
+        rotors: tuple[float | None, ...] = (KNOWN_ROTOR,) if is_sure(situation, joint) else (KNOWN_ROTOR, None)
+        return tuple(product(stiffness, rotors, (DAMPING_RATIO, None)))[:-1]
 
     def is_plausible(self, robot: Robot, joint: Place, coefficients: Array, shape: tuple[float, ...] = ()) -> bool:
         """Rejects an oscillation whose dynamic stiffness is far from the inverse compliance."""
         ratio = float(coefficients[0]) * shape[0] if shape else 1.0
-        return 1.0 / APART < ratio < APART and super().is_plausible(robot, joint, coefficients, shape)
+        return 1.0 / LARGEST_STIFFNESS_RATIO < ratio < LARGEST_STIFFNESS_RATIO and super().is_plausible(
+            robot, joint, coefficients, shape
+        )
 
     def columns(self, situation: Situation, joint: Place, shape: tuple[float, ...] = ()) -> Array:
         """Evaluates the torque of all joints per compliance of one joint (N, n, 1)."""
@@ -119,13 +117,15 @@ class JointElasticity(Effect):
     def coordinate(self, situation: Situation, joint: Place, shape: tuple[float, ...] = ()) -> tuple[str, Array]:
         """Returns the second derivative of the load."""
         assert joint is not None
-        rotor = shape[1] if len(shape) > 1 else KNOWN
+        rotor = shape[1] if len(shape) > 1 else KNOWN_ROTOR
         curve = situation.derivatives(load_beside(situation, joint, rotor))[1]
         unit = force_unit(situation.robot, joint - 1)
         return f"second derivative of the load of joint {joint} [{unit}/s2]", curve
 
 
-def followed(situation: Situation, load: Array, stiffness: float, inertia: Array, damping: float = DAMPING) -> Array:
+def followed(
+    situation: Situation, load: Array, stiffness: float, inertia: Array, damping: float = DAMPING_RATIO
+) -> Array:
     """Filters a load by the dynamics of a link on an elastic gear.
 
     If the mean resonance is above 0.4 of the Nyquist frequency, the load is returned unchanged.
@@ -160,22 +160,23 @@ def followed(situation: Situation, load: Array, stiffness: float, inertia: Array
     return result
 
 
-def least_inertia(situation: Situation, joint: int, rotor: float = KNOWN) -> Array:
+def least_inertia(situation: Situation, joint: int, rotor: float = KNOWN_ROTOR) -> Array:
     """Returns the link inertia (N,) on a joint's gear, at least a fraction of its largest value.
 
     A wrist's inertia is so small that its fit may be negative, which would make the link unstable.
     """
     j = joint - 1
     own = situation.sensitivity("inertia")[:, j, j] - (situation.rotors[1, j] + rotor)
-    return np.asarray(np.maximum(own, LIGHTEST * max(float(np.abs(own).max(initial=0.0)), 1e-9)))
+    # Smallest inertia of a joint in any pose, as a fraction of its largest.
+    return np.asarray(np.maximum(own, 0.02 * max(float(np.abs(own).max(initial=0.0)), 1e-9)))
 
 
-def _stiffness(situation: Situation, joint: int, resonance: float, rotor: float = KNOWN) -> float:
+def _stiffness(situation: Situation, joint: int, resonance: float, rotor: float = KNOWN_ROTOR) -> float:
     """Computes the stiffness that gives the log's mean inertia a resonance [Hz]."""
     return float((2 * np.pi * resonance) ** 2 * np.mean(least_inertia(situation, joint, rotor)))
 
 
-def link_inertia(situation: Situation, joint: int, rotor: float = KNOWN) -> Array:
+def link_inertia(situation: Situation, joint: int, rotor: float = KNOWN_ROTOR) -> Array:
     """Returns a joint's column of the links' inertia matrix (N, n), without described and additional rotor inertia."""
     column = _column(situation, "inertia", joint).copy(order="K")
     column[:, joint - 1] -= situation.rotors[1, joint - 1] + rotor
@@ -187,7 +188,9 @@ def _column(situation: Situation, kind: str, joint: int) -> Array:
     return situation.cached((kind, joint), lambda: np.asfortranarray(situation.sensitivity(kind)[:, :, joint - 1]))
 
 
-def windup(situation: Situation, joint: int, lag: Array, rate: Array, curve: Array, rotor: float = KNOWN) -> Array:
+def windup(
+    situation: Situation, joint: int, lag: Array, rate: Array, curve: Array, rotor: float = KNOWN_ROTOR
+) -> Array:
     """Computes the torque change of all joints when a link lags its encoder, to first order.
 
     Args:

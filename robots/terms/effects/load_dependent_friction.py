@@ -12,7 +12,7 @@ from robots.terms.base import force_unit, length_unit
 from robots.terms.effect_bases.base import Coefficient, Place, Shape, Situation
 from robots.terms.effect_bases.capabilities import GearLoad
 from robots.terms.effect_bases.static import Instant, StaticJointEffect
-from robots.terms.effect_bases.unknown_rotor import KNOWN, ROTOR, load_beside, rotor_bounds, rotor_grid
+from robots.terms.effect_bases.unknown_rotor import KNOWN_ROTOR, ROTOR, load_beside, rotor_bounds, rotor_grid
 
 if TYPE_CHECKING:
     from robots.robot import Robot
@@ -21,7 +21,7 @@ Array = NDArray[np.float64]
 
 
 # Ratio of friction when the load drives the joint to friction when the joint drives the load, if both are equal.
-ALIKE = 1.0
+EQUAL_FRICTION = 1.0
 
 
 class LoadDependentFriction(StaticJointEffect):
@@ -36,7 +36,7 @@ class LoadDependentFriction(StaticJointEffect):
     title: ClassVar[str] = "load-dependent friction"
     gear_load: ClassVar[GearLoad] = GearLoad.FEELS
     shapes: ClassVar[tuple[Shape, ...]] = (
-        Shape("driven_back", "1", 0.0, 1.0, "linear", (ALIKE,), 0.05, default=ALIKE),
+        Shape("driven_back", "1", 0.0, 1.0, "linear", (EQUAL_FRICTION,), 0.05, default=EQUAL_FRICTION),
         ROTOR,
     )
     rivals: ClassVar[tuple[str, ...]] = (
@@ -57,7 +57,7 @@ class LoadDependentFriction(StaticJointEffect):
     def grid(self, situation: Situation, joint: Place) -> tuple[tuple[float, ...], ...]:
         """Lists a gear with equal friction in both power directions, for each rotor inertia of the scan."""
         assert joint is not None
-        return tuple((ALIKE, rotor) for rotor in rotor_grid(situation, joint))
+        return tuple((EQUAL_FRICTION, rotor) for rotor in rotor_grid(situation, joint))
 
     def bounds(self, situation: Situation, joint: Place) -> tuple[tuple[float, float], ...]:
         """Bounds the rotor inertia to its known range."""
@@ -68,7 +68,7 @@ class LoadDependentFriction(StaticJointEffect):
         self, situation: Situation, joint: Place, shape: tuple[float, ...], coefficients: Array
     ) -> tuple[tuple[float | None, ...], ...]:
         """Lists equal friction in both power directions, the known rotor, and both together."""
-        return (ALIKE, KNOWN), (ALIKE, None), (None, KNOWN)
+        return (EQUAL_FRICTION, KNOWN_ROTOR), (EQUAL_FRICTION, None), (None, KNOWN_ROTOR)
 
     def row(self, robot: Robot, joint: int, at: Instant) -> casadi.SX:
         """Builds w |tau_L| sign(dq) and w |tau_L| dq."""
@@ -89,7 +89,7 @@ class LoadDependentFriction(StaticJointEffect):
         """Describes the values in one sentence."""
         back = (
             ""
-            if not shape or shape[0] == ALIKE
+            if not shape or shape[0] == EQUAL_FRICTION
             else f" When the load drives the joint, the friction is {shape[0]:.2g} times as large."
         )
         change, (coulomb, viscous) = "grows", 100 * coefficients[:2]
@@ -105,7 +105,7 @@ class LoadDependentFriction(StaticJointEffect):
         """Returns the absolute load times the sign of velocity."""
         assert joint is not None
         j = joint - 1
-        back, rotor = shape or (ALIKE, KNOWN)
+        back, rotor = shape or (EQUAL_FRICTION, KNOWN_ROTOR)
         load = load_beside(situation, joint, rotor)
         signed = np.where(load * situation.dq[:, j] > 0, 1.0, back) * np.abs(load) * situation.sign[:, j]
         unit = force_unit(situation.robot, joint - 1)

@@ -21,14 +21,10 @@ Array = NDArray[np.float64]
 PLAIN = (0.0, 0.0, 3.0)
 LINEAR = (0.0, 0.0, 1.0)
 
-
-# Lever ratios and dead centres [rad] of the scan; a joint that moves less than the third value [rad] does not
-# determine them.
-RATIOS, CENTRES, NARROW = (0.35,), tuple(float(x) for x in np.arange(-np.pi, np.pi, np.pi / 4)), 1.0
+# Lever ratios and dead centres [rad] of the scan.
+RATIOS, CENTRES = (0.35,), tuple(float(x) for x in np.arange(-np.pi, np.pi, np.pi / 4))
 # Least length of the shorter lever, as a fraction of the other; below it the spring counts as one without levers.
-SHORTEST = 0.1
-# Ratio above which the levers' ends nearly meet at the dead centre; no spring is as short as their distance there.
-MEETING = 0.8
+SHORTEST_LEVER = 0.1
 LEVER = Shape("lever_ratio", "", 0.0, 0.95, "linear", inexact=0.1, default=0.0)
 CENTRE = Shape("dead_centre", "rad", -1.5 * np.pi, 1.5 * np.pi, "linear", inexact=0.1, default=0.0)
 # Highest power of the deflection in the torque: a spring is linear unless the data require more.
@@ -85,13 +81,16 @@ class Spring(StaticJointEffect):
     def is_plausible(self, robot: Robot, joint: Place, coefficients: Array, shape: tuple[float, ...] = ()) -> bool:
         """Rejects a spring whose ends nearly meet within the joint's limits, which resembles a local fault there."""
         assert joint is not None
-        meets = _has_lever(shape) and shape[0] > MEETING and _passes(robot, joint, shape[1])
+        # Ratio above which the levers' ends nearly meet at the dead centre; no spring is as short as their distance
+        # there.
+        meets = _has_lever(shape) and shape[0] > 0.8 and _passes(robot, joint, shape[1])
         return not meets and super().is_plausible(robot, joint, coefficients, shape)
 
     def grid(self, situation: Situation, joint: Place) -> tuple[tuple[float, ...], ...]:
         """Lists springs without levers, and levers if the joint moves far enough to determine them."""
         assert joint is not None
-        return (LINEAR, PLAIN) if np.ptp(situation.q[:, joint - 1]) < NARROW else self.forms(situation, joint)
+        # A joint that moves by less than 1 rad does not determine levers.
+        return (LINEAR, PLAIN) if np.ptp(situation.q[:, joint - 1]) < 1.0 else self.forms(situation, joint)
 
     def forms(self, situation: Situation, joint: Place) -> tuple[tuple[float, ...], ...]:
         """Lists springs without levers, and for a revolute joint those with levers."""
@@ -123,7 +122,7 @@ class Spring(StaticJointEffect):
         length = casadi.sqrt(1.0 + ratio**2 - 2.0 * ratio * casadi.cos(angle))
         s, rate = (ratio - 2.0 * casadi.cos(angle)) / (length + 1.0), casadi.sin(angle) / length
         lever = casadi.horzcat(s, s**2, 0.0, 1.0) * rate
-        has_lever = ratio >= SHORTEST
+        has_lever = ratio >= SHORTEST_LEVER
         return has_lever * lever + (1.0 - has_lever) * plain
 
     def describe(
@@ -152,7 +151,7 @@ class Spring(StaticJointEffect):
 
 
 def _has_lever(shape: tuple[float, ...]) -> bool:
-    return bool(shape) and shape[0] >= SHORTEST
+    return bool(shape) and shape[0] >= SHORTEST_LEVER
 
 
 def _passes(robot: Robot, joint: int, angle: float) -> bool:

@@ -18,13 +18,8 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
-
-SLOWER = 12.0
+HOUSING_TIME_RATIO = 12.0
 """Time constant of the housing as a multiple of the gear's. It is fixed, because only logs of hours determine it."""
-MIDDLE = 400.0
-"""Time constant [s] of the stored heat that limits `fading`."""
-FADES = 5.0
-"""Largest product of `fading` and that stored heat; the decrease of friction is then saturated."""
 
 
 class ThermalFriction(HeatEffect):
@@ -66,8 +61,10 @@ class ThermalFriction(HeatEffect):
         """Bounds `fading` by the heat stored in these logs."""
         assert joint is not None
         time, weight, _ = super().bounds(situation, joint)
-        most = float(heat(situation, joint, MIDDLE).max(initial=0.0))
-        return time, weight, (0.0, FADES / most if most > 0 else 0.0)
+        # Time constant [s] of the stored heat that limits `fading`.
+        most = float(heat(situation, joint, 400.0).max(initial=0.0))
+        # Largest product of `fading` and that stored heat; the decrease of friction is then saturated.
+        return time, weight, (0.0, 5.0 / most if most > 0 else 0.0)
 
     def forms(self, situation: Situation, joint: Place) -> tuple[tuple[float, ...], ...]:
         """Lists time constants, each with several housing weights."""
@@ -97,7 +94,11 @@ class ThermalFriction(HeatEffect):
 
 def _more(shape: tuple[float, ...]) -> str:
     _, weight, fading = shape
-    slow = f", with a second part, {weight:.2g} times as large and {SLOWER:.0f} times as slow" if weight > 0 else ""
+    slow = (
+        f", with a second part, {weight:.2g} times as large and {HOUSING_TIME_RATIO:.0f} times as slow"
+        if weight > 0
+        else ""
+    )
     return slow + (f"; the effect saturates with exp(-x {fading:.2g}/kJ)" if fading > 0 else "")
 
 
@@ -105,7 +106,7 @@ def _kept(situation: Situation, joint: int, shape: tuple[float, ...]) -> Array:
     time, weight, fading = shape
     x = heat(situation, joint, time)
     if weight > 0:
-        x = x + weight / SLOWER * heat(situation, joint, SLOWER * time)
+        x = x + weight / HOUSING_TIME_RATIO * heat(situation, joint, HOUSING_TIME_RATIO * time)
     return -np.expm1(-fading * x) / fading if fading > 0 else x
 
 

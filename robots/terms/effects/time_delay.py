@@ -18,14 +18,14 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
-SMALL = 1e-5
+LEAST_SHIFT = 1e-5
 """Least step [s] of the difference quotient."""
-SHORTEST = 1e-4
+LEAST_DELAY = 1e-4
 """Delay [s] below which it counts as zero: the time of a reversal within a sample is not known better."""
-APART = 1.6
+DELAY_RATIO = 1.6
 """Largest ratio between the delay and that of the reversals."""
 # A delay also acts above the frequency band of the data, so it is underestimated by some per cent.
-INEXACT = 0.05
+DELAY_ERROR = 0.05
 SHIFT = Shape("reversals_late", "s", -0.02, 0.02, "linear", (-0.003, -0.001, -0.0002, 0.0002, 0.001, 0.003, 0.008))
 
 
@@ -37,7 +37,7 @@ class Late(Effect):
 
     def ties(self, coefficients: Array) -> tuple[tuple[int, int, float], ...]:
         """Ties the delay at reversals to the delay elsewhere: the range of `near` is taken as 95 %."""
-        return ((0, 0, 0.5 * (APART - 1.0 / APART) * float(abs(coefficients[0]))),)
+        return ((0, 0, 0.5 * (DELAY_RATIO - 1.0 / DELAY_RATIO) * float(abs(coefficients[0]))),)
 
     def is_plausible(self, robot: Robot, joint: Place, coefficients: Array, shape: tuple[float, ...] = ()) -> bool:
         """Rejects a delay at the end of the range that the delay at reversals allows."""
@@ -69,7 +69,7 @@ class TimeDelay(Late):
 
     def parameters(self, robot: Robot, joint: Place) -> tuple[Coefficient, ...]:
         """Describes the delay; no sensor has more than 50 ms."""
-        return (Coefficient("delay", "s", -0.05, 0.05, INEXACT, SHORTEST),)
+        return (Coefficient("delay", "s", -0.05, 0.05, DELAY_ERROR, LEAST_DELAY),)
 
     def ranges(self, robot: Robot, joint: Place, shape: tuple[float, ...]) -> tuple[tuple[float, float], ...]:
         """Bounds the delay to values near that of the reversals."""
@@ -108,12 +108,12 @@ def lateness(situation: Situation, shift: float) -> Array:
 
     Args:
         situation: the motion and the base model's torque (N samples).
-        shift: delay of the difference quotient [s]; `SMALL` is used if its size is below that.
+        shift: delay of the difference quotient [s]; `LEAST_SHIFT` is used if its size is below that.
 
     Returns:
         (N, n) [N m/s or N/s].
     """
-    step = shift if abs(shift) > SMALL else SMALL
+    step = shift if abs(shift) > LEAST_SHIFT else LEAST_SHIFT
 
     def evaluate() -> Array:
         smooth = situation.torque - situation.friction
@@ -159,9 +159,9 @@ def _past(situation: Situation, smooth: Array) -> list[tuple[Callable[[Array], A
 
 
 def near(shift: float) -> tuple[tuple[float, float], ...]:
-    """Returns the range [s] of a delay for a given delay at reversals: within a factor of `APART`.
+    """Returns the range [s] of a delay for a given delay at reversals: within a factor of `DELAY_RATIO`.
 
     A difference quotient over a much longer time than the delay would contain the torque's second derivative.
     """
-    low, high = sorted((shift / APART, shift * APART))
-    return ((low - SMALL, high + SMALL),)
+    low, high = sorted((shift / DELAY_RATIO, shift * DELAY_RATIO))
+    return ((low - LEAST_SHIFT, high + LEAST_SHIFT),)

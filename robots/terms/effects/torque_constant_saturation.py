@@ -20,10 +20,6 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 
 
-# Relative error of the formula: it uses a power of the base model's torque, which contains part of the error itself.
-INEXACT = 0.1
-
-
 class TorqueConstantSaturation(StaticJointEffect):
     """tau_e = c tau |tau / tau_r|^p: the logged torque, current times a constant, exceeds the true one.
 
@@ -43,7 +39,9 @@ class TorqueConstantSaturation(StaticJointEffect):
 
     def parameters(self, robot: Robot, joint: Place) -> tuple[Coefficient, ...]:
         """Describes the relative error at the torque tau_r."""
-        return (Coefficient("error", "1", inexact=INEXACT),)
+        # Relative error of the formula: it uses a power of the base model's torque, which contains part of the error
+        # itself.
+        return (Coefficient("error", "1", inexact=0.1),)
 
     def grid(self, situation: Situation, joint: Place) -> tuple[tuple[float, ...], ...]:
         """Lists exponents, with the largest torque of the data as tau_r."""

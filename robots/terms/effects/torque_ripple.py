@@ -20,19 +20,9 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
-SAMPLES_PER_PERIOD = 2.5
-"""Least number of samples in a period of the ripple."""
-WAVES = 2.0
-"""Number of waves over the joint's range below which a ripple resembles gravity or a spring."""
 HIGHEST = {"rad": 1000.0, "m": 10_000.0}
 """Highest order per turn, and highest wave number of a linear axis [rad/m]: four waves per turn of a screw with 3 mm
 lead."""
-LARGEST = 1600
-"""Largest number of orders on the grid: more than a joint resolves over one and a half turns."""
-ABOUT = 201
-"""Number of spectrum points, four per resolution, in the median that gives the local level around an order."""
-APART = 2
-"""Neighbouring grid points, two per resolution, that belong to the spectral line of a proposed order."""
 
 
 class TorqueRipple(StaticJointEffect):
@@ -78,7 +68,8 @@ class TorqueRipple(StaticJointEffect):
         if not top:
             return ()
         low = self._lowest(situation, joint)
-        count = int(min(max((top - low) / spacing, 0), LARGEST))  # orders of a known gear may lie beyond
+        # Largest number of orders on the grid: more than a joint resolves over one and a half turns.
+        count = int(min(max((top - low) / spacing, 0), 1600))  # orders of a known gear may lie beyond
         orders = set((low + spacing * np.arange(count + 1)).tolist())
         orders |= {order for order in _of_gear(situation.robot, joint) if low <= order <= top}
         # Whole orders are more likely, so each replaces the grid points next to it.
@@ -98,7 +89,8 @@ class TorqueRipple(StaticJointEffect):
     def _lowest(self, situation: Situation, joint: int) -> float:
         """Returns the lowest order; with fewer waves over the joint's range a ripple resembles any smooth function."""
         reach = float(np.ptp(situation.q[:, joint - 1]))
-        fewest = 2 * np.pi * WAVES / max(reach, 1e-9)
+        # Number of waves over the joint's range below which a ripple resembles gravity or a spring.
+        fewest = 2 * np.pi * 2.0 / max(reach, 1e-9)
         return float(np.clip(fewest, self.shapes[0].lower, 0.5 * _highest(situation, joint)))
 
     def likely(
@@ -128,7 +120,8 @@ class TorqueRipple(StaticJointEffect):
         if reach < 1e-3 or len(moving) < 20:
             return 0.0, 0.0
         slow = float(np.quantile(moving, 0.1))
-        top = 2 * np.pi / (SAMPLES_PER_PERIOD * situation.period * slow)
+        # Least number of samples in a period of the ripple.
+        top = 2 * np.pi / (2.5 * situation.period * slow)
         return np.pi / reach, float(min(top, _highest(situation, joint)))
 
     def propose(
@@ -145,7 +138,8 @@ class TorqueRipple(StaticJointEffect):
         orders = np.array([order for order, *_ in grid])
         power = angle_spectrum(situation.q[:, joint - 1], residual[:, joint - 1], orders, level=True)
         known = np.flatnonzero(np.isin(orders, _of_gear(situation.robot, joint)))
-        return tuple(grid[i] for i in dict.fromkeys([*best_apart(power, count, APART), *known.tolist()]))
+        # Neighbouring grid points, two per resolution, that belong to the spectral line of a proposed order.
+        return tuple(grid[i] for i in dict.fromkeys([*best_apart(power, count, 2), *known.tolist()]))
 
     def row(self, robot: Robot, joint: int, at: Instant) -> casadi.SX:
         """Builds cos(h p) and sin(h p), alone and times the load or the motor's torque."""
@@ -209,5 +203,6 @@ def angle_spectrum(q: Array, values: Array, orders: Array, *, level: bool = Fals
     spectrum = np.abs(np.fft.rfft(sums, 4 * bins)) ** 2
     frequencies = 2 * np.pi * np.arange(len(spectrum)) / (4 * reach)
     if level:
-        spectrum /= np.maximum(median_filter(spectrum, ABOUT, mode="nearest"), 1e-300)
+        # Number of spectrum points, four per resolution, in the median that gives the local level around an order.
+        spectrum /= np.maximum(median_filter(spectrum, 201, mode="nearest"), 1e-300)
     return np.interp(orders, frequencies, spectrum)

@@ -39,26 +39,28 @@ class TorqueSensorDrift(JointEffect):
     def parameters(self, robot: Robot, joint: Place) -> tuple[Coefficient, ...]:
         """Describes the drift in each interval."""
         assert joint is not None
-        return tuple(Coefficient(f"drift_{k}", force_unit(robot, joint - 1)) for k in range(1, STRETCHES + 1))
+        return tuple(Coefficient(f"drift_{k}", force_unit(robot, joint - 1)) for k in range(1, DRIFT_INTERVALS + 1))
 
     def grid(self, situation: Situation, joint: Place) -> tuple[tuple[float, ...], ...]:
         """Lists a straight line, and drifts with more and more intervals."""
         (origin, _), (shortest, longest), (end, _) = self.bounds(situation, joint)
-        pieces = [count for count in (1, 2, 4, 8, STRETCHES) if longest / count >= shortest]
+        pieces = [count for count in (1, 2, 4, 8, DRIFT_INTERVALS) if longest / count >= shortest]
         return tuple((origin, longest / count, end) for count in pieces)
 
     def bounds(self, situation: Situation, joint: Place) -> tuple[tuple[float, float], ...]:
         """Fixes origin and end to those of the data, and bounds the intervals' length."""
         origin, end = float(situation.t[0]), float(situation.t[-1])
         duration = max(end - origin, 1.0)
-        return (origin, origin), (min(max(duration / STRETCHES, SHORTEST), duration), duration), (end, end)
+        # Least length of an interval [s]; a faster change depends on the motion, not on time.
+        return (origin, origin), (min(max(duration / DRIFT_INTERVALS, 3.5), duration), duration), (end, end)
 
     def local(self, situation: Situation, joint: int, shape: tuple[float, ...] = ()) -> Array:
         """Evaluates one ramp per interval (N, 16); zero for intervals with less than half in the data."""
         origin, stretch, end = shape
         elapsed = (np.minimum(situation.t, end) - origin) / stretch
-        begun = np.arange(STRETCHES)
-        shown = begun + SHOWN <= (end - origin) / stretch
+        begun = np.arange(DRIFT_INTERVALS)
+        # Least fraction of an interval that lies in the data.
+        shown = begun + 0.5 <= (end - origin) / stretch
         return np.asarray(np.clip(elapsed[:, None] - begun, 0.0, 1.0) * shown)
 
     def describe(
@@ -75,9 +77,5 @@ class TorqueSensorDrift(JointEffect):
         return f"The torque zero of joint {joint} drifts by {np.ptp(places):.3g} {force}."
 
 
-STRETCHES = 16
+DRIFT_INTERVALS = 16
 """Largest number of intervals."""
-SHOWN = 0.5
-"""Least fraction of an interval that lies in the data."""
-SHORTEST = 3.5
-"""Least length of an interval [s]; a faster change depends on the motion, not on time."""

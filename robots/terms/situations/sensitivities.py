@@ -11,12 +11,12 @@ from numpy.typing import NDArray
 
 from robots.batch import BatchFunction, batch_function, builds_expressions
 from robots.common.errors import InputError
+from robots.common.stretches import chunks
 from robots.geometry.chain import Chain
 from robots.geometry.symbolic import cleaned, symbolic_placement
 from robots.regressor import TorqueModel
 
 Array = NDArray[np.float64]
-CHUNK = 4096
 
 
 def evaluate(kind: str, model: TorqueModel, parameters: Array, q: Array, dq: Array, ddq: Array) -> Array:
@@ -43,8 +43,7 @@ def evaluate(kind: str, model: TorqueModel, parameters: Array, q: Array, dq: Arr
     pi = parameters[rigid] if rigid else np.zeros(10 * model.robot.n)
     result = np.empty((len(q), *evaluator.output_shapes[0]))
     # In chunks, because the parameters are repeated for every sample; for a long log they would not fit into memory.
-    for start in range(0, len(q), CHUNK):
-        rows = slice(start, min(start + CHUNK, len(q)))
+    for rows in chunks(len(q)):
         repeated = np.broadcast_to(pi, (rows.stop - rows.start, len(pi)))
         evaluator(q[rows], dq[rows], ddq[rows], repeated, out=(result[rows],))
     return result

@@ -287,10 +287,6 @@ def _part_of(column: Column, parts: Collection[str]) -> str:
     return column.term if column.term in parts else "other"
 
 
-ENDS = 6
-"""Rows at an end from which derivatives of second order in its first three rows follow."""
-
-
 def differentiate(t: Array, values: Array, runs: Iterable[slice]) -> tuple[Array, Array]:
     """Computes the first and second time derivative of samples, within each log.
 
@@ -305,14 +301,16 @@ def differentiate(t: Array, values: Array, runs: Iterable[slice]) -> tuple[Array
         Both derivatives (N, ...); zero in logs of less than three rows.
     """
     first, second = np.zeros_like(values), np.zeros_like(values)
+    # Rows at an end from which derivatives of second order in its first three rows follow.
+    end_rows = 6
     for run in runs:
         times, x = t[run], values[run]
         if len(times) < 3:
             continue
         steps = np.diff(times)
         h = float(steps.mean())
-        even = len(times) > 2 * ENDS and np.abs(steps - h).max() < 1e-3 * h
-        for part in (slice(0, ENDS), slice(-ENDS, None)) if even else (slice(None),):
+        even = len(times) > 2 * end_rows and np.abs(steps - h).max() < 1e-3 * h
+        for part in (slice(0, end_rows), slice(-end_rows, None)) if even else (slice(None),):
             slope = np.gradient(x[part], times[part], axis=0)
             first[run][part], second[run][part] = slope, np.gradient(slope, times[part], axis=0)
         if even:

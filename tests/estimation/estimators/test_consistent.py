@@ -9,7 +9,7 @@ import pytest
 
 from estimation import identify, predict, read_log
 from estimation.estimators import ESTIMATORS, PhysicallyConsistent, WeightedLeastSquares
-from estimation.estimators.consistent import EPSILON
+from estimation.estimators.consistent import LEAST_BODY_EIGENVALUE
 from estimation.linear_algebra.conic import ConicProgram
 from estimation.regressions.standard_parameters import body_columns, reference_bodies, scaling
 from robots.common.errors import InfeasibleError, InputError
@@ -74,7 +74,7 @@ def test_it_is_the_optimum_that_a_modelling_layer_finds(problem_named, assemble,
         body = sum(BASIS[k] * x[int(c)] for k, c in enumerate(columns))
         reference = np.tensordot(units.unit_reference[link], BASIS, axes=1)
         inverse = np.linalg.inv(reference)
-        constraints.append(body - EPSILON * np.eye(4) >> 0)
+        constraints.append(body - LEAST_BODY_EIGENVALUE * np.eye(4) >> 0)
         if pull == "entropic":
             cost = cost + weight * (cvxpy.trace(inverse @ body) - cvxpy.log_det(body))
         else:

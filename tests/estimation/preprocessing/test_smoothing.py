@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from estimation.preprocessing import resample, smooth
-from estimation.preprocessing.smoothing import ORDER, transient
+from estimation.preprocessing.smoothing import BUTTERWORTH_ORDER, transient
 
 PERIOD = 0.004
 T = PERIOD * np.arange(5000)  # 20 s
@@ -22,9 +22,9 @@ def component(t, signal, frequency):
 
 def low_pass_gain(frequency, cutoff):
     """Butterworth's gain, squared by the second pass; bilinear frequencies."""
-    own = cutoff / (np.sqrt(2) - 1) ** (1 / (2 * ORDER))
+    own = cutoff / (np.sqrt(2) - 1) ** (1 / (2 * BUTTERWORTH_ORDER))
     ratio = np.tan(np.pi * frequency * PERIOD) / np.tan(np.pi * own * PERIOD)
-    return 1 / (1 + ratio ** (2 * ORDER))
+    return 1 / (1 + ratio ** (2 * BUTTERWORTH_ORDER))
 
 
 @pytest.mark.parametrize("frequency", [0.5, 2.0, 5.0, 8.0])

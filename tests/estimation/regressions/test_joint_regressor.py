@@ -1,9 +1,10 @@
 import numpy as np
 import pytest
 
-from estimation.regressions.joint_regressor import JointRegressor, chunks, summed
+from estimation.regressions.joint_regressor import JointRegressor, summed
 from estimation.regressions.moments import Moments
 from robots.base_parameters import find_base_parameters
+from robots.common.stretches import chunks
 from robots.regressor import default_model
 
 

@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from estimation.linear_algebra.scaled import solve_ridge
-from estimation.thermal.information import FAINT, inverse_of
+from estimation.linear_algebra.scaled import LEAST_RIDGE, solve_ridge
+from estimation.thermal.information import inverse_of
 
 
 def problem(scale):
@@ -18,7 +18,7 @@ def test_scales_that_differ_by_many_orders_do_not_matter():
     scale = np.sqrt(np.diag(matrix))
     # The regularisation of 1e-12 is the only error besides rounding.
     np.testing.assert_allclose(inverse_of(matrix) @ matrix * scale[:, None] / scale, np.eye(4), atol=1e-10)
-    np.testing.assert_allclose(solve_ridge(matrix, matrix @ (right / scale), FAINT) * scale, right, rtol=1e-9)
+    np.testing.assert_allclose(solve_ridge(matrix, matrix @ (right / scale), LEAST_RIDGE) * scale, right, rtol=1e-9)
 
 
 def test_parameter_without_influence_has_an_infinite_variance():

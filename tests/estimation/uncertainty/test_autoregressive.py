@@ -4,7 +4,7 @@ from scipy.linalg import toeplitz
 from scipy.signal import lfilter
 
 from estimation.uncertainty import Noise
-from estimation.uncertainty.autoregressive import HIGHEST_ORDER, autocovariance, fit_noise
+from estimation.uncertainty.autoregressive import HIGHEST_NOISE_ORDER, autocovariance, fit_noise
 
 SAMPLES = 20_000
 
@@ -25,9 +25,9 @@ def fitted(residual):
 def test_coefficients_are_recovered(truth):
     """The fit of an AR(1) or AR(2) process finds its coefficients, and next to nothing beyond their order."""
     noise = fitted(process(truth, scale=2.0)[:, None])
-    found = np.zeros(HIGHEST_ORDER)
+    found = np.zeros(HIGHEST_NOISE_ORDER)
     found[: len(noise.coefficients[0])] = noise.coefficients[0]
-    expected = np.zeros(HIGHEST_ORDER)
+    expected = np.zeros(HIGHEST_NOISE_ORDER)
     expected[: len(truth)] = truth
     # 1/sqrt(N) is 0.007, the standard error of a coefficient; five of them.
     np.testing.assert_allclose(found, expected, atol=0.035)

@@ -30,7 +30,7 @@ def averages(Y, mask, residual, size, chunk):
 @pytest.mark.parametrize("chunk", [4, 50, 1000])
 def test_groups_are_summed_row_by_row(monkeypatch, chunk):
     """Sums, means and deviations equal those of a loop over the rows that count, in pieces of any length."""
-    monkeypatch.setattr("estimation.uncertainty.averages.EVERY", 1)
+    monkeypatch.setattr("estimation.uncertainty.averages.DEVIATION_STRIDE", 1)
     rng, size = np.random.default_rng(0), 4
     Y, mask = regressor(203), (rng.random((203, JOINTS)) < 0.8).astype(float)
     residual = rng.normal(size=(203, JOINTS)) * mask

@@ -5,6 +5,7 @@ from scipy.signal import lfilter
 
 from estimation.uncertainty import Part, covariance, sandwich, white_noise_covariance
 from estimation.uncertainty.autoregressive import autocovariance, fit_noise
+from robots.common.stretches import chunks
 from tests.estimation.uncertainty.least_squares import JOINTS, WEIGHTS, coloured, fit
 
 COLUMNS = 3
@@ -39,7 +40,7 @@ def dense(Y, mask, residual, inverse):
     """(Y'WY)^-1 Y'W Gamma W Y (Y'WY)^-1 and the robust estimate, by matrices of all rows at once."""
     counts = mask.sum(axis=0)
     own = np.stack([autocovariance(residual[:, j], counts[j]) for j in range(JOINTS)])
-    noise = fit_noise(residual, counts, own, sandwich.ORDERS)
+    noise = fit_noise(residual, counts, own, sandwich.NOISE_ORDER_FACTOR)
     rows = len(Y)
     filters = []
     for a in noise.coefficients:
@@ -72,7 +73,7 @@ def test_chunks_do_not_matter(problem, monkeypatch, chunk):
     parts = [part(Y, mask, residual)]
     expected = covariance(parts, WEIGHTS, inverse, seed=3)
     white = white_noise_covariance(parts, WEIGHTS, inverse)
-    monkeypatch.setattr(sandwich, "CHUNK", chunk)
+    monkeypatch.setattr(sandwich, "chunks", lambda rows: chunks(rows, chunk))
     np.testing.assert_allclose(covariance(parts, WEIGHTS, inverse, seed=3), expected, rtol=1e-9)
     np.testing.assert_allclose(white_noise_covariance(parts, WEIGHTS, inverse), white, rtol=1e-9)
 

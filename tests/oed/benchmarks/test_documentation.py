@@ -9,8 +9,8 @@ import numpy as np
 
 from oed.benchmarks import read_answers, score_benchmark
 from oed.benchmarks.making.strata import SHARES
-from oed.benchmarks.rivals.residual_fit import LEAST
-from oed.benchmarks.rivals.threshold import FACTOR
+from oed.benchmarks.rivals.residual_fit import LEAST_RESIDUAL_SHARE
+from oed.benchmarks.rivals.threshold import NOISE_FACTOR
 from oed.benchmarks.taxonomy import CLASSES, PARAMETERS
 
 PAGE = (Path(__file__).parents[3] / "docs" / "benchmark.md").read_text(encoding="utf-8")
@@ -48,5 +48,5 @@ def test_tables_are_those_of_the_code():
     assert parameters == {name: (p.unit, p.effects, p.meaning) for name, p in PARAMETERS.items()}
     shares = re.findall(r"^\| (\w+) \| (\d+) % \|", PAGE, flags=re.MULTILINE)
     assert {name: int(share) / 100 for name, share in shares} == SHARES
-    assert f"more than {FACTOR:g} times" in PAGE
-    assert f"at least {100 * LEAST:g} %" in PAGE
+    assert f"more than {NOISE_FACTOR:g} times" in PAGE
+    assert f"at least {100 * LEAST_RESIDUAL_SHARE:g} %" in PAGE

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from oed.benchmarks.taxonomy import CLASSES, EFFECT_NAMES, PARAMETERS, UNKNOWN, class_of
-from oed.benchmarks.truth.effects import KNOWN, STRANGERS
+from oed.benchmarks.truth.effects import KNOWN, UNLISTED
 from robots.terms.effects import EFFECTS
 
 
@@ -17,7 +17,7 @@ def test_every_effect_has_a_class():
 
 def test_effects_outside_have_none():
     """What the plant hides beyond the catalogue has no class, as an effect without a name."""
-    assert {class_of(effect.name) for effect in STRANGERS} == {class_of("outside")} == {UNKNOWN}
+    assert {class_of(effect.name) for effect in UNLISTED} == {class_of("outside")} == {UNKNOWN}
 
 
 def test_classes_are_names_too():

@@ -25,8 +25,8 @@ BRIEF = Ipopt(max_iter=15, finish_iter=10)
 @pytest.fixture(autouse=True)
 def _impatient(monkeypatch: pytest.MonkeyPatch) -> None:
     """The controller of the tests runs faster than real time."""
-    monkeypatch.setattr(recorder, "LOOK", 0.1)
-    monkeypatch.setattr(ending, "STANDS", 0.1)
+    monkeypatch.setattr(recorder, "FEEDBACK_TRIAL_TIME", 0.1)
+    monkeypatch.setattr(ending, "STANDING_TIME", 0.1)
 
 
 @pytest.fixture(scope="session")

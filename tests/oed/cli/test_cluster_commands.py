@@ -46,7 +46,7 @@ def test_fleet_is_the_same_table(run, dask_cluster, tmp_path: Path, monkeypatch)
 def test_a_wrong_address(run, robot, tmp_path: Path, monkeypatch, command: str) -> None:
     """An address without a scheduler is one message with code 2 within seconds, and leaves no folder."""
     pytest.importorskip("distributed", reason="a cluster needs the package distributed")
-    monkeypatch.setattr(connection, "ANSWER", 0.1)
+    monkeypatch.setattr(connection, "ANSWER_TIMEOUT", 0.1)
     (tmp_path / "logs").mkdir()
     words = (tmp_path / "logs", "--model", tmp_path) if command == "fleet" else ("--robot", robot)
     with socket.socket() as closed:

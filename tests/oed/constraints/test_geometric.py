@@ -8,7 +8,7 @@ import pytest
 from scipy.optimize import minimize
 
 from oed.constraints.geometric import CollisionLimit, GeometricLimits
-from oed.constraints.singularity import SINGULAR, SingularityLimit
+from oed.constraints.singularity import SINGULARITY_FLOOR, SingularityLimit
 from oed.constraints.tool import PlaneLimit, ToolBox
 from robots.collision import Box, Capsule, CollisionModel, Scene, collision_model, floor, reach
 from robots.collision.pairs import random_poses
@@ -146,7 +146,7 @@ def test_the_distance_to_singularity_is_a_bound(name):
     smallest = np.array([np.linalg.svd(_scaled_jacobian(robot, x, length), compute_uv=False)[-1] for x in q])
     rounding = 1e-8  # of the differences
     assert (bound <= smallest + rounding).all()
-    assert (bound >= 6**-0.25 * smallest - SINGULAR - rounding).all()
+    assert (bound >= 6**-0.25 * smallest - SINGULARITY_FLOOR - rounding).all()
 
 
 def test_singular_poses_have_no_distance():
@@ -165,7 +165,7 @@ def test_arms_of_few_joints_have_a_distance_to_singularity():
     bound = limits.linearise(q)[0][:, 0] + 1e-3
     exact = [np.linalg.svd(_scaled_jacobian(robot, x, 0.5), compute_uv=False)[-1] for x in q]
     assert (bound <= np.array(exact) + 1e-8).all()
-    assert (bound >= 2**-0.25 * np.array(exact) - SINGULAR - 1e-8).all()
+    assert (bound >= 2**-0.25 * np.array(exact) - SINGULARITY_FLOOR - 1e-8).all()
 
 
 def test_prismatic_and_single_joints_work():

@@ -25,9 +25,9 @@ PATIENT = StreamOptions(patience=20.0)
 @pytest.fixture(autouse=True)
 def _impatient(monkeypatch: pytest.MonkeyPatch) -> None:
     """Waits are for people's controllers; those of the tests run faster than real time."""
-    monkeypatch.setattr(recorder, "LOOK", 0.1)
-    monkeypatch.setattr(ending, "STANDS", 0.1)
-    monkeypatch.setattr(ending, "STANDS_WITHOUT_STATUS", 0.3)
+    monkeypatch.setattr(recorder, "FEEDBACK_TRIAL_TIME", 0.1)
+    monkeypatch.setattr(ending, "STANDING_TIME", 0.1)
+    monkeypatch.setattr(ending, "STANDING_TIME_WITHOUT_STATUS", 0.3)
 
 
 @pytest.fixture(scope="session")

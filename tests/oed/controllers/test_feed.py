@@ -13,7 +13,7 @@ import pytest
 from oed.controllers import ControllerError, LinkError
 from oed.controllers.errors import ProtocolError
 from oed.controllers.links import Link
-from oed.controllers.recording.feed import BACKWARD
+from oed.controllers.recording.feed import BACKWARD_TIME
 from oed.controllers.recording.recorder import Recorder
 from oed.exports.simple_message import DEFAULT, Frame, JointFeedback, Message, Status, TorqueFeedback, Valid
 from robots.robot import Robot
@@ -109,7 +109,7 @@ def test_a_clock_that_goes_on_from_an_earlier_time_is_a_restart(
     """A controller that restarted reports earlier times and nothing else, also if it had run for a moment only."""
     link.report(10.0)
     begin = time.monotonic()
-    repeated(recorder, lambda: link.report(10.0 - back + 0.001 * (time.monotonic() - begin)), 20 * BACKWARD)
+    repeated(recorder, lambda: link.report(10.0 - back + 0.001 * (time.monotonic() - begin)), 20 * BACKWARD_TIME)
     with pytest.raises(ControllerError, match=r"clock went back by .* restarted"):
         recorder.check()
 

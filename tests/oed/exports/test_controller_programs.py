@@ -11,7 +11,7 @@ import pytest
 from scipy.interpolate import CubicSpline
 
 from oed.exports import CONTROLLER_FORMS, ExportOptions, export_trajectory
-from oed.exports.forms.controller_programs import ARRAY
+from oed.exports.forms.controller_programs import LONGEST_ARRAY
 from oed.exports.forms.sampling import at_period
 from robots.common.errors import AssumedValueWarning, InputError
 from robots.joints.controller_axes import ControllerAxes
@@ -101,7 +101,7 @@ def test_krl_list_is_cut(er3a: Robot, tmp_path: Path) -> None:
     long = Motion(motion.t, motion.q, motion.dq, motion.ddq)
     export_trajectory(tmp_path / "excite.dat", long, er3a, "kuka", options=NAME, period=0.00018)
     program = Krl((tmp_path / "excite.dat").read_text())
-    assert program.arrays == {"POINT": ARRAY, "POINT_2": 33335 - ARRAY}
+    assert program.arrays == {"POINT": LONGEST_ARRAY, "POINT_2": 33335 - LONGEST_ARRAY}
     assert len(program.points) == 33335
 
 

@@ -172,7 +172,7 @@ def test_a_function_that_is_built_again_is_not_written_again(needs_compiler, mon
     written = []
     monkeypatch.setattr(compiled, "c_source", lambda function: written.append(function) or c_source(function))
     monkeypatch.setattr(compiled, "_SOURCES", OrderedDict())
-    monkeypatch.setattr(compiled, "KEPT", 2)
+    monkeypatch.setattr(compiled, "KEPT_SOURCES", 2)
 
     def value(constant: float) -> float:
         x = casadi.SX.sym("x")

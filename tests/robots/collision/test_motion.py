@@ -158,7 +158,7 @@ def test_blocks_of_a_long_motion_meet(monkeypatch, model):
     """A motion searched in blocks gives what it gives in one."""
     motion = _wave(model.chain.n, 0.3, 0.2, 2.0, 0.02)
     whole = check_motion(model, motion, confirm=False)
-    monkeypatch.setattr("robots.collision.motion.BLOCK", 17)
+    monkeypatch.setattr("robots.collision.motion.SAMPLES_AT_A_TIME", 17)
     parts = check_motion(model, motion, confirm=False)
     # How far an interval is halved depends on what was found before, and so do the last digits of the smallest value.
     np.testing.assert_allclose(parts.clearance, whole.clearance, rtol=0, atol=1e-4)

@@ -105,7 +105,7 @@ def test_other_versions_are_refused(dask_cluster):
 
 def test_no_scheduler(monkeypatch):
     """A wrong address, and a port where something else listens, are input errors within the time for an answer."""
-    monkeypatch.setattr(connection, "ANSWER", 1.0)
+    monkeypatch.setattr(connection, "ANSWER_TIMEOUT", 1.0)
     with socket.socket() as other:
         other.bind(("127.0.0.1", 0))
         other.listen()
@@ -124,8 +124,8 @@ def test_cluster_without_workers(monkeypatch):
     """A cluster without workers is refused; the loss of the last worker, or of the scheduler, ends the work."""
     from distributed import LocalCluster
 
-    monkeypatch.setattr(executors, "WITHOUT_WORKERS", 0.3)
-    monkeypatch.setattr(executors, "LOOK", 0.1)
+    monkeypatch.setattr(executors, "WORKERLESS_TIMEOUT", 0.3)
+    monkeypatch.setattr(executors, "WORKER_CHECK_PERIOD", 0.1)
     quiet = {"dashboard_address": "127.0.0.1:0", "processes": False}
     with LocalCluster(n_workers=0, **quiet) as empty:
         with pytest.raises(InputError, match="has no workers"), cluster(empty.scheduler_address):
@@ -136,7 +136,7 @@ def test_cluster_without_workers(monkeypatch):
             empty.scale(0)
             with pytest.raises(OedError, match="has had no worker"):
                 parallel_map(jobs.fail, [0, 2], executor=executor)
-            monkeypatch.setattr(executors, "WITHOUT_WORKERS", 100.0)
+            monkeypatch.setattr(executors, "WORKERLESS_TIMEOUT", 100.0)
             threading.Timer(0.3, empty.close).start()
             with pytest.raises(OedError, match=r"connection to the Dask scheduler at .* was lost"):
                 parallel_map(jobs.fail, [0, 2], executor=executor)

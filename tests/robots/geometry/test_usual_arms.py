@@ -9,7 +9,14 @@ import pytest
 
 from robots.common.errors import AssumedValueWarning, InputError
 from robots.consistency import normalised_eigenvalues
-from robots.geometry.usual_arms import BY_PAYLOAD, BY_REACH, MASS, usual_body, usual_masses, working_reach
+from robots.geometry.usual_arms import (
+    PAYLOAD_EXPONENT,
+    REACH_EXPONENT,
+    USUAL_MASS,
+    usual_body,
+    usual_masses,
+    working_reach,
+)
 from robots.loading import load_robot
 
 # payload [kg], reach [m], mass [kg] of the manufacturers' data sheets
@@ -51,7 +58,7 @@ def test_the_mass_follows_data_sheets():
     payload, reach, mass = np.log(SHEETS).T
     matrix = np.column_stack([np.ones_like(mass), payload, reach])
     fit = np.linalg.lstsq(matrix, mass, rcond=None)[0]
-    np.testing.assert_allclose([np.log(MASS), BY_PAYLOAD, BY_REACH], fit, atol=0.01)
+    np.testing.assert_allclose([np.log(USUAL_MASS), PAYLOAD_EXPONENT, REACH_EXPONENT], fit, atol=0.01)
     assert np.exp((mass - matrix @ fit).std()) == pytest.approx(1.8, abs=0.05)
 
 

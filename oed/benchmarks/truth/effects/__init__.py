@@ -1,4 +1,4 @@
-"""True effects that cases hide: those of the catalogue (`KNOWN`), and others (`STRANGERS`)."""
+"""True effects that cases hide: those of the catalogue (`KNOWN`), and others (`UNLISTED`)."""
 
 from __future__ import annotations
 
@@ -14,7 +14,9 @@ from oed.benchmarks.truth.effects.friction import (
     Stribeck,
     Warming,
 )
-from oed.benchmarks.truth.effects.strangers import (
+from oed.benchmarks.truth.effects.surroundings import Contact, Payload, Tilt
+from oed.benchmarks.truth.effects.transmission import Backlash, Balancer, Cable, Elastic, Ripple, WristCoupling
+from oed.benchmarks.truth.effects.unlisted_joint_effects import (
     BeltFriction,
     BorrowedFriction,
     CrossWave,
@@ -25,9 +27,7 @@ from oed.benchmarks.truth.effects.strangers import (
     SlippedZero,
     TiredCable,
 )
-from oed.benchmarks.truth.effects.surroundings import Contact, Payload, Tilt
-from oed.benchmarks.truth.effects.transmission import Backlash, Balancer, Cable, Elastic, Ripple, WristCoupling
-from oed.benchmarks.truth.effects.whole_strangers import Conveyor, FloorVibration, Hose, SlippedBase, Slosh
+from oed.benchmarks.truth.effects.unlisted_robot_effects import Conveyor, FloorVibration, Hose, SlippedBase, Slosh
 
 KNOWN: tuple[type[Effect], ...] = (
     Stribeck,
@@ -54,7 +54,7 @@ KNOWN: tuple[type[Effect], ...] = (
     Contact,
     LeaningBase,
 )
-STRANGERS: tuple[type[Effect], ...] = (
+UNLISTED: tuple[type[Effect], ...] = (
     CrossWave,
     TiredCable,
     FloorVibration,
@@ -70,4 +70,4 @@ STRANGERS: tuple[type[Effect], ...] = (
     SlippedZero,
     Conveyor,
 )
-__all__ = ["KNOWN", "STRANGERS", "Effect"]
+__all__ = ["KNOWN", "UNLISTED", "Effect"]

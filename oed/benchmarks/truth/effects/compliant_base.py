@@ -15,11 +15,6 @@ from oed.benchmarks.truth.ride import Ride
 
 Motion = tuple[np.ndarray, ...]
 
-LEAD = 3000  # rows after which a base that was at rest rings no more
-SETTLED = 20  # rounds for the tilt at rest, which changes the load itself
-FAST = 30.0  # resonance [Hz] from which a base does not ring: smoothed logs do not contain it
-ROW = 0.002  # step of the integration [s]; a base with a faster resonance follows its load
-
 
 @dataclass(frozen=True, kw_only=True)
 class LeaningBase(Effect):
@@ -47,13 +42,15 @@ class LeaningBase(Effect):
         return cls(ratio=rng.uniform(0.5, 2.0), own=rng.uniform(0.02, 0.2), damping=rng.uniform(0.02, 0.08))
 
     def torque(self, ride: Ride) -> np.ndarray:
-        model, every = ride.machine.model, max(round(ROW / ride.step), 1)
+        # A step of the integration takes 2 ms; a base with a faster resonance follows its load.
+        model, every = ride.machine.model, max(round(0.002 / ride.step), 1)
         poses = ride.link_q[:: max(len(ride.q) // 50, 1)]
         inertia = float(np.mean([_about_base(model, q) for q in poses]))
         whole = _on_two_axes(model, self.own * inertia)
         stiffness = np.array([1.0, 1.0 / self.ratio]) / self.amount
         resonance = np.sqrt(stiffness / inertia) / (2 * np.pi)
-        lost = 2 * np.where(resonance < FAST, self.damping, 1.0) * np.sqrt(stiffness * inertia)
+        # A base that resonates above 30 Hz does not ring: smoothed logs do not contain it.
+        lost = 2 * np.where(resonance < 30.0, self.damping, 1.0) * np.sqrt(stiffness * inertia)
         torque = np.empty_like(ride.q)
         for run in ride.runs:
             rows = np.unique(np.r_[run.start : run.stop : every, run.stop - 1])
@@ -104,11 +101,14 @@ def _integrated(
     """
     q, v, a = motion
     rest = np.zeros(whole.nv)
-    rest[2:] = q[:LEAD][-1]
-    for _ in range(SETTLED):
+    # Rows after which a base that was at rest rings no more.
+    lead = 3000
+    rest[2:] = q[:lead][-1]
+    # The tilt at rest changes the load itself, and settles in these rounds.
+    for _ in range(20):
         rest[:2] = -pin.rnea(whole, whole.createData(), rest, 0 * rest, 0 * rest)[:2] / stiffness
-    back = tuple(values[:LEAD][::-1] for values in (q, -v, a))
-    start = _steps(whole, stiffness, lost, steps[: LEAD - 1][::-1], back, (rest[:2], np.zeros(2), np.zeros(2)))
+    back = tuple(values[:lead][::-1] for values in (q, -v, a))
+    start = _steps(whole, stiffness, lost, steps[: lead - 1][::-1], back, (rest[:2], np.zeros(2), np.zeros(2)))
     tilt, rate, curve = start[:, -1]
     return _steps(whole, stiffness, lost, steps, motion, (tilt, -rate, curve))
 

@@ -11,9 +11,6 @@ from oed.benchmarks.truth.effects.base import Effect, log_uniform, place_of
 from oed.benchmarks.truth.machines import Machine
 from oed.benchmarks.truth.ride import Ride
 
-SUBSTEPS = 4
-HEAT_STEP = 0.1
-
 
 @dataclass(frozen=True, kw_only=True)
 class Stribeck(Effect):
@@ -70,16 +67,17 @@ class LuGre(Effect):
 
 def _bristles(v: np.ndarray, step: float, reach: float) -> np.ndarray:
     """Solves z' = v - |v| z / reach for z / reach, exactly for a velocity that is constant within each sub-step."""
-    weight = np.arange(1, SUBSTEPS + 1) / SUBSTEPS
+    substeps = 4
+    weight = np.arange(1, substeps + 1) / substeps
     before = np.concatenate([v[:1], v[:-1]])
     fine = (before[:, None] + (v - before)[:, None] * weight).ravel()
-    decay = np.exp(-np.abs(fine) * step / SUBSTEPS / reach)
+    decay = np.exp(-np.abs(fine) * step / substeps / reach)
     target = np.sign(fine) * (1.0 - decay)
     z, result = float(np.sign(v[0])), np.empty(len(fine))
     for k, (keep, gain) in enumerate(zip(decay.tolist(), target.tolist(), strict=True)):
         z = keep * z + gain
         result[k] = z
-    return result[SUBSTEPS - 1 :: SUBSTEPS]
+    return result[substeps - 1 :: substeps]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -214,7 +212,7 @@ class Warming(Effect):
         heat = np.empty(len(ride.t))
         for run in ride.runs:
             state = expm(rates * max(ride.t[run.start] - clock, 0.0)) @ state
-            stride = max(round(HEAT_STEP / ride.step), 1)
+            stride = max(round(0.1 / ride.step), 1)
             edges = np.arange(run.start, run.stop, stride)
             whole = expm(
                 np.block([[rates, np.array([[1.0 / self.fast], [0.0]])], [np.zeros((1, 3))]]) * stride * ride.step

@@ -12,10 +12,6 @@ from oed.benchmarks.truth.effects.base import Effect, log_uniform, place_of
 from oed.benchmarks.truth.machines import Machine
 from oed.benchmarks.truth.ride import Ride
 
-SETTLES = 0.3  # time [s] in which a link that has landed comes to rest
-FINE = 2e-4  # largest integration step [s] of a link within the backlash
-LOADED = 0.1  # least RMS of the load that scales the ripple, as a fraction of the joint's torque RMS
-
 
 @dataclass(frozen=True, kw_only=True)
 class Ripple(Effect):
@@ -39,7 +35,8 @@ class Ripple(Effect):
         load, first = ride.load[:, self.j], ride.runs[0]
         # Without the lower bound, rounding of a load near zero would scale the ripple.
         whole = np.sqrt((ride.base_torque()[first, self.j] ** 2).mean())
-        share = load / max(np.sqrt((load[first] ** 2).mean()), LOADED * whole)
+        # The load that scales the ripple has at least a tenth of the joint's torque, as RMS.
+        share = load / max(np.sqrt((load[first] ** 2).mean()), 0.1 * whole)
         wave = np.cos(angle) * (1 - self.loaded + self.loaded * share)
         return self.on_joint(ride, self.amount * wave)
 
@@ -108,7 +105,8 @@ class Backlash(Effect):
 
     def _floating(self, ride: Ride, run: slice, through: np.ndarray) -> np.ndarray:
         """Simulates the motor's position minus the link's in a run, with two derivatives (3, N)."""
-        half, settles = self.amount / 2, round(SETTLES / ride.step)
+        # A link that has landed comes to rest within 0.3 s.
+        half, settles = self.amount / 2, round(0.3 / ride.step)
         signs = np.where(through >= 0, 1.0, -1.0)
         behind = np.zeros((3, len(through)))
         behind[0] = half * signs
@@ -122,7 +120,8 @@ class Backlash(Effect):
         data, model = ride.machine.model.createData(), ride.machine.model
         inertia = np.array([pin.crba(model, data, ride.q[run.start + k])[self.j, self.j] for k in starts])
         stiff, damp = inertia * (2 * np.pi * self.swing) ** 2, 2 * self.damping * inertia * 2 * np.pi * self.swing
-        x, v, times = half * signs[starts], np.zeros(len(starts)), max(1, round(ride.step / FINE))
+        # A link within the backlash is integrated in steps of 0.2 ms at most.
+        x, v, times = half * signs[starts], np.zeros(len(starts)), max(1, round(ride.step / 2e-4))
         step = ride.step / times
         for k in range(min(length, len(through))):
             at = np.minimum(starts + k, len(through) - 1)

@@ -9,13 +9,6 @@ from collections.abc import Callable
 
 from oed.controllers.virtual.options import Faults
 
-OVERTAKEN = 0.005
-"""A reordered datagram is held back for so long [s], so that the next one overtakes it."""
-
-
-DELAYED = 100_000
-"""Datagrams on their way, at most."""
-
 
 class Network:
     """Decides for each datagram when it arrives, and delivers it then.
@@ -40,7 +33,8 @@ class Network:
         for due in self.arrivals(now):
             if due <= now:
                 arrive()
-            elif len(self._delayed) < DELAYED:
+            # Datagrams on their way, at most.
+            elif len(self._delayed) < 100_000:
                 self._count += 1
                 heapq.heappush(self._delayed, (due, self._count, arrive))
 
@@ -64,5 +58,6 @@ class Network:
         times = []
         for _ in range(copies):
             late = faults.late_by if draw() < faults.late else 0.0
-            times.append(now + late + (OVERTAKEN if draw() < faults.reorder else 0.0))
+            # A reordered datagram is held back for so long [s], so that the next one overtakes it.
+            times.append(now + late + (0.005 if draw() < faults.reorder else 0.0))
         return times

@@ -13,12 +13,6 @@ Kind = Literal["none", "swap", "sign", "half-speed", "stall", "offset", "other-r
 
 KINDS: tuple[Kind, ...] = ("none", "swap", "sign", "half-speed", "stall", "offset", "other-robot")
 
-STALL = 5.0
-"""How long a robot stands still in the middle [s]."""
-
-OFFSET = 0.2
-"""By how much an encoder jumps [rad or m]."""
-
 
 class PathFault:
     """Changes what the robot does from a time of the trajectory on; it goes on from where it is.
@@ -44,7 +38,8 @@ class PathFault:
         if elapsed < self._after:
             return False
         if self._kind == "stall":
-            return elapsed < self._after + STALL
+            # How long a robot stands still in the middle [s].
+            return elapsed < self._after + 5.0
         self._ticks += 1
         return self._kind == "half-speed" and self._ticks % 2 == 0
 
@@ -60,7 +55,8 @@ class PathFault:
         elif self._kind == "sign":
             away[0] = -away[0]
         elif self._kind == "offset":
-            away[0] += OFFSET
+            # By how much an encoder jumps [rad or m].
+            away[0] += 0.2
         else:
             away = away @ (0.6 * np.eye(n) + 0.3 * np.eye(n, k=1))
         return self._from + away

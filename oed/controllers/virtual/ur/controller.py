@@ -17,16 +17,16 @@ from numpy.typing import NDArray
 from oed.controllers.rtde.packages import (
     AS_TORQUE,
     FIELDS,
-    JOINTS,
     NOT_FOUND,
     PLAYED,
+    UR_JOINTS,
     Command,
     Packages,
     body_format,
     opened,
     package,
 )
-from oed.controllers.rtde.state import PLAYING, RUNNING, STOPPED, Safety
+from oed.controllers.rtde.state import PROGRAM_PLAYING, PROGRAM_STOPPED, ROBOT_RUNNING, Safety
 from oed.controllers.virtual.arm import Arm, ArmSample
 from oed.controllers.virtual.faults.paths import PathFault
 from oed.controllers.virtual.options import ControllerOptions
@@ -40,23 +40,6 @@ from robots.plants import Plant, nominal_plant
 from robots.robot import Robot
 
 Array = NDArray[np.float64]
-
-TORQUE_CONSTANT = 10.0
-"""Joint torque of a motor current [N m/A]."""
-
-TEMPERATURE = 30.0
-"""Of all joints [degC]."""
-
-CLIENTS = 16
-SHORTEST_WAIT = 0.0005
-STALL = 0.15
-"""A delay of this program beyond this [s] is no time of the controller: its clock stands still for so long."""
-
-SAYS = 0.1
-"""The port for programs reports the state in such a period [s]."""
-
-EMPTY = 2.0
-"""A program that waits for data makes time stand still no longer than this [s]."""
 
 
 class _Programs:
@@ -98,7 +81,7 @@ class VirtualUr(Service):
         seed: int = 0,
     ) -> None:
         super().__init__()
-        require_joints(robot, JOINTS, JOINTS, "a UR controller")
+        require_joints(robot, UR_JOINTS, UR_JOINTS, "a UR controller")
         self.options = options
         self.cycle = robot.period if robot.period in CYCLES else min(CYCLES)
         plant = plant or nominal_plant(robot)
@@ -107,9 +90,10 @@ class VirtualUr(Service):
         fault = PathFault(options.faults.path, options.faults.path_after)
         start = np.asarray(robot.limits.home if pose is None else pose, dtype=float)
         self._arm = Arm(start, self.cycle, virtual, fault)
-        self._scripts = TcpPort(options.host, options.motion_port, _Programs, CLIENTS)
+        clients = 16
+        self._scripts = TcpPort(options.host, options.motion_port, _Programs, clients)
         try:
-            self._state = TcpPort(options.host, options.state_port, Packages, CLIENTS)
+            self._state = TcpPort(options.host, options.state_port, Packages, clients)
         except BaseException:
             self._scripts.close()
             raise
@@ -174,7 +158,7 @@ class VirtualUr(Service):
     def _turn(self) -> None:
         wait = self._due_from + self.cycle / self.options.speed - time.monotonic()
         ports = {sock: port for port in (self._scripts, self._state) for sock in port.sockets()}
-        for sock in select.select(list(ports), [], [], max(min(wait, 0.02), SHORTEST_WAIT))[0]:
+        for sock in select.select(list(ports), [], [], max(min(wait, 0.02), 0.0005))[0]:
             port = ports[sock]
             for client, data in port.receive(sock, time.monotonic()):
                 (self._answer if port is self._state else self._load)(client, data)
@@ -233,7 +217,8 @@ class VirtualUr(Service):
     def _advance(self, now: float) -> None:
         """Goes on with the controller's time, and sends what is due."""
         step = self.cycle / self.options.speed
-        if now - self._due_from > max(STALL, 2 * step):
+        # A delay of this program beyond this [s] is no time of the controller: its clock stands still for so long.
+        if now - self._due_from > max(0.15, 2 * step):
             self.stalled += now - self._due_from
             self._due_from = now - step
         for _ in range(int((now - self._due_from) / step + 1e-9)):
@@ -244,30 +229,35 @@ class VirtualUr(Service):
             except StopIteration:
                 self.programs += 1
                 self._end_program()
-            if self._starved is not None and self.options.wait_for_points and now - self._starved < EMPTY:
+            # A program that waits for data makes time stand still no longer than this [s].
+            if self._starved is not None and self.options.wait_for_points and now - self._starved < 2.0:
                 self._due_from = now
                 break
             self._due_from += step
             self._report(self._arm.tick())
             self._ticks += 1
-        if now - self._said > SAYS:
+        # The port for programs reports the state in such a period [s].
+        if now - self._said > 0.1:
             self._said = now
             for client in list(self._scripts.clients):
                 self._say(self._scripts, client, struct.pack(">iB", 5, 16))
 
     def _report(self, sample: ArmSample) -> None:
-        tau = np.zeros(JOINTS) if sample.tau is None else sample.tau
+        tau = np.zeros(UR_JOINTS) if sample.tau is None else sample.tau
         q, dq, ddq = sample.q[None], sample.dq[None], sample.ddq[None]
+        # A motor makes 10 N m/A, and all joints are at 30 degC.
         values: Mapping[str, Any] = {
             "timestamp": self.time,
             "actual_q": sample.q,
             "actual_qd": sample.dq,
-            "actual_current": tau / TORQUE_CONSTANT,
-            "target_moment": self._model.torque(q, dq, ddq, self._parameters)[0] if self._sending else [nan] * JOINTS,
-            "joint_temperatures": [TEMPERATURE] * JOINTS,
-            "robot_mode": RUNNING - 2 * (self.options.state == "drives-off"),
+            "actual_current": tau / 10.0,
+            "target_moment": self._model.torque(q, dq, ddq, self._parameters)[0]
+            if self._sending
+            else [nan] * UR_JOINTS,
+            "joint_temperatures": [30.0] * UR_JOINTS,
+            "robot_mode": ROBOT_RUNNING - 2 * (self.options.state == "drives-off"),
             "safety_mode": int(self._safety),
-            "runtime_state": PLAYING if self.moving else STOPPED,
+            "runtime_state": PROGRAM_PLAYING if self.moving else PROGRAM_STOPPED,
             PLAYED: self._registers.get(24, 0),
             AS_TORQUE: tau,
         }

@@ -14,7 +14,7 @@ from robots import load_robot
 from robots.regressor import default_model
 from robots.robot import Robot
 from robots.terms.discrepancies.flange_oscillator import FlangeOscillator
-from robots.terms.discrepancies.resonance import DAMPING
+from robots.terms.effect_bases.parameters import DAMPING_RATIO
 from robots.terms.effects import Situation, situation
 from robots.terms.situations.joining import join_situations
 from tests.estimation.diagnosis.pinocchio_chains import chain_of
@@ -115,7 +115,7 @@ def test_columns_are_the_torque_against_masses_on_springs(
     """
     X = FlangeOscillator().columns(state, None, (frequency,))
     upright = np.array([0.0, 0.0, 1.0])
-    for late, force in enumerate(_swung(flange, state.t, frequency, DAMPING)):
+    for late, force in enumerate(_swung(flange, state.t, frequency, DAMPING_RATIO)):
         for k, direction in ((late, 1 - upright), (2 + late, upright)):
             expected = -flange.torque(state.q, force * direction)
             error = np.sqrt(np.mean((X[:, :, k] - expected) ** 2, axis=0))
@@ -132,7 +132,7 @@ def test_a_tank_of_other_damping_is_a_mixture_of_both_phases(
     With half or twice the damping the fitted mass differs, because it follows the height of the resonance. Less than a
     tenth of the energy remains.
     """
-    mass, damping = 2.0, factor * DAMPING
+    mass, damping = 2.0, factor * DAMPING_RATIO
     X = FlangeOscillator().columns(state, None, (1.5,))[:, :, :2].reshape(-1, 2)
     place, rate = _swung(flange, state.t, 1.5, damping)
     torque = -flange.torque(state.q, mass * (place + 2 * damping * rate) * [1.0, 1.0, 0.0]).reshape(-1)

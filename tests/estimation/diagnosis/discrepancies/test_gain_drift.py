@@ -8,7 +8,7 @@ import pytest
 from estimation.models.extension import find_effect
 from robots import load_robot
 from robots.robot import Robot
-from robots.terms.discrepancies.gain_drift import FEWEST, GainDrift
+from robots.terms.discrepancies.gain_drift import FEWEST_JOINTS_OF_DRIFT, GainDrift
 from robots.terms.discrepancies.patterns import is_of_time
 from robots.terms.effects import Situation
 
@@ -29,7 +29,7 @@ def test_a_slow_gain_of_all_joints_is_within_its_columns(swept: Situation) -> No
 
 def test_one_or_two_joints_share_nothing(arm: Robot) -> None:
     """The effect needs at least three joints, because with fewer a common change is not distinct."""
-    assert arm.n < FEWEST
+    assert arm.n < FEWEST_JOINTS_OF_DRIFT
     assert GainDrift().joints(arm) == ()
     assert GainDrift().joints(load_robot("ur10")) == (None,)
 

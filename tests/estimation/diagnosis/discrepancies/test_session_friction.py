@@ -14,7 +14,7 @@ from estimation.models.extension import find_effect
 from robots.robot import Robot
 from robots.signals import Log
 from robots.terms.discrepancies.patterns import Pattern, is_of_time
-from robots.terms.discrepancies.session_friction import SESSIONS, SessionFriction
+from robots.terms.discrepancies.session_friction import MOST_SESSIONS, SessionFriction
 from robots.terms.effects import Situation
 from robots.terms.situations.joining import join_situations
 
@@ -30,7 +30,7 @@ def test_each_session_has_shares_of_its_own(swept: Situation) -> None:
     """Each session after the first has a column per joint; a short pause does not begin a session."""
     days = join_situations([_later(swept, by) for by in (0.0, 30.0, DAY, 2 * DAY)])
     rows, n = len(swept), 6
-    X = SessionFriction().columns(days, None).reshape(4 * rows, n, SESSIONS - 1, n)
+    X = SessionFriction().columns(days, None).reshape(4 * rows, n, MOST_SESSIONS - 1, n)
     assert not X[: 2 * rows].any()
     assert not X[:, :, 2:].any()
     for k in (0, 1):
@@ -40,7 +40,7 @@ def test_each_session_has_shares_of_its_own(swept: Situation) -> None:
     assert len(SessionFriction().grid(days, None)) == 1
     assert SessionFriction().grid(join_situations([swept, _later(swept, 30.0)]), None) == ()
     many = join_situations([_later(swept, k * DAY) for k in range(9)])
-    assert SessionFriction().columns(many, None).any(axis=(0, 1)).sum() == (SESSIONS - 1) * n
+    assert SessionFriction().columns(many, None).any(axis=(0, 1)).sum() == (MOST_SESSIONS - 1) * n
 
 
 def test_logs_whose_pauses_nobody_noted_may_be_of_several_days(swept: Situation) -> None:

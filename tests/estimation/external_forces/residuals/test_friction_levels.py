@@ -5,7 +5,12 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from estimation.external_forces.residuals.friction_levels import MEMORY, contact_weight, friction_excess, steady_clock
+from estimation.external_forces.residuals.friction_levels import (
+    FRICTION_MEMORY,
+    contact_weight,
+    friction_excess,
+    steady_clock,
+)
 
 
 def signals(seconds, excess):
@@ -24,7 +29,7 @@ def test_drift_is_followed_with_the_lag_of_the_memory():
     """Of a ramp the excess is late by the time constant, as any first-order filter."""
     t, external, friction, begins = signals(300.0, lambda t: 1e-3 * t)
     found = friction_excess(t, external, friction, begins)
-    assert found[-1, 0] == pytest.approx(1e-3 * (t[-1] - MEMORY), rel=0.01)
+    assert found[-1, 0] == pytest.approx(1e-3 * (t[-1] - FRICTION_MEMORY), rel=0.01)
 
 
 def test_short_push_hardly_counts():
@@ -33,7 +38,7 @@ def test_short_push_hardly_counts():
     push = (t > 60.0) & (t <= 60.2)
     external[push] -= friction[push]
     found = friction_excess(t, external, friction, begins)
-    assert np.abs(found).max() == pytest.approx(0.2 / MEMORY, rel=0.05)
+    assert np.abs(found).max() == pytest.approx(0.2 / FRICTION_MEMORY, rel=0.05)
 
 
 def test_strong_push_counts_as_one_at_the_threshold():
@@ -43,7 +48,7 @@ def test_strong_push_counts_as_one_at_the_threshold():
     external[push] -= 50.0 * friction[push]
     weights = contact_weight(np.where(push, 50.0**2, 0.5))
     found = friction_excess(t, external, friction, begins, weights)
-    assert np.abs(found).max() == pytest.approx(0.2 / MEMORY, rel=0.05)
+    assert np.abs(found).max() == pytest.approx(0.2 / FRICTION_MEMORY, rel=0.05)
     t, external, friction, begins = signals(60.0, lambda t: 0.2 + 0 * t)
     np.testing.assert_allclose(friction_excess(t, external, friction, begins, np.full(len(t), 0.3)), 0.2, atol=1e-9)
 

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from estimation.external_forces.thresholds.error_models import PRIOR, ErrorModel, fit_error_model
+from estimation.external_forces.thresholds.error_models import PRIOR_SECONDS, ErrorModel, fit_error_model
 
 
 def samples(exact, seed=0, count=40_000, beyond=0.0):
@@ -69,10 +69,10 @@ def test_what_healthy_logs_show_of_the_parameters_errors_is_recovered(exact):
 
 @pytest.mark.slow
 def test_band_of_other_motions_counts_less_the_more_healthy_motion_there_is(exact):
-    """Without new motion the band counts in full; with as much as `PRIOR` half of its variance; beyond it in full."""
+    """Without new motion the band counts in full; with `PRIOR_SECONDS` half of its variance; beyond it in full."""
     model, _, residual, dq, friction, variance = samples(exact, count=4000, beyond=0.04)
     counts, growth = np.ones(len(dq), dtype=bool), np.array([3.0, 2.0, 0.0])
-    for seconds, share in ((0.0, 1.0), (PRIOR, 0.5)):
+    for seconds, share in ((0.0, 1.0), (PRIOR_SECONDS, 0.5)):
         found = fit_error_model(model, residual, dq, friction, variance, counts, lambda x: x, seconds=seconds)
         np.testing.assert_allclose(found.inside, share * growth**2)
         # The largest variance in these logs is the reach; twice that adds a variance of growth^2 times it.

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from estimation.external_forces import estimate_forces
-from estimation.external_forces.thresholds.error_models import PRIOR
+from estimation.external_forces.thresholds.error_models import PRIOR_SECONDS
 
 pytestmark = pytest.mark.slow
 
@@ -38,7 +38,7 @@ def test_repeated_motion_says_nothing_new(banded, pushed_log):
     )
     assert once.threshold.seconds == pytest.approx(40.0, rel=0.05)
     assert again.threshold.seconds == pytest.approx(40.0, rel=0.05)
-    np.testing.assert_allclose(once.errors.inside, 4.0 * PRIOR / (PRIOR + 40.0), rtol=0.02)
+    np.testing.assert_allclose(once.errors.inside, 4.0 * PRIOR_SECONDS / (PRIOR_SECONDS + 40.0), rtol=0.02)
     np.testing.assert_allclose(again.errors.inside, once.errors.inside, rtol=0.02)
     assert once.check is not None
     assert again.check is not None

@@ -65,7 +65,7 @@ def test_pieces_sum_to_the_whole(
 ) -> None:
     """Pieces, row groups and parts with borders anywhere give the values of the log in memory, to rounding."""
     for module in (pieces, preparation):
-        monkeypatch.setattr(module, "PIECE", 7_000)
+        monkeypatch.setattr(module, "SMOOTHED_ROWS", 7_000)
     path = in_parts(file, tmp_path / "parts", 11_000, 4_700) if parts else file
     whole = identify(robot, read_log(file), candidates=LOW_PASS)
     found = identify_stream(robot, open_stream(path, 2))
@@ -85,7 +85,7 @@ def test_pieces_sum_to_the_whole(
 @pytest.mark.slow
 def test_a_pause_between_parts(robot: Robot, file: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Parts with a pause between them are fitted as two logs: nothing is interpolated, and names need no order."""
-    monkeypatch.setattr(survey, "BLOCK", 8_000)
+    monkeypatch.setattr(survey, "SURVEYED_ROWS", 8_000)
     folder = tmp_path / "parts"
     folder.mkdir()
     log = read_log(file)

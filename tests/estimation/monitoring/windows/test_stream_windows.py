@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from estimation.monitoring.windows.stream_windows import LONGEST, StreamWindows
+from estimation.monitoring.windows.stream_windows import LONGEST_WINDOW, StreamWindows
 
 STEP = 0.01
 
@@ -44,7 +44,7 @@ def test_rests_make_a_window_longer():
 def test_a_robot_that_hardly_moves_still_ends_windows():
     """Long rests do not keep rows for ever."""
     windows = cut(rows_of(1.0, 60.0, 5), 10_000)
-    assert windows[:-1, 1] - windows[:-1, 0] == pytest.approx(10.0 * LONGEST)
+    assert windows[:-1, 1] - windows[:-1, 0] == pytest.approx(10.0 * LONGEST_WINDOW)
 
 
 @pytest.mark.parametrize("chunk", [7, 100, 1111])

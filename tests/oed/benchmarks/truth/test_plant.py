@@ -14,11 +14,11 @@ from scipy.integrate import solve_ivp
 from oed.benchmarks.truth.cases import Hidden, draw_case
 from oed.benchmarks.truth.description import urdf_of, write_description
 from oed.benchmarks.truth.dynamics import rigid_torque
-from oed.benchmarks.truth.effects import KNOWN, STRANGERS
+from oed.benchmarks.truth.effects import KNOWN, UNLISTED
 from oed.benchmarks.truth.effects.friction import LoadDependent, LuGre, Stribeck, _bristles
-from oed.benchmarks.truth.effects.strangers import CrossWave
 from oed.benchmarks.truth.effects.surroundings import Payload
 from oed.benchmarks.truth.effects.transmission import Backlash, Balancer, Elastic
+from oed.benchmarks.truth.effects.unlisted_joint_effects import CrossWave
 from oed.benchmarks.truth.experiments import KnownChange, Stage
 from oed.benchmarks.truth.kinds import KINDS
 from oed.benchmarks.truth.machines import draw_machine
@@ -112,7 +112,7 @@ def test_every_effect_changes_the_log_and_is_reproducible() -> None:
     """Every effect can be drawn and adds torque, and the same seed gives the same log."""
     machine = draw_machine("panda", np.random.default_rng(5))
     reference = draw_periodic(machine, np.random.default_rng(6), cycles=2)
-    for choice in (*KNOWN, *STRANGERS):
+    for choice in (*KNOWN, *UNLISTED):
         joints = choice.joints(machine)
         effect = choice.draw(machine, np.random.default_rng(8), joints[-1], 10.0)
         effect = effect.of(min(effect.largest / 4, 1.0))

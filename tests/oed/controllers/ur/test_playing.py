@@ -104,7 +104,7 @@ def test_played_and_recorded(cycle: float, ur10: Robot, log: Path) -> None:
 )
 def test_what_ends_a_motion(settings: dict[str, Any], words: str, ur10: Robot, log: Path, monkeypatch: Any) -> None:
     """Each fault ends the command with one message; the robot stands, and the log is whole up to then."""
-    monkeypatch.setattr("oed.controllers.clients.program.CONNECTS", 0.5)
+    monkeypatch.setattr("oed.controllers.clients.program.CONNECT_TIMEOUT", 0.5)
     motion = swing(ur10, 750)
     with playing(ur10, **settings) as (controller, place):
         with pytest.raises((ControllerError, LinkError), match=words):

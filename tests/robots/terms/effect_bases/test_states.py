@@ -11,7 +11,7 @@ from scipy.integrate import solve_ivp
 
 from robots.terms.effect_bases.states import best_apart, bristle, change_times
 from robots.terms.effects import EFFECTS
-from robots.terms.effects.thermal_friction import SLOWER, heat
+from robots.terms.effects.thermal_friction import HOUSING_TIME_RATIO, heat
 from robots.terms.situations.situation import situation
 
 
@@ -74,8 +74,8 @@ def test_a_warm_housing_keeps_heat_through_a_pause(seen):
     power = np.maximum(now.friction[:, 1] * now.dq[:, 1], 0) / 1000
     # Two nodes whose eigenvalues are -1 / T and -1 / (c T): y' = p - a y + b z, z' = d (y - z).
     fast, weight = 20.0, 1.5
-    slow = SLOWER * fast
-    share = weight / SLOWER
+    slow = HOUSING_TIME_RATIO * fast
+    share = weight / HOUSING_TIME_RATIO
     # Laplace: x = p (1 / (s + 1/T) + share / (s + 1/(c T))) = p (1 + share) (s + zero) / ((s + 1/T) (s + 1/(c T))).
     zero = (1 / slow + share / fast) / (1 + share)
 

@@ -10,7 +10,7 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from robots.terms.effects import EFFECTS
-from robots.terms.effects.backlash import HOVERS, _lag, _spread
+from robots.terms.effects.backlash import HOVERING_LOAD, _lag, _spread
 
 Array = np.ndarray
 LANDING = 0.012
@@ -130,7 +130,7 @@ def test_size_and_time_of_a_crossing_show_one_play(seen) -> None:
 
 def _sides_changed(load: Array) -> Array:
     """Rows before which a load was last of its old sign, one that exceeds a twentieth of its RMS beyond zero."""
-    far, side, last, rows = HOVERS * np.sqrt(np.mean(load**2)), 0.0, 0, []
+    far, side, last, rows = HOVERING_LOAD * np.sqrt(np.mean(load**2)), 0.0, 0, []
     for k, (now, after) in enumerate(pairwise(load)):
         if abs(now) > far:
             side = side or np.sign(now)

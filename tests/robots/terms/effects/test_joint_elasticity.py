@@ -8,7 +8,7 @@ import numpy as np
 
 from robots import load_robot
 from robots.terms.effects import EFFECTS
-from robots.terms.effects.joint_elasticity import APART, SCANNED, followed, least_inertia
+from robots.terms.effects.joint_elasticity import LARGEST_STIFFNESS_RATIO, SCANNED, followed, least_inertia
 
 
 def test_a_wrist_whose_inertia_is_fitted_negative_swings_all_the_same() -> None:
@@ -30,6 +30,6 @@ def test_a_gear_has_one_stiffness() -> None:
     gear, robot = EFFECTS["joint_elasticity"], load_robot("ur10")
     compliance = np.array([1e-4])
     assert gear.is_plausible(robot, 2, compliance, (1e4, 0.0, 0.05))
-    assert gear.is_plausible(robot, 2, compliance, (0.9 * APART * 1e4, 0.0, 0.05))
-    for ratio in (1.1 * APART, 1 / (1.1 * APART)):
+    assert gear.is_plausible(robot, 2, compliance, (0.9 * LARGEST_STIFFNESS_RATIO * 1e4, 0.0, 0.05))
+    for ratio in (1.1 * LARGEST_STIFFNESS_RATIO, 1 / (1.1 * LARGEST_STIFFNESS_RATIO)):
         assert not gear.is_plausible(robot, 2, compliance, (ratio * 1e4, 0.0, 0.05))

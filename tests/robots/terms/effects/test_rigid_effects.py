@@ -14,7 +14,7 @@ from robots.geometry.chain import Chain
 from robots.regressor import default_model
 from robots.robot import Robot
 from robots.terms.effects import EFFECTS
-from robots.terms.effects.backlash import LANDS
+from robots.terms.effects.backlash import LANDING_TIME
 from robots.terms.effects.base_tilt import level_axes
 from robots.terms.effects.joint_elasticity import followed
 from robots.terms.situations.situation import situation
@@ -188,7 +188,7 @@ def test_size_of_an_effect_tells_its_time(seen):
     bare = seen(5, seed=1, robot=replace(now.robot, rotor_inertia=np.zeros(5)))
     for known, at, count in ((True, now, 7), (False, bare, 15)):
         crossings = EFFECTS["backlash"].likely(at, 2, (1e-3, 0.2, 0.0, 0.03), np.array([2e-4]))
-        assert crossings[0] == (4e-4, 0.0, 0.0, LANDS)
+        assert crossings[0] == (4e-4, 0.0, 0.0, LANDING_TIME)
         assert len(set(crossings)) == count
         assert (None,) * 4 not in crossings
         assert ((None, None, 0.0, None) in crossings) is not known
