@@ -11,7 +11,6 @@ from numpy.typing import NDArray
 
 from estimation.diagnosis.base_models.baseline import Baseline
 from estimation.diagnosis.calibration import MIN_COUNTED_ENERGY, MIN_DISTANT_ENERGY
-from estimation.diagnosis.hypothesis_tests.groups import Group
 from estimation.diagnosis.hypothesis_tests.hypotheses import Hypothesis
 from estimation.diagnosis.noise_models.high_frequency_band import HighBand
 from estimation.diagnosis.noise_models.whitening import Whitening
@@ -288,3 +287,42 @@ class Problem:
 
 def _squares(columns: Array | Small) -> Array:
     return np.asarray((columns.T[:, None] @ columns.T[:, :, None])[:, 0, 0], dtype=float)
+
+
+@dataclass(frozen=True, eq=False)
+class Group:
+    """A hypothesis at one shape, whitened, with the base model projected out of its inner products.
+
+    Attributes:
+        joints: joints on which it acts, from 0.
+        columns: whitened columns (N, k) of each of the joints.
+        against: <X, Q> (k, b), Q the base model's orthonormal columns.
+        gram: Gram matrix of the columns (k, k), base model projected out.
+        raw: squared norms (k,) before the projection; infinite for columns that are nearly all in masked rows.
+        cross: inner products with the residual (k,).
+        high_band_columns: white columns (N', k) of each joint above its band; none for effects that are not
+            searched `above_band`.
+        reversal_columns: column of each joint's reversal timing over its error (n, k); None if the effect does not
+            delay all torque.
+    """
+
+    joints: tuple[int, ...]
+    columns: tuple[Small, ...]
+    against: Array
+    gram: Array
+    raw: Array
+    cross: Array
+    high_band_columns: tuple[Small, ...] = ()
+    reversal_columns: Array | None = None
+
+    @property
+    def size(self) -> int:
+        """Number of columns k."""
+        return len(self.raw)
+
+    @property
+    def by_reversals(self) -> bool:
+        """Whether most of its information is from reversal timing, which held-out errors do not contain."""
+        return self.reversal_columns is not None and 2.0 * float(np.sum(self.reversal_columns**2)) > float(
+            self.gram[0, 0]
+        )

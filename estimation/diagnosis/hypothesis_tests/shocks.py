@@ -11,8 +11,7 @@ from scipy.signal import correlate
 
 from estimation.diagnosis.calibration import MAX_GLITCH_SHARE, SHOCK_COUNT
 from estimation.diagnosis.hypothesis_tests.fitted_effects import FittedEffect
-from estimation.diagnosis.hypothesis_tests.groups import Group
-from estimation.diagnosis.hypothesis_tests.problem import Problem
+from estimation.diagnosis.hypothesis_tests.problem import Group, Problem
 from estimation.diagnosis.hypothesis_tests.scoring import Accepted, accept, score
 
 Array = NDArray[np.float64]

@@ -15,7 +15,7 @@ from estimation.diagnosis.base_models.baseline import FAINT, Baseline
 from estimation.diagnosis.calibration import MIN_HIGH_BAND
 from estimation.diagnosis.noise_models.frequency_bands import TRANSITION, Band, low_pass
 from estimation.diagnosis.noise_models.masked_rows import find_masked_rows
-from estimation.diagnosis.noise_models.spectral_lines import remove_lines
+from estimation.diagnosis.noise_models.noise_spectrum import remove_lines
 from estimation.diagnosis.noise_models.whitening import Whitening
 from estimation.diagnosis.recordings.recording import Recording, rest_rows
 from estimation.linear_algebra.orthonormal import orthonormal

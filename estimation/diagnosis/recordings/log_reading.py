@@ -10,13 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 
-from estimation.diagnosis.recordings.constant_speed import remove_encoder_lines
 from estimation.diagnosis.recordings.directions import ALIKE, Directions, find_directions
-from estimation.diagnosis.recordings.harmonic_projection import project_on_harmonics
-from estimation.diagnosis.recordings.position_cutoff import select_position_cutoff
-from estimation.diagnosis.recordings.position_spectra import Spectra, Spectrum
+from estimation.diagnosis.recordings.position_spectra import Spectra, Spectrum, select_position_cutoff
 from estimation.diagnosis.recordings.recording import Recording
-from estimation.diagnosis.recordings.smoothed_motion import smooth_motion
+from estimation.diagnosis.recordings.smoothed_motion import project_on_harmonics, remove_encoder_lines, smooth_motion
 from estimation.diagnosis.recordings.thinning import decimate_recording, keep_clipped_level, low_pass_rows
 from estimation.gate.measurements.resolution import lattice_step
 from estimation.preprocessing import Cycle

@@ -23,10 +23,8 @@ from estimation.diagnosis.searches.acceptance import (
     is_accepted,
     is_certain,
 )
-from estimation.diagnosis.searches.candidate_screening import screen_candidates
-from estimation.diagnosis.searches.joint_shape_refinement import refine_shapes_jointly
-from estimation.diagnosis.searches.relinearisation import relinearise
-from estimation.diagnosis.searches.swap_search import refine_candidates, refine_with_swaps, remeasure
+from estimation.diagnosis.searches.joint_refinement import refine_shapes_jointly, relinearise
+from estimation.diagnosis.searches.swap_search import refine_candidates, refine_with_swaps, remeasure, screen_candidates
 from robots.terms.effect_bases.capabilities import Persistence
 
 FAR_MORE = 1.5  # ratio of gains by which a joint refinement must strengthen a candidate

@@ -11,10 +11,9 @@ from estimation.diagnosis.findings import Gain
 from estimation.diagnosis.hypothesis_tests.fitted_effects import FittedEffect
 from estimation.diagnosis.hypothesis_tests.problem import Problem
 from estimation.diagnosis.joint_fits.extended_fit import ExtendedFit, fit_extended
-from estimation.diagnosis.validations.decision import Decision, Reason
 from estimation.diagnosis.validations.gear_compliance import EFFECT as ELASTICITY
 from estimation.diagnosis.validations.prediction_settings import with_band, with_best_cutoff, with_best_sign_sharpness
-from estimation.diagnosis.validations.validated_findings import ValidatedFindings
+from estimation.diagnosis.validations.validated_findings import Decision, Reason, ValidatedFindings
 from estimation.identifications.identification import recorded_ranges
 from estimation.logs.provenance import describe_logs
 from estimation.models.model import Model

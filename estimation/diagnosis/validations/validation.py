@@ -15,11 +15,10 @@ from estimation.diagnosis.hypothesis_tests.refinement import refine_member
 from estimation.diagnosis.hypothesis_tests.scan import measure
 from estimation.diagnosis.recordings.recording import cut_recording
 from estimation.diagnosis.validations.equivalent_shapes import complete_effects, equivalent_shapes
-from estimation.diagnosis.validations.free_functions import free_functions
 from estimation.diagnosis.validations.gear_compliance import MeasuredCompliance, measure_gear_compliance
 from estimation.diagnosis.validations.held_out_errors import HeldOutResult, measure_held_out
 from estimation.diagnosis.validations.held_out_validation import validate_on_held_out
-from estimation.diagnosis.validations.name_comparison import ComparedNames
+from estimation.diagnosis.validations.name_comparison import ComparedNames, free_functions
 from estimation.diagnosis.validations.validated_findings import ValidatedFindings
 from robots.robot import Robot
 from robots.terms.discrepancies.patterns import all_patterns

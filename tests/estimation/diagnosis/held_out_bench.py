@@ -10,8 +10,7 @@ from types import SimpleNamespace
 import numpy as np
 
 from estimation.diagnosis.findings import Gain
-from estimation.diagnosis.hypothesis_tests.evidence import Evidence
-from estimation.diagnosis.hypothesis_tests.fitted_effects import FittedEffect
+from estimation.diagnosis.hypothesis_tests.fitted_effects import Evidence, FittedEffect
 from estimation.diagnosis.hypothesis_tests.hypotheses import Hypothesis
 from estimation.diagnosis.searches.selection import SelectedEffect
 from estimation.diagnosis.validations.held_out_validation import validate_on_held_out

@@ -12,14 +12,14 @@ import pytest
 from estimation.diagnosis.calibration import MIN_BIC_GAIN, RARE_ODDS
 from estimation.diagnosis.hypothesis_tests import refinement
 from estimation.diagnosis.hypothesis_tests.fitted_effects import FittedEffect
-from estimation.diagnosis.hypothesis_tests.groups import Group
 from estimation.diagnosis.hypothesis_tests.hypotheses import Hypothesis
 from estimation.diagnosis.hypothesis_tests.joint_agreement import PerJointEvidence
+from estimation.diagnosis.hypothesis_tests.problem import Group
 from estimation.diagnosis.hypothesis_tests.scan import Outcome
 from estimation.diagnosis.hypothesis_tests.scoring import Limited
 from estimation.diagnosis.searches import acceptance
 from estimation.diagnosis.searches.acceptance import SURE, exceeds_leakage, is_certain, passes_bic
-from estimation.diagnosis.searches.candidate_screening import screen_candidates
+from estimation.diagnosis.searches.swap_search import screen_candidates
 from robots.terms.effects import EFFECTS, Shape
 from robots.terms.effects.stribeck import Stribeck
 

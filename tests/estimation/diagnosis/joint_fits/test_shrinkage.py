@@ -10,7 +10,7 @@ from scipy.stats import multivariate_normal
 
 from estimation.diagnosis.base_models.priors import solve_map
 from estimation.diagnosis.hypothesis_tests.fitted_effects import FittedEffect
-from estimation.diagnosis.hypothesis_tests.groups import Group
+from estimation.diagnosis.hypothesis_tests.problem import Group
 from estimation.diagnosis.hypothesis_tests.scoring import Score, visible_root
 from estimation.diagnosis.joint_fits.shrinkage import shrinkage_precision
 from estimation.regressions.parameter_priors import GaussianPrior

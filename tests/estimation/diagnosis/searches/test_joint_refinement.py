@@ -14,7 +14,7 @@ from estimation.diagnosis.hypothesis_tests.refinement import refine
 from estimation.diagnosis.hypothesis_tests.scoring import accept
 from estimation.diagnosis.joint_fits.extended_fit import dense
 from estimation.diagnosis.recordings.log_reading import build_recording
-from estimation.diagnosis.searches.relinearisation import relinearise
+from estimation.diagnosis.searches.joint_refinement import relinearise
 from robots.robot import Robot
 from robots.signals import Log
 from robots.terms.effects import EFFECTS
