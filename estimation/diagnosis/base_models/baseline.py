@@ -14,6 +14,8 @@ from estimation.diagnosis.recordings.directions import SHARP, sharpest_sign_velo
 from estimation.diagnosis.recordings.log_reading import Recording
 from estimation.diagnosis.recordings.thinning import evaluate_at_full_rate
 from estimation.linear_algebra.orthonormal import orthonormal
+from estimation.regressions.moments import Moments
+from estimation.regressions.parameter_priors import GaussianPrior
 from robots.base_parameters import BaseParameters, find_base_parameters
 from robots.regressor import default_model
 from robots.robot import Robot
@@ -39,13 +41,25 @@ class Baseline:
 
     Attributes:
         base: base parameters of the model.
-        regressor: columns (N, n, b).
-        nuisance: columns (N, n, m) that are fitted too but belong to no finding: errors of the sign widths.
+        columns: columns (N, n, b + m): those of the base parameters, then others that are fitted too but belong to no
+            finding: errors of the sign widths.
     """
 
     base: BaseParameters
-    regressor: Array
-    nuisance: Array
+    columns: Array
+
+    @property
+    def regressor(self) -> Array:
+        """Columns of the base parameters (N, n, b)."""
+        return self.columns[:, :, : self.base.size]
+
+    def moments(self, weights: Array, tau: Array) -> Moments:
+        """Sums the normal equations of base parameters and nuisance for torque (N, n), rows weighted by (N, n)."""
+        return Moments.of(self.columns, tau, weights)
+
+    def fitted(self, weights: Array, tau: Array, pull: GaussianPrior) -> Array:
+        """Fits the base parameters (b,) to torque (N, n) by their posterior maximum, rows weighted by (N, n)."""
+        return self.moments(weights, tau).pulled(pull).posterior()[: self.base.size]
 
     def situation(self, recording: Recording, values: Array) -> Situation:
         """Returns the quantities on which effects may depend, with base parameters (b,)."""
@@ -115,7 +129,7 @@ def build_baseline(
         for i in signs:
             joint = base.columns[i].joint - 1
             Y[:, joint, i] = friction_signs(recording, joint, np.array([chosen[joint]]))[:, 0]
-    return Baseline(base, Y, _nuisance(recording, chosen))
+    return Baseline(base, np.concatenate([Y, _nuisance(recording, chosen)], axis=2))
 
 
 def _nuisance(recording: Recording, chosen: tuple[float, ...] | None) -> Array:

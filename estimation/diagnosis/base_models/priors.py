@@ -7,7 +7,6 @@ from numpy.typing import NDArray
 
 from estimation.diagnosis.base_models.baseline import Baseline
 from estimation.diagnosis.recordings.log_reading import Recording
-from estimation.linear_algebra.scaled import inverse_root
 from estimation.regressions.parameter_priors import (
     OWN,
     SILENT,
@@ -22,8 +21,6 @@ Array = NDArray[np.float64]
 
 # Quantile of a joint's speed that counts as its largest.
 FASTEST = 0.999
-# Directions below this share of the largest are not determined.
-FAINT = 1e-12
 
 
 def base_model_prior(baseline: Baseline, recording: Recording, strength: float = 1.0) -> GaussianPrior:
@@ -63,43 +60,10 @@ def base_model_prior(baseline: Baseline, recording: Recording, strength: float =
         usual = np.array([usual_share(column) for column in baseline.base.columns])
         share = (levels / torque[:, None]).max(axis=0) / usual
         pull = GaussianPrior(np.diag(np.maximum(share, SILENT) ** 2), np.zeros(len(own)))
-    b, m = len(pull.target), baseline.nuisance.shape[2]
-    precision = np.zeros((b + m, b + m))
+    b, size = len(pull.target), baseline.columns.shape[2]
+    m = size - b
+    precision = np.zeros((size, size))
     precision[:b, :b] = pull.precision
     # Errors of the sign widths need a bound, too: rows that hardly contain them would allow any value.
-    precision[range(b, b + m), range(b, b + m)] = 1.0 / (OWN * torque[:m]) ** 2
+    precision[range(b, size), range(b, size)] = 1.0 / (OWN * torque[:m]) ** 2
     return GaussianPrior(strength * precision, np.concatenate([pull.target, np.zeros(m)]))
-
-
-def solve_map(gram: Array, cross: Array, pull: GaussianPrior) -> Array:
-    """Solves normal equations (p, p), (p,) with a prior on the first columns, or on all of them.
-
-    Directions that neither the data nor the prior determine are zero, as in the least-norm solution.
-    """
-    root, aim = _root(gram, pull), _aim(cross, pull)
-    return np.asarray(root @ (root.T @ aim))
-
-
-def solve_least_squares(gram: Array, cross: Array) -> Array:
-    """Solves normal equations (p, p), (p,) without a prior."""
-    return solve_map(gram, cross, GaussianPrior(np.zeros((0, 0)), np.zeros(0)))
-
-
-def explained_chi2(gram: Array, cross: Array, pull: GaussianPrior) -> float:
-    """Computes the energy that the fit with a prior explains, minus the penalty of the prior."""
-    projected = _root(gram, pull).T @ _aim(cross, pull)
-    return float(projected @ projected - pull.target @ pull.precision @ pull.target)
-
-
-def _aim(cross: Array, pull: GaussianPrior) -> Array:
-    aim = cross.copy()
-    aim[: len(pull.target)] += pull.precision @ pull.target
-    return aim
-
-
-def _root(gram: Array, pull: GaussianPrior) -> Array:
-    """Factorises the inverse of a Gram matrix (p, p) plus prior as R R', with R (p, r), in determined directions."""
-    b = len(pull.target)
-    gram = gram.copy()
-    gram[:b, :b] += pull.precision
-    return inverse_root(gram, FAINT)

@@ -108,7 +108,7 @@ def planned_problem(
     rough = recording.tau + ROUGH * recording.tau.std(axis=0) * np.tanh(joined.dq / SHARP)
     baseline = build_baseline(find_base_parameters(model), replace(recording, tau=rough), whitening.scale)
     # The data determine the known parameters exactly, so no prior is needed.
-    size = baseline.base.size + baseline.nuisance.shape[2]
+    size = baseline.columns.shape[2]
     free = GaussianPrior(np.zeros((size, size)), np.zeros(size))
     return build_problem(recording, baseline, whitening, pull=free)
 

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from estimation.diagnosis.base_models.baseline import FAINT, Baseline
-from estimation.diagnosis.base_models.priors import base_model_prior, solve_map
+from estimation.diagnosis.base_models.priors import base_model_prior
 from estimation.diagnosis.hypothesis_tests.problem import Problem
 from estimation.diagnosis.noise_models.high_frequency_band import HighBand
 from estimation.diagnosis.noise_models.whitening import Whitening
@@ -44,7 +44,7 @@ def build_problem(
     """
     n = recording.n
     root = np.linalg.cholesky(whitening.precision)  # P = L L'
-    columns = np.concatenate([baseline.regressor, baseline.nuisance], axis=2)
+    columns = baseline.columns
     norms = np.sqrt((columns**2).sum(axis=(0, 1)))
     white = whitening.all(columns[:, :, norms > 0])
     # A column that acts only in rows of unknown friction sign is rounding after whitening.
@@ -58,14 +58,15 @@ def build_problem(
     tilted = tilted - np.einsum("nkb,b->nk", Q, np.einsum("nkb,nk->b", Q, tilted, optimize=True), optimize=True)
     scales = whitening.scales(len(recording))
     own = recording.tau if extra is None else recording.tau - extra
-    gram, cross = normal_equations(baseline, ~recording.sign_unknown / scales, own)
+    weights = ~recording.sign_unknown / scales
+    moments = baseline.moments(weights, own).joined()
     if pull is None:
         strength = whitening.row_weight
         pull = inflate_conflicting_prior(
-            base_model_prior(baseline, recording, strength), gram.sum(axis=0), cross.sum(axis=0), strength
+            base_model_prior(baseline, recording, strength), moments.gram[0], moments.cross[0], strength
         )
-    values = solve_map(gram.sum(axis=0), cross.sum(axis=0), pull)[: baseline.base.size]
-    alone = values if extra is None else fit_values(baseline, scales, recording.sign_unknown, recording.tau, pull)
+    values = moments.pulled(pull).posterior()[: baseline.base.size]
+    alone = values if extra is None else baseline.fitted(weights, recording.tau, pull)
     remainder = recording.tau - baseline.regressor @ alone
     now = with_gear_load(baseline.situation(recording, values), bearing)
     return Problem(
@@ -83,34 +84,3 @@ def build_problem(
         delayed_torque_state=None if followed is None else now.beside(followed),
         extra_load=bearing,
     )
-
-
-def fit_values(baseline: Baseline, scale: Array, unsure: NDArray[np.bool_], tau: Array, pull: GaussianPrior) -> Array:
-    """Fits base parameters (b,) to torque (N, n) by their posterior maximum.
-
-    Args:
-        baseline: the base model.
-        scale: standard deviation of the noise, per joint (n,) or per row (N, n) [N m or N].
-        unsure: rows (N, n) without weight.
-        tau: torque (N, n) [N m or N].
-        pull: prior, which determines directions that the log does not.
-    """
-    gram, cross = normal_equations(baseline, ~unsure / scale, tau)
-    return solve_map(gram.sum(axis=0), cross.sum(axis=0), pull)[: baseline.base.size]
-
-
-def normal_equations(baseline: Baseline, weights: Array, tau: Array) -> tuple[Array, Array]:
-    """Returns each joint's normal equations (n, p, p), (n, p) of base parameters and nuisance.
-
-    Args:
-        baseline: the base model, with p columns including nuisance.
-        weights: row weights (N, n) [1/(N m) or 1/N].
-        tau: torque (N, n) [N m or N].
-    """
-    size = baseline.regressor.shape[2] + baseline.nuisance.shape[2]
-    gram, cross = np.zeros((tau.shape[1], size, size)), np.zeros((tau.shape[1], size))
-    for j, weight in enumerate(weights.T):
-        own = np.concatenate([baseline.regressor[:, j], baseline.nuisance[:, j]], axis=1) * weight[:, None]
-        gram[j] = own.T @ own
-        cross[j] = own.T @ (tau[:, j] * weight)
-    return gram, cross

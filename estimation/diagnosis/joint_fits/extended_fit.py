@@ -8,7 +8,6 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from estimation.diagnosis.base_models.priors import solve_map
 from estimation.diagnosis.hypothesis_tests.fitted_effects import FittedEffect, accept_all_but
 from estimation.diagnosis.hypothesis_tests.hypotheses import Hypothesis
 from estimation.diagnosis.hypothesis_tests.problem import Problem
@@ -25,7 +24,7 @@ from estimation.diagnosis.joint_fits.shrinkage import effects_prior
 from estimation.identifications.verdicts import NEGLIGIBLE, RELATIVE
 from estimation.models.extension import Extension
 from estimation.models.model import Model
-from estimation.regressions.parameter_priors import GaussianPrior
+from estimation.regressions.moments import Moments
 from estimation.uncertainty.blocks import widened_by_blocks
 from estimation.uncertainty.quantiles import NORMAL_95
 from robots.terms.effect_bases.capabilities import AboveBand, AtReversals
@@ -65,7 +64,7 @@ def fit_extended(problem: Problem, members: Sequence[FittedEffect], provenance: 
         provenance: origin of the model, as stored in it.
     """
     baseline, white = problem.baseline, problem.whitening
-    base = np.concatenate([baseline.regressor, baseline.nuisance], axis=2)
+    base = baseline.columns
     blocks, slices, deviations = [base], [], []
     at = base.shape[2]
     fitted_members: list[FittedEffect] = []
@@ -113,9 +112,9 @@ def fit_extended(problem: Problem, members: Sequence[FittedEffect], provenance: 
             forms[-1][:, start : start + size] = held
     free = flat[:, linear & ~known]
     # The prior is stated for plain rows of the log; `row_weight` converts it to white rows.
-    pull, kept = effects_prior(problem, members), ~known[linear]
-    pull = GaussianPrior(pull.precision[np.ix_(kept, kept)] / white.row_weight, pull.target[kept])
-    values[linear & ~known] = solve_map(free.T @ free, free.T @ (tau - flat[:, known] @ values[known]), pull)
+    pull = effects_prior(problem, members).columns(np.flatnonzero(~known[linear])).times(1.0 / white.row_weight)
+    rest = Moments.of(free[:, None], (tau - flat[:, known] @ values[known])[:, None])
+    values[linear & ~known] = rest.pulled(pull).posterior()
     by_reversals = reversal_columns(members, [start for start, *_ in slices], (problem.n, flat.shape[1]))
     covariance, unseen = _covariance(np.concatenate([flat, by_reversals, *forms]))
     covariance = widened_by_blocks(covariance, flat[:plain], (tau - flat @ values)[:plain])

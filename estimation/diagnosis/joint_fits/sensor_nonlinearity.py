@@ -8,7 +8,6 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from estimation.diagnosis.base_models.priors import solve_map
 from estimation.diagnosis.hypothesis_tests.fitted_effects import FittedEffect, accept_all_but
 from estimation.diagnosis.hypothesis_tests.problem import Problem
 from estimation.diagnosis.hypothesis_tests.refinement import clip_shape, refine
@@ -98,7 +97,7 @@ class _Search:
         # The distortion is evaluated at the base model's torque, so only the base columns are scaled.
         columns[:, :, : self.problem.baseline.base.size] *= passes[:, :, None]
         left = self.problem.recording.tau - self.fit.full @ values - self._distortion(now, members)
-        return solve_map(*self.fit.normal(left + columns @ np.concatenate(own), columns), self.problem.prior)
+        return self.fit.moments(left + columns @ np.concatenate(own), columns).posterior()
 
     def _moved(
         self, values: Array, members: Sequence[FittedEffect], goal: Array, share: float

@@ -9,13 +9,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from estimation.diagnosis.base_models.payload_and_gravity import build_situation
-from estimation.diagnosis.base_models.priors import solve_least_squares, solve_map
 from estimation.diagnosis.hypothesis_tests.fitted_effects import FittedEffect
 from estimation.diagnosis.hypothesis_tests.hypotheses import Hypothesis
 from estimation.diagnosis.hypothesis_tests.problem import Problem
 from estimation.diagnosis.joint_fits.extended_fit import dense, reversal_columns
 from estimation.diagnosis.noise_models.noise_nuisance_basis import is_short
 from estimation.diagnosis.recordings.recording import Recording
+from estimation.regressions.moments import Moments
 from robots.terms.effect_bases.capabilities import AtReversals, Reading
 from robots.terms.effect_bases.gear_load import with_gear_load
 from robots.terms.effects import Situation
@@ -122,8 +122,8 @@ class JointFit:
         baseline, recording = problem.baseline, problem.recording
         blocks = [dense(problem, member.hypothesis, member.shape) for member in members]
         self.problem = problem
-        self.full = np.concatenate([baseline.regressor, baseline.nuisance, *blocks], axis=2)
-        edges = np.cumsum([baseline.regressor.shape[2] + baseline.nuisance.shape[2], *(b.shape[2] for b in blocks)])
+        self.full = np.concatenate([baseline.columns, *blocks], axis=2)
+        edges = np.cumsum([baseline.columns.shape[2], *(b.shape[2] for b in blocks)])
         self.timed = reversal_columns(members, edges[:-1].tolist(), (recording.n, self.full.shape[2]))
         self.weights = (counted & ~recording.sign_unknown) / problem.whitening.scales(len(recording))
 
@@ -134,25 +134,21 @@ class JointFit:
             tau: torque (N, n) [N m or N].
             passes: derivative of the reading by the torque (N, n); 1 by default.
         """
-        return solve_map(*self.moments(tau, passes), self.problem.prior)
+        return self.moments(tau, self.full if passes is None else self.full * passes[:, :, None]).posterior()
 
-    def moments(self, tau: Array, passes: Array | None = None) -> tuple[Array, Array]:
-        """Returns the normal equations (b, b), (b,) of the same fit."""
-        return self.normal(tau, self.full if passes is None else self.full * passes[:, :, None])
-
-    def normal(self, tau: Array, columns: Array) -> tuple[Array, Array]:
-        """Returns the normal equations of torque (N, n) for given columns.
+    def moments(self, tau: Array, columns: Array) -> Moments:
+        """Returns the normal equations of torque (N, n) for given columns, with the prior.
 
         Args:
             tau: torque (N, n) [N m or N].
             columns: (N, n, p), the first b of which correspond to `full`.
         """
-        flat = (columns * self.weights[:, :, None]).reshape(-1, columns.shape[2])
-        gram, cross, b = flat.T @ flat, flat.T @ (tau * self.weights).reshape(-1), self.full.shape[2]
-        gram[:b, :b] += self.timed.T @ self.timed
-        if self.problem.timing is not None:
-            cross[:b] += self.timed.T @ self.problem.timing.residual
-        return gram, cross
+        moments = Moments.of(columns, tau, self.weights).joined().pulled(self.problem.prior)
+        if self.problem.timing is None:
+            return moments
+        more = np.zeros((len(self.timed), 1, columns.shape[2]))
+        more[:, 0, : self.full.shape[2]] = self.timed
+        return moments + Moments.of(more, self.problem.timing.residual[:, None])
 
     def total_torque(self, values: Array) -> Problem:
         """Returns the problem with the total torque of these values (b,)."""
@@ -169,13 +165,10 @@ def fit_jointly(problem: Problem, members: Sequence[FittedEffect]) -> tuple[Arra
         All values (b,); the residual (N, n) from which the noise is estimated; all columns (N, n, b).
     """
     both, tau = JointFit(problem, members, np.ones_like(problem.recording.sign_unknown)), problem.recording.tau
-    gram, cross = both.moments(tau)
-    values = solve_map(gram, cross, problem.prior)
-    return (
-        values,
-        tau - both.full @ (values if is_short(problem.recording) else solve_least_squares(gram, cross)),
-        both.full,
-    )
+    moments = both.moments(tau, both.full)
+    values = moments.posterior()
+    free = values if is_short(problem.recording) else moments.pulled(None).posterior()
+    return values, tau - both.full @ free, both.full
 
 
 def effect_columns(

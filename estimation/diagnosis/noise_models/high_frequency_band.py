@@ -151,7 +151,7 @@ def build_high_band(
         passing = _levelling(wide, recording, noise[:, j, None], counts, j, band.cutoff, length)
         left = _passed(wide, noise[:, j, None], j, passing)[:, 0] * counts
         counts *= _calmness(left, counts, round(BURST / (recording.step * wide.stride)))
-        own = np.concatenate([baseline.regressor[:, j], baseline.nuisance[:, j]], axis=1)
+        own = baseline.columns[:, j]
         base = orthonormal(_passed(wide, own[:, own.any(axis=0)], j, passing) * counts[:, None], FAINT)
         white = _passed(wide, remainder[:, j, None], j, passing)[:, 0] * counts
         joints.append(JointHighBand(passing, counts, base, white - base @ (base.T @ white), white))

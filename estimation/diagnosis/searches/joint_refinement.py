@@ -11,14 +11,12 @@ from dataclasses import replace
 
 import numpy as np
 
-from estimation.diagnosis.base_models.priors import solve_map
 from estimation.diagnosis.hypothesis_tests.fitted_effects import FittedEffect, accept_all_but
 from estimation.diagnosis.hypothesis_tests.problem import Problem
 from estimation.diagnosis.hypothesis_tests.refinement import refine
 from estimation.diagnosis.hypothesis_tests.scoring import accept
 from estimation.diagnosis.joint_fits.extended_fit import dense
 from estimation.diagnosis.searches.swap_search import remeasure
-from estimation.regressions.parameter_priors import GaussianPrior
 from robots.terms.effect_bases.capabilities import AtReversals, Reading
 from robots.terms.effect_bases.gear_load import with_gear_load
 
@@ -70,10 +68,8 @@ def relinearise(problem: Problem, members: Sequence[FittedEffect]) -> tuple[Prob
 def _with_base_model_beside(problem: Problem, extra: np.ndarray) -> Problem:
     """Fits the base model to the whitened torque without that of effects (N, n), and evaluates the situation there."""
     baseline, white = problem.baseline, problem.whitening
-    flat = white.independent(np.concatenate([baseline.regressor, baseline.nuisance], axis=2))
-    tau = white.independent(problem.recording.tau - extra)
-    pull = GaussianPrior(problem.prior.precision / white.row_weight, problem.prior.target)
-    values = solve_map(flat.T @ flat, flat.T @ tau, pull)[: baseline.base.size]
+    moments = white.moments(baseline.columns, problem.recording.tau - extra)
+    values = moments.pulled(problem.prior.times(1.0 / white.row_weight)).posterior()[: baseline.base.size]
     now = with_gear_load(baseline.situation(problem.recording, values), problem.extra_load)
     return replace(problem, situation=now)
 

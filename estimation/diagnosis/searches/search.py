@@ -8,18 +8,18 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from estimation.diagnosis.base_models.baseline import Baseline, build_baseline, inertia_matrix
-from estimation.diagnosis.base_models.priors import base_model_prior, solve_least_squares, solve_map
+from estimation.diagnosis.base_models.priors import base_model_prior
 from estimation.diagnosis.calibration import MAX_HIGH_BAND_ERROR
 from estimation.diagnosis.hypothesis_tests.hypotheses import Hypothesis, all_hypotheses
 from estimation.diagnosis.hypothesis_tests.problem import Problem
-from estimation.diagnosis.hypothesis_tests.problem_setup import build_problem, normal_equations
+from estimation.diagnosis.hypothesis_tests.problem_setup import build_problem
 from estimation.diagnosis.hypothesis_tests.scan import Entry, measure
 from estimation.diagnosis.joint_fits.total_torque import with_total_torque
 from estimation.diagnosis.noise_models.high_frequency_band import build_high_band
 from estimation.diagnosis.noise_models.noise_estimate import estimate_whitening, quiet_joints
 from estimation.diagnosis.noise_models.noise_nuisance_basis import build_nuisance_projection, is_short
 from estimation.diagnosis.recordings.log_reading import Recording
-from estimation.diagnosis.reversals.reversal_timing import measure_reversal_timing
+from estimation.diagnosis.reversals.reversal_timing import ReversalTiming, measure_reversal_timing
 from estimation.diagnosis.searches.refit import RefitResult, base_torque_changed, noise_decreased, refit
 from estimation.diagnosis.searches.selection import Selection, select, with_rivals
 from estimation.regressions.parameter_priors import inflate_conflicting_prior
@@ -74,8 +74,7 @@ def search(
         The last search, with the rivals of each selected effect.
     """
     hypotheses = all_hypotheses(base.model.robot, effects)
-    recording = _trust_reversal_rows(base, recording)
-    baseline, settled = fit_plain(base, recording)
+    recording, baseline, settled, timing = _with_reversal_rows(base, recording)
     last: Search | None = None
     blurred = False
     known: dict[Hypothesis, tuple[float, ...]] = {}
@@ -108,7 +107,8 @@ def search(
             # A base model fitted beside effects may leave a very different residual than the base model alone.
             upper = build_high_band(recording, baseline, posed.base_residual, settled.residual, whitening.bands, wide)
             posed = replace(posed, high_band=upper)
-        timing = measure_reversal_timing(recording, baseline, settled.values, *settled.without_delay())
+        if attempt:
+            timing = measure_reversal_timing(recording, baseline, settled.values, *settled.without_delay())
         if timing is not None:
             posed = replace(posed, timing=timing.beside(recording))
         give_back()
@@ -131,18 +131,26 @@ def search(
     return replace(last, selection=with_alternatives)
 
 
-def _trust_reversal_rows(base: BaseParameters, recording: Recording) -> Recording:
-    """Includes rows at reversals of joints whose acceleration errors are small, as checked with the base model."""
-    if not recording.sign_known_from_velocity.any():
-        return recording
+def _with_reversal_rows(
+    base: BaseParameters, recording: Recording
+) -> tuple[Recording, Baseline, RefitResult, ReversalTiming | None]:
+    """Includes rows at reversals of joints whose acceleration errors are small, as checked with the base model.
+
+    Returns:
+        The recording, the base model and its fit on it, and the timing of the torque at reversals.
+    """
     baseline, settled = fit_plain(base, recording)
-    inertia = inertia_matrix(baseline, recording, settled.values)
-    trusted = quiet_joints(recording, settled.residual, inertia)
     timing = measure_reversal_timing(recording, baseline, settled.values, settled.residual)
+    if not recording.sign_known_from_velocity.any():
+        return recording, baseline, settled, timing
+    trusted = quiet_joints(recording, settled.residual, inertia_matrix(baseline, recording, settled.values))
     if timing is not None and recording.reversal_time_error is not None:
         # Impulses in the torque may show a larger velocity error than the positions alone.
         trusted &= timing.kicks <= np.max(recording.reversal_time_error * np.abs(recording.ddq), axis=0)
-    return recording.with_trusted(trusted)
+    more = recording.with_trusted(trusted)
+    if not more.counted_rows.any():
+        return more, baseline, settled, timing
+    return more, *fit_plain(base, more), timing
 
 
 def fit_plain(base: BaseParameters, recording: Recording) -> tuple[Baseline, RefitResult]:
@@ -161,14 +169,12 @@ def fit_plain(base: BaseParameters, recording: Recording) -> tuple[Baseline, Ref
     """
     baseline, tau = build_baseline(base, recording), recording.tau
     counts, size = ~recording.sign_unknown, tau.std(axis=0) + 1e-12
-    pull, (grams, crosses) = (
-        base_model_prior(baseline, recording),
-        normal_equations(baseline, counts.astype(float), tau),
-    )
+    pull, moments = base_model_prior(baseline, recording), baseline.moments(counts.astype(float), tau)
     scale = size
     for _ in range(ROUNDS):
-        gram, cross = np.tensordot(scale**-2.0, grams, 1), scale**-2.0 @ crosses
-        values = solve_map(gram, cross, inflate_conflicting_prior(pull, gram, cross))[: baseline.base.size]
+        weighted = moments.joined(scale**-2.0)
+        prior = inflate_conflicting_prior(pull, weighted.gram[0], weighted.cross[0])
+        values = weighted.pulled(prior).posterior()[: baseline.base.size]
         left = tau - baseline.regressor @ values
         noise = np.sqrt((left**2 * counts).sum(axis=0) / np.maximum(counts.sum(axis=0), 1))
         before, scale = scale, np.clip(noise, QUIETEST * size, scale)
@@ -176,7 +182,7 @@ def fit_plain(base: BaseParameters, recording: Recording) -> tuple[Baseline, Ref
             break
     if not is_short(recording):
         # Effects are measured beside a base model without prior, so the noise is, too.
-        left = tau - np.concatenate([baseline.regressor, baseline.nuisance], axis=2) @ solve_least_squares(gram, cross)
+        left = tau - baseline.columns @ weighted.posterior()
     return baseline, RefitResult(left, values)
 
 

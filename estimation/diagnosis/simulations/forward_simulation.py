@@ -10,13 +10,13 @@ from numpy.typing import NDArray
 from scipy.signal import butter, sosfiltfilt
 
 from estimation.diagnosis.base_models.payload_and_gravity import build_situation
-from estimation.diagnosis.base_models.priors import solve_map
 from estimation.diagnosis.hypothesis_tests.fitted_effects import FittedEffect
 from estimation.diagnosis.hypothesis_tests.problem import Problem
 from estimation.diagnosis.recordings.recording import Recording, cut_recording
 from estimation.diagnosis.simulations.simulation_result import Curves, Simulation
 from estimation.diagnosis.validations.gain_intervals import model_columns
 from estimation.diagnosis.validations.held_out_errors import HeldOutResult, found_in_one_log_only, split_runs
+from estimation.regressions.moments import Moments
 from robots.plants.closed_loop import Driven, Loop, Reference, Tangent, drive
 from robots.regressor import TorqueModel
 from robots.terms.discrepancies.patterns import PREFIX
@@ -333,7 +333,7 @@ def simulate_held_out(
     known = problem.baseline.base
     b = known.size
     before = FittedRobot(model=known.model, columns=known.independent, values=base[:b])
-    edges = np.cumsum([b + problem.baseline.nuisance.shape[2], *(X.shape[2] for X in measured.effects)])
+    edges = np.cumsum([problem.baseline.columns.shape[2], *(X.shape[2] for X in measured.effects)])
     there = [i for i in range(len(members)) if i not in measured.absent]
     after = replace(
         before,
@@ -370,17 +370,10 @@ def _fits(problem: Problem, measured: HeldOutResult, left_out: slice | None) -> 
         kept[left_out] = False
     rows = np.flatnonzero(kept)
     rows = rows[:: max(1, -(-len(rows) // ENOUGH_ROWS))]
-    full = np.concatenate(
-        [problem.baseline.regressor[rows], problem.baseline.nuisance[rows], *(X[rows] for X in effects)], axis=2
-    )
+    full = np.concatenate([problem.baseline.columns[rows], *(X[rows] for X in effects)], axis=2)
     weights = (~recording.sign_unknown / problem.whitening.scales(len(recording)))[rows]
-    flat = (full * weights[:, :, None]).reshape(-1, full.shape[2])
-    gram, cross = flat.T @ flat, flat.T @ (recording.tau[rows] * weights).reshape(-1)
     # Compensates the decimation, so that the prior keeps its weight.
-    factor = kept.sum() / max(len(rows), 1)
-    alone, *_, everything = model_columns(full.shape[2] - sum(X.shape[2] for X in effects), effects)
-    first, last = (
-        solve_map(factor * gram[np.ix_(chosen, chosen)], factor * cross[chosen], measured.prior.columns(chosen))
-        for chosen in (alone, everything)
-    )
-    return first, last
+    factor = np.full(recording.n, kept.sum() / max(len(rows), 1))
+    moments = Moments.of(full, recording.tau[rows], weights).joined(factor).pulled(measured.prior)
+    alone, *_, everything = model_columns(problem.baseline.columns.shape[2], effects)
+    return moments.columns(alone).posterior(), moments.columns(everything).posterior()

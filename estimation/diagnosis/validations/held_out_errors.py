@@ -230,7 +230,7 @@ def _on_logs(
     states, columns = effect_columns(problem, whole, members)
     columns = [X[first:] * (i not in gone) for i, X in enumerate(columns)]
     baseline = problem.baseline
-    base = base_regressor(baseline.base, other)
-    nuisance = np.zeros((len(other), robot.n, baseline.nuisance.shape[2]))
-    unseen = held_out_errors(problem, effects, other, np.concatenate([base, nuisance], axis=2), columns, pull)
+    base = np.zeros((len(other), *baseline.columns.shape[1:]))
+    base[:, :, : baseline.base.size] = base_regressor(baseline.base, other)
+    unseen = held_out_errors(problem, effects, other, base, columns, pull)
     return unseen, states, whole, first, columns

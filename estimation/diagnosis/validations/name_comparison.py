@@ -24,6 +24,7 @@ from estimation.diagnosis.hypothesis_tests.refinement import refine
 from estimation.diagnosis.hypothesis_tests.scan import Entry, scan
 from estimation.diagnosis.hypothesis_tests.scoring import accept
 from estimation.diagnosis.searches.selection import SelectedEffect, Selection
+from estimation.diagnosis.searches.swap_search import refine_candidates
 
 
 @dataclass(frozen=True, eq=False)
@@ -104,7 +105,7 @@ def _outperformed(
             continue
         names, others = [f.effect for f in own], [f.effect for f in kept if f not in own]
         here = [entry for entry in patterns if entry.hypothesis.joint in joints]
-        free, _ = free_functions(problem, here, others, false_alarm)
+        free, _ = free_functions(problem, here, others, false_alarm, most=1)
         if free and not _explain_as_well(problem, names, others, free[0]):
             return min(own, key=lambda f: f.effect.gain)
     return None
@@ -176,6 +177,7 @@ def free_functions(
     false_alarm: float,
     *,
     alone: bool = False,
+    most: int = MAX_FREE_FUNCTIONS,
 ) -> tuple[list[FittedEffect], list[float]]:
     """Adds free functions beside named effects, as long as the strongest is significant and improves the BIC.
 
@@ -187,13 +189,14 @@ def free_functions(
         named: named effects in the model.
         false_alarm: largest p-value of a free function.
         alone: whether a very small p-value suffices for the first free function if no named effect is in the model.
+        most: largest number of free functions.
 
     Returns:
         The free functions in the order of their selection, and the p-value of each.
     """
     members: list[FittedEffect] = []
     p_values: list[float] = []
-    while len(members) < MAX_FREE_FUNCTIONS:
+    while len(members) < most:
         accepted = accept(problem, tuple(m.group for m in (*named, *members)))
         result = scan(problem, patterns, accepted)
         if not result.outcomes:
@@ -201,8 +204,8 @@ def free_functions(
         p = result.p_value(result.outcomes[0])
         if not p <= false_alarm:
             break
-        near = [refine(problem, o.hypothesis, o.shape, accepted) for o in result.outcomes[:CONTENDERS] if o.degrees]
-        member = max(near, key=lambda m: m.bic_gain)
+        near = [o for o in result.outcomes[:CONTENDERS] if o.degrees]
+        member = refine_candidates(problem, near, accepted)[0]
         before = (*named, *members)
         if member.excess_chi2 < MIN_FREE_SHARE * sum(m.gain_on(member.group.joints) for m in before):
             break

@@ -29,7 +29,7 @@ def problem(arm: Robot, arm_log: Callable[..., Log], pose_arm: Callable[..., Pro
 def _written_out(problem: Problem, extra: np.ndarray) -> tuple[float, float]:
     """Computes the squared white residual of the base model without and with more columns, by numpy's least squares."""
     root = np.linalg.cholesky(problem.whitening.precision)
-    base = np.concatenate([problem.baseline.regressor, problem.baseline.nuisance], axis=2)
+    base = problem.baseline.columns
     tau = (problem.whitening.all(problem.recording.tau) @ root).reshape(-1)
     left = []
     for columns in (base, np.concatenate([base, extra], axis=2)):

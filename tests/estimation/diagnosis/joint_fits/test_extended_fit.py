@@ -36,8 +36,7 @@ def recording(arm: Robot, arm_log: Callable[..., Log]) -> Recording:
 
 def _estimable(problem: Problem, member: FittedEffect) -> np.ndarray:
     """Returns which coefficients the rows determine, by the null space of all columns."""
-    blocks = [problem.baseline.regressor, problem.baseline.nuisance]
-    known = np.concatenate([*blocks, dense(problem, member.hypothesis, member.shape)], axis=2)[::7]
+    known = np.concatenate([problem.baseline.columns, dense(problem, member.hypothesis, member.shape)], axis=2)[::7]
     flat = known.reshape(-1, known.shape[2])
     norms = np.linalg.norm(flat, axis=0)
     flat = flat / np.where(norms > 0, norms, 1.0)
