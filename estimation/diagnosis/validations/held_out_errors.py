@@ -225,7 +225,7 @@ def _on_logs(
     other = other.with_trusted(recording.trusted)
     # One clock: later held-out logs start with the heat of the logs before.
     later = bool(other.t[0] > recording.t[-1])
-    whole = join_recordings(recording, other) if later else other
+    whole = join_recordings([recording, other]) if later else other
     first = len(recording) if later else 0
     states, columns = effect_columns(problem, whole, members)
     columns = [X[first:] * (i not in gone) for i, X in enumerate(columns)]
