@@ -95,6 +95,10 @@ class FittedEffect:
         counts = square[fourth > 0] ** 2 / fourth[fourth > 0]
         return max(float(counts.mean()), 2.0) if len(counts) else np.inf
 
+    def torque(self, problem: Problem) -> Array:
+        """Evaluates its torque (N0, n) [N m or N]."""
+        return problem.dense(self.hypothesis, self.shape) @ self.coefficients
+
     def gain_on(self, joints: Collection[int]) -> float:
         """Returns the part of the gain on some joints, from 0, in proportion to the torque's energy there."""
         energies = [float(np.sum((X @ self.coefficients) ** 2)) for X in self.group.columns]

@@ -56,6 +56,14 @@ class Hypothesis:
         joints = tuple(int(j) for j in np.flatnonzero(acting(X).any(axis=1))) or (0,)
         return joints, tuple(X[:, j] for j in joints)
 
+    def dense(self, situation: Situation, shape: tuple[float, ...]) -> Array:
+        """Evaluates the columns on all joints (N, n, k), zero where it does not act; see `columns`."""
+        joints, columns = self.columns(situation, shape)
+        X = np.zeros((*situation.q.shape, columns[0].shape[1]))
+        for j, part in zip(joints, columns, strict=True):
+            X[:, j] = part
+        return X
+
     def coefficient_bounds(self, robot: Robot, shape: tuple[float, ...]) -> tuple[Array, Array]:
         """Returns the physical bounds of the coefficients, (k,) and (k,), at given shape values."""
         ranges = self.effect.ranges(robot, self.joint, shape)

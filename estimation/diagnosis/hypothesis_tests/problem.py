@@ -141,6 +141,10 @@ class Problem:
         """Evaluates a hypothesis: the joints on which it acts, from 0, and its columns (N0, k) on each."""
         return hypothesis.columns(self.state_for(hypothesis.effect), shape)
 
+    def dense(self, hypothesis: Hypothesis, shape: tuple[float, ...]) -> Array:
+        """Evaluates a hypothesis on all joints (N0, n, k), zero where it does not act."""
+        return hypothesis.dense(self.state_for(hypothesis.effect), shape)
+
     def measured(self, hypothesis: Hypothesis, shape: tuple[float, ...]) -> Group:
         """Evaluates a hypothesis at one shape and returns its group."""
         return self.group(*self.columns_of(hypothesis, shape), effect=hypothesis.effect)

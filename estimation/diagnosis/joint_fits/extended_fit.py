@@ -9,7 +9,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from estimation.diagnosis.hypothesis_tests.fitted_effects import FittedEffect, accept_all_but
-from estimation.diagnosis.hypothesis_tests.hypotheses import Hypothesis
 from estimation.diagnosis.hypothesis_tests.problem import Problem
 from estimation.diagnosis.hypothesis_tests.scoring import accept, score
 from estimation.diagnosis.joint_fits.event_window import open_event_edges
@@ -75,7 +74,7 @@ def fit_extended(problem: Problem, members: Sequence[FittedEffect], provenance: 
         steps = shape_errors(problem, member, accept(problem, tuple(m.group for m in rest)))
         steps = open_event_edges(problem, member, rest, widen_change_times(problem, member, rest, steps))
         fitted_members.append(member)
-        X = dense(problem, member.hypothesis, member.shape)
+        X = problem.dense(member.hypothesis, member.shape)
         slopes = [_slope(problem, member, k, abs(step)) for k, step in enumerate(steps)]
         blocks += [X, *slopes]
         slices.append((at, X.shape[2], len(member.shape)))
@@ -178,15 +177,6 @@ def fit_extended(problem: Problem, members: Sequence[FittedEffect], provenance: 
     return ExtendedFit(model, tuple(determined_of), values[: base.shape[2]])
 
 
-def dense(problem: Problem, hypothesis: Hypothesis, shape: tuple[float, ...]) -> Array:
-    """Evaluates the columns of a hypothesis on all joints (N, n, k), zero where it does not act."""
-    joints, columns = problem.columns_of(hypothesis, shape)
-    X = np.zeros((len(problem.recording), problem.n, columns[0].shape[1]))
-    for j, part in zip(joints, columns, strict=True):
-        X[:, j] = part
-    return X
-
-
 def reversal_columns(members: Sequence[FittedEffect], starts: Sequence[int], shape: tuple[int, int]) -> Array:
     """Returns the rows by which reversal timing enters a joint fit, one per joint.
 
@@ -213,7 +203,7 @@ def _slope(problem: Problem, member: FittedEffect, k: int, step: float) -> Array
     up, down = min(value + h, high), max(value - h, low)
     if up <= down:
         return np.zeros((len(problem.recording), problem.n, 1))
-    above, below = (dense(problem, member.hypothesis, with_value(member.shape, k, x)) for x in (up, down))
+    above, below = (problem.dense(member.hypothesis, with_value(member.shape, k, x)) for x in (up, down))
     return ((above - below) @ member.coefficients * (h / (up - down)))[:, :, None]
 
 

@@ -12,7 +12,7 @@ from estimation.diagnosis.base_models.payload_and_gravity import build_situation
 from estimation.diagnosis.hypothesis_tests.fitted_effects import FittedEffect
 from estimation.diagnosis.hypothesis_tests.hypotheses import Hypothesis
 from estimation.diagnosis.hypothesis_tests.problem import Problem
-from estimation.diagnosis.joint_fits.extended_fit import dense, reversal_columns
+from estimation.diagnosis.joint_fits.extended_fit import reversal_columns
 from estimation.diagnosis.noise_models.noise_nuisance_basis import is_short
 from estimation.diagnosis.recordings.recording import Recording
 from estimation.regressions.moments import Moments
@@ -43,7 +43,7 @@ def with_total_torque(problem: Problem, members: Sequence[FittedEffect], hypothe
     """
     others = [member for member in members if member.hypothesis.effect.at_reversals is not AtReversals.LATE]
     if others and any(hypothesis.effect.at_reversals is AtReversals.LATE for hypothesis in hypotheses):
-        beyond = np.sum([dense(problem, m.hypothesis, m.shape) @ m.coefficients for m in others], axis=0)
+        beyond = np.sum([m.torque(problem) for m in others], axis=0)
         problem = replace(problem, delayed_torque_state=problem.situation.beside(beyond))
     useless = np.zeros_like(problem.recording.sign_unknown)
     for hypothesis in hypotheses:
@@ -98,7 +98,7 @@ def fit_clipped_torque(problem: Problem, members: Sequence[FittedEffect]) -> Pro
 
 def _lost(problem: Problem, members: Sequence[FittedEffect]) -> Array:
     """Returns the torque (N, n) removed by effects that act on the total torque."""
-    return np.sum([dense(problem, member.hypothesis, member.shape).sum(axis=2) for member in members], axis=0)
+    return np.sum([problem.dense(member.hypothesis, member.shape).sum(axis=2) for member in members], axis=0)
 
 
 def _with_more(problem: Problem, torque: Array) -> Problem:
@@ -120,7 +120,7 @@ class JointFit:
 
     def __init__(self, problem: Problem, members: Sequence[FittedEffect], counted: Flags) -> None:
         baseline, recording = problem.baseline, problem.recording
-        blocks = [dense(problem, member.hypothesis, member.shape) for member in members]
+        blocks = [problem.dense(member.hypothesis, member.shape) for member in members]
         self.problem = problem
         self.full = np.concatenate([baseline.columns, *blocks], axis=2)
         edges = np.cumsum([baseline.columns.shape[2], *(b.shape[2] for b in blocks)])
@@ -187,13 +187,13 @@ def effect_columns(
     model = problem.situation.model
     own = build_situation(recording, model, problem.parameters_without_payload)
     now = with_gear_load(replace(own, since=problem.situation.origin), problem.extra_load)
-    states, columns = [now] * len(members), [_dense(now, member) for member in members]
+    states, columns = [now] * len(members), [m.hypothesis.dense(now, m.shape) for m in members]
     late = [k for k, member in enumerate(members) if member.hypothesis.effect.at_reversals is AtReversals.LATE]
     if problem.delayed_torque_state is not None and 0 < len(late) < len(members):
         plain = [columns[k] @ member.coefficients for k, member in enumerate(members) if k not in late]
         followed = now.beside(np.sum(plain, axis=0))
         for k in late:
-            states[k], columns[k] = followed, _dense(followed, members[k])
+            states[k], columns[k] = followed, members[k].hypothesis.dense(followed, members[k].shape)
     if problem.total_torque_state is not None:
         whole = build_situation(
             recording, model, replace(problem, situation=problem.total_torque_state).parameters_without_payload
@@ -206,12 +206,5 @@ def effect_columns(
         whole = whole.beside(np.sum(parts, axis=0) if parts else None)
         for k, member in enumerate(members):
             if member.hypothesis.effect.reading is Reading.CUTS:
-                states[k], columns[k] = whole, _dense(whole, member)
+                states[k], columns[k] = whole, member.hypothesis.dense(whole, member.shape)
     return states, columns
-
-
-def _dense(state: Situation, member: FittedEffect) -> Array:
-    X = np.zeros((*state.q.shape, len(member.coefficients)))
-    for j, part in zip(*member.hypothesis.columns(state, member.shape), strict=True):
-        X[:, j] = part
-    return X

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from scipy.signal import welch
 
 from estimation.diagnosis.recordings.smoothed_motion import low_pass_gain, smooth_motion
+from estimation.linear_algebra.orthonormal import orthonormal
 from estimation.preprocessing import Resampled, between_rows
 from estimation.regressions.preparation import Prepared
 from robots.regressor import default_model
@@ -144,7 +145,7 @@ NEAR = 1.1
 ROWS = 1000
 WIDTH = 0.02  # [rad/s or m/s] width of the friction sign
 STALLED = 0.05  # share of a joint's RMS speed below which the sign of its friction is unknown
-FAINT = 1e-6
+FAINT = 1e-3
 
 
 def select_position_cutoff(robot: Robot, logs: Sequence[Prepared], cutoffs: Array) -> float:
@@ -200,10 +201,6 @@ def _residual(robot: Robot, logs: Sequence[Prepared], cutoffs: Array) -> float:
     Y, tau = np.concatenate(blocks), np.concatenate(targets)
     scale = np.maximum(tau.std(axis=0), 1e-9 * max(float(np.abs(tau).max()), 1e-12))
     flat = (Y / scale[:, None]).reshape(-1, Y.shape[2])
-    flat = flat / np.maximum(np.linalg.norm(flat, axis=0), 1e-300)
-    target = (tau / scale).reshape(-1)
-    values, vectors = np.linalg.eigh(flat.T @ flat)
-    kept = values > FAINT * values[-1]
-    basis = flat @ (vectors[:, kept] / np.sqrt(values[kept]))
+    target, basis = (tau / scale).reshape(-1), orthonormal(flat, FAINT)
     left = (target - basis @ (basis.T @ target)).reshape(tau.shape)
     return float(np.mean(np.log(np.maximum(np.sqrt(np.mean(left**2, axis=0)), 1e-9))))

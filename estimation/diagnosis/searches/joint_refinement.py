@@ -15,7 +15,6 @@ from estimation.diagnosis.hypothesis_tests.fitted_effects import FittedEffect, a
 from estimation.diagnosis.hypothesis_tests.problem import Problem
 from estimation.diagnosis.hypothesis_tests.refinement import refine
 from estimation.diagnosis.hypothesis_tests.scoring import accept
-from estimation.diagnosis.joint_fits.extended_fit import dense
 from estimation.diagnosis.searches.swap_search import remeasure
 from robots.terms.effect_bases.capabilities import AtReversals, Reading
 from robots.terms.effect_bases.gear_load import with_gear_load
@@ -44,7 +43,7 @@ def relinearise(problem: Problem, members: Sequence[FittedEffect]) -> tuple[Prob
     if not driven or any(effect.reading is not Reading.ADDS for effect in effects):
         return problem, list(members)
     members = list(members)
-    torques = [dense(problem, m.hypothesis, m.shape) @ m.coefficients for m in members]
+    torques = [m.torque(problem) for m in members]
     for _ in range(RELINEARISATIONS):
         problem = _with_base_model_beside(problem, np.sum(torques, axis=0))
         members = [replace(m, group=problem.measured(m.hypothesis, m.shape)) for m in members]
@@ -58,7 +57,7 @@ def relinearise(problem: Problem, members: Sequence[FittedEffect]) -> tuple[Prob
                 others=False,
             )
         members = [remeasure(problem, m, accept_all_but(problem, members, i)) for i, m in enumerate(members)]
-        before, torques = torques, [dense(problem, m.hypothesis, m.shape) @ m.coefficients for m in members]
+        before, torques = torques, [m.torque(problem) for m in members]
         changes = [np.sum((b - a) ** 2) / max(np.sum(a**2), 1e-300) for a, b in zip(before, torques, strict=True)]
         if max(changes) < CONVERGED**2:
             break

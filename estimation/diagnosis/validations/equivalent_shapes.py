@@ -17,7 +17,6 @@ from estimation.diagnosis.hypothesis_tests.fitted_effects import FittedEffect, a
 from estimation.diagnosis.hypothesis_tests.problem import Problem
 from estimation.diagnosis.hypothesis_tests.refinement import refine
 from estimation.diagnosis.hypothesis_tests.scoring import accept
-from estimation.diagnosis.joint_fits.extended_fit import dense
 from estimation.diagnosis.joint_fits.shrinkage import effects_prior
 from estimation.diagnosis.searches.selection import SelectedEffect
 from estimation.regressions.moments import Moments
@@ -70,11 +69,11 @@ def complete_effects(problem: Problem, founds: Sequence[SelectedEffect]) -> tupl
 def _evidence(problem: Problem, others: Sequence[FittedEffect]) -> Callable[[FittedEffect], float]:
     """Returns the function that computes twice the log evidence of a shape, up to a constant for all shapes."""
     baseline, white = problem.baseline, problem.whitening
-    blocks = [baseline.columns, *(dense(problem, m.hypothesis, m.shape) for m in others)]
+    blocks = [baseline.columns, *(problem.dense(m.hypothesis, m.shape) for m in others)]
     known, tau = white.independent(np.concatenate(blocks, axis=2)), white.independent(problem.recording.tau)
 
     def evidence(form: FittedEffect) -> float:
-        flat = np.hstack([known, white.independent(dense(problem, form.hypothesis, form.shape))])
+        flat = np.hstack([known, white.independent(problem.dense(form.hypothesis, form.shape))])
         pull = effects_prior(problem, [*others, form]).times(1.0 / white.row_weight)
         moments = Moments.of(flat[:, None], tau[:, None]).pulled(pull)
         both = moments.gram[0] + pull.precision

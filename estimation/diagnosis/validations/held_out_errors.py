@@ -14,7 +14,6 @@ from estimation.diagnosis.calibration import MIN_JOINT_GAIN, ONE_LOG_ENERGY
 from estimation.diagnosis.findings import Gain
 from estimation.diagnosis.hypothesis_tests.fitted_effects import FittedEffect
 from estimation.diagnosis.hypothesis_tests.problem import Problem
-from estimation.diagnosis.joint_fits.extended_fit import dense
 from estimation.diagnosis.joint_fits.shrinkage import effects_prior
 from estimation.diagnosis.joint_fits.total_torque import effect_columns
 from estimation.diagnosis.recordings.log_reading import build_recording
@@ -91,7 +90,7 @@ def measure_held_out(
     Returns:
         Errors, gains and support of each member.
     """
-    effects = tuple(dense(problem, member.hypothesis, member.shape) for member in members)
+    effects = tuple(problem.dense(member.hypothesis, member.shape) for member in members)
     rng = np.random.default_rng(seed)
     pull = effects_prior(problem, members)
     if held_out:
