@@ -100,9 +100,6 @@ RULES: dict[str, Rule] = {
     "reversals agree (Birge ratio)": Rule(
         ("hypothesis_tests.refinement:_reversal_scatter",), lambda *_: 1.0, lambda result, _: result > 1.05
     ),
-    "errors of reversal times": Rule(
-        ("hypothesis_tests.refinement:gain_from_reversal_errors",), lambda *_: 0.0, lambda result, _: result > 1.0
-    ),
     "rows at reversals count": Rule(
         ("searches.search:quiet_joints",),
         lambda recording, *_: np.zeros(recording.n, dtype=bool),

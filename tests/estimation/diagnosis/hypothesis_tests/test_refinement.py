@@ -291,7 +291,6 @@ def test_friction_that_turns_round_over_no_way_is_no_presliding(
         return SimpleNamespace(limited=lambda *_: Limited(float(gain), np.ones(1), 1), visible=1.0)
 
     monkeypatch.setattr(refinement, "score", score)
-    monkeypatch.setattr(refinement, "gain_from_reversal_errors", lambda *_: 0.0)
     monkeypatch.setattr(Hypothesis, "coefficient_bounds", lambda *_: ((0.0, np.inf),))
 
     class _Shape(tuple):  # type: ignore[type-arg]
