@@ -55,14 +55,6 @@ RULES: dict[str, Rule] = {
     ),
     "single shock": Rule(("searches.selection:exceeds_single_shock",), _yes, _denied),
     "leakage of formulas": Rule(("searches.selection:exceeds_leakage",), _yes, _denied),
-    "delay away from impacts": Rule(
-        (
-            "searches.selection:delay_supported_away_from_impacts",
-            "searches.acceptance:delay_supported_away_from_impacts",
-        ),
-        _yes,
-        _denied,
-    ),
     "event window": Rule(
         ("searches.selection:refit_event_window",),
         lambda problem, member, beside: member,
@@ -122,15 +114,6 @@ RULES: dict[str, Rule] = {
     ),
     "held-out rejection": Rule(
         ("validations.held_out_validation:_is_harmful",), _no, lambda result, _: bool(result), late=True
-    ),
-    "held-out support of weak effects": Rule(
-        ("validations.held_out_validation:_is_insignificant",), _no, lambda result, _: bool(result), late=True
-    ),
-    "free functions together": Rule(
-        ("validations.held_out_validation:_harmful_together",),
-        lambda *_: [],
-        lambda result, _: bool(result),
-        True,
     ),
     "absent from held-out data": Rule(
         ("validations.held_out_validation:_without_change",),

@@ -9,14 +9,11 @@ from estimation.diagnosis.calibration import (
     CLOSE_RIVAL_BIC,
     CONTRADICTION_SHARE,
     FREE_P_VALUE,
-    MAX_FREE_RMSE_RATIO,
     MAX_RMSE_RATIO,
     MIN_BIC_GAIN,
     MIN_RETAINED_GAIN,
     MIN_SUPPORT,
     MIN_SUPPORT_CHI2,
-    MINOR_BIC_GAIN,
-    MINOR_SHARE,
     OSCILLATION_P_VALUE,
     REJECT_RMSE_RATIO,
 )
@@ -70,16 +67,9 @@ def validate_on_held_out(
         return measure(members, frozenset(i for i, member in enumerate(members) if member.hypothesis in absent))
 
     seen = measure_members(members)
-    strongest = max((found.effect.local_bic_gain for found in selected), default=0.0)
-    while idle := [i for i in range(len(selected)) if _is_insignificant(seen, i, members[i], beyond, strongest)]:
-        changes.append(ChangedFinding(Change.INSIGNIFICANT, members[idle[0]].hypothesis))
-        for items in (selected, members, p_values):
-            items.pop(idle[0])
-        seen = measure_members(members)
-    while harmful := (
-        [i for i, m in enumerate(members) if m.hypothesis not in cooling_explains and _is_harmful(seen, i, m, beyond)]
-        or _harmful_together(seen, members, len(selected), beyond)
-    ):
+    while harmful := [
+        i for i, m in enumerate(members) if m.hypothesis not in cooling_explains and _is_harmful(seen, i, m, beyond)
+    ]:
         worst = min(harmful, key=lambda i: seen.gains[i].ci95[1])
         own = members[worst].hypothesis
         if len(members) == 1 > len(selected) and _is_weak(members[0].hypothesis.effect, p_values[0]):
@@ -94,7 +84,7 @@ def validate_on_held_out(
             seen = undone
             changes.append(ChangedFinding(Change.ABSENT, own))
             continue
-        elif instead := _alternative(selected, worst, members, measure_members, beyond, forms):
+        elif instead := _alternative(selected[worst], worst, members, measure_members, beyond, forms):
             selected[worst], seen = instead
             members[worst] = selected[worst].effect
             if members[worst].hypothesis != own:
@@ -158,7 +148,7 @@ def _without_change(
 
 
 def _alternative(
-    selected: Sequence[SelectedEffect],
+    found: SelectedEffect,
     place: int,
     members: Sequence[FittedEffect],
     measure: Callable[[Sequence[FittedEffect]], HeldOutResult],
@@ -172,12 +162,9 @@ def _alternative(
 
     def measured(one: FittedEffect) -> HeldOutResult | None:
         """Measures with another member in place of the rejected one; None if that is harmful, too."""
-        instead = [*members[:place], one, *members[place + 1 :]]
-        seen = measure(instead)
-        together = _harmful_together(seen, instead, len(selected), beyond)
-        return None if place in together or _is_harmful(seen, place, one, beyond) else seen
+        seen = measure([*members[:place], one, *members[place + 1 :]])
+        return None if _is_harmful(seen, place, one, beyond) else seen
 
-    found = selected[place]
     harmless: list[tuple[SelectedEffect, HeldOutResult]] = []
     for form in forms(members, place):
         if (seen := measured(form)) is not None:
@@ -192,54 +179,12 @@ def _alternative(
     return harmless[0] if harmless else None
 
 
-def _harmful_together(
-    seen: HeldOutResult, members: Sequence[FittedEffect], named: int, beyond: Callable[[FittedEffect], bool]
-) -> list[int]:
-    """Lists members without significant gain on joints whose error the members increase together.
-
-    Each may reduce the error beside the others, because it compensates their errors.
-    """
-    before, after = seen.errors.nrmse(0), seen.errors.nrmse(-1)
-    listed = []
-    for i, member in enumerate(members if len(members) > 1 else ()):
-        joint = member.hypothesis.joint
-        if joint is None or seen.gains[i].ci95[0] > 0 or (i < named and beyond(member)):
-            continue
-        limit = MAX_RMSE_RATIO if i < named else MAX_FREE_RMSE_RATIO
-        if after[joint - 1] > limit * before[joint - 1]:
-            listed.append(i)
-    return listed
-
-
 def _is_weak(free: Effect, p_value: float) -> bool:
     """Whether a single free function counts as noise if held-out data contradict it.
 
     This does not apply to functions of time, which held-out data cannot test.
     """
     return not is_of_time(free) and p_value > (OSCILLATION_P_VALUE if is_oscillation(free) else FREE_P_VALUE)
-
-
-def _is_insignificant(
-    seen: HeldOutResult,
-    i: int,
-    member: FittedEffect,
-    beyond: Callable[[FittedEffect], bool],
-    strongest: float,
-) -> bool:
-    """Whether a barely significant effect has no gain on held-out data that can test it.
-
-    A minor effect may be true and still increase the error, because it changes base parameters. It is kept if it has
-    support or a significant gain.
-    """
-    gain = seen.gains[i]
-    if beyond(member):
-        return False
-    slight = (
-        member.local_bic_gain < min(MINOR_SHARE * strongest, MINOR_BIC_GAIN)
-        and seen.support[i] < MIN_RETAINED_GAIN
-        and gain.ci95[0] <= 0
-    )
-    return slight or (member.local_bic_gain <= MIN_BIC_GAIN and gain.nrmse_after >= gain.nrmse_before)
 
 
 def _is_harmful(seen: HeldOutResult, i: int, member: FittedEffect, beyond: Callable[[FittedEffect], bool]) -> bool:

@@ -21,7 +21,7 @@ NUMERICS = {
     "scan.py": {"LONG", "PROPOSED", "WIDE", "CHUNK"},
     "shocks.py": {"BETWEEN", "TAIL", "FEWEST", "MOST"},
     "time_windows.py": {"COARSE", "FINE", "BESIDE", "FAINT", "ROUNDING"},
-    "acceptance.py": {"ANSWERS", "MOSTLY", "ASIDE", "SURE"},
+    "acceptance.py": {"SURE"},
     "refit.py": {"CUT", "MIN_BASE_CHANGE", "MIN_EFFECT_CHANGE", "MIN_NOISE_CHANGE", "MIN_SLOW_NOISE_CHANGE"},
     "joint_refinement.py": {"RELINEARISATIONS", "CONVERGED", "EFFORT", "ROUNDS", "LEAST_GAIN", "FACTORS"},
     "search.py": {"SEARCHES", "ROUNDS", "SETTLED", "QUIETEST"},

@@ -11,8 +11,6 @@ from estimation.diagnosis.calibration import (
     CONTRADICTION_SHARE,
     MAX_RMSE_RATIO,
     MIN_RETAINED_GAIN,
-    MINOR_BIC_GAIN,
-    MINOR_SHARE,
     REJECT_RMSE_RATIO,
 )
 from estimation.diagnosis.results.notes import state_change
@@ -253,31 +251,6 @@ def test_a_free_function_that_brings_nothing_beside_others_is_no_part_of_the_mod
     assert alone.effects == (FREE,)
 
 
-@pytest.mark.parametrize(("extra", "kept"), [(0.004, 1), (0.0, 2)])
-def test_free_functions_that_harm_together_are_left_out_until_they_do_not(extra: float, kept: int) -> None:
-    """If free functions together increase the held-out error, the one with the least gain is left out."""
-    other = member_of("pattern:acceleration:0:odd", 3)
-    bench = bench_with(load=Shown(-0.001, 0.0015, 1.0))
-    bench.shows[other.hypothesis.label] = Shown(-0.001, 0.003, 1.0)
-    bench.extra[3] = extra
-    result = validated(bench, free=[FREE, other], p_values=[1e-7, 1e-7])
-    assert result.effects == ((FREE, other) if kept == 2 else (other,))
-    assert [member for member, *_ in result.rejected_discrepancies] == ([] if kept == 2 else [FREE])
-
-
-@pytest.mark.parametrize(("extra", "worth", "kept"), [(0.0, 100.0, 2), (0.005, 100.0, 1), (0.005, 1.0, 0)])
-def test_effects_of_a_joint_that_harm_together_do_not_stay(extra: float, worth: float, kept: int) -> None:
-    """If effects of a joint increase its error together, one without gain goes. What it only compensated goes, too."""
-    bench = bench_with(presliding_hysteresis=Shown(-0.002, 0.003, 0.96), stribeck=Shown(0.0001, 0.002, 0.92))
-    bench.extra[2] = extra
-    founds = SelectedEffect(PRESLIDING, 1e-5, ()), SelectedEffect(STRIBECK, 1e-4, ())
-    result = validated(bench, *founds, alone={STRIBECK: worth})
-    names = [member.hypothesis.effect.name for member in result.effects]
-    assert names == ["presliding_hysteresis", "stribeck"][2 - kept :]
-    assert [member for member, *_ in result.refuted] == ([] if kept == 2 else [PRESLIDING])
-    assert len(result.changes) == 2 - kept
-
-
 def test_what_errs_on_all_joints_is_reported_of_the_whole_robot() -> None:
     """A rejected function of all joints is reported for the whole robot."""
     result = validated(bench_with(swinging=HARMS), free=[SWING], p_values=[1e-10])
@@ -293,45 +266,6 @@ def test_a_passing_effect_is_not_judged_on_other_logs() -> None:
     # For the same reason it cannot replace another finding by other logs.
     bench = bench_with(stribeck=HARMS, external_contact=HARMS)
     assert validated(bench, SelectedEffect(STRIBECK, 1e-9, ((PUSH, 1.0),))).effects == ()
-
-
-@pytest.mark.parametrize(("shown", "stays"), [(HELPS, True), (IDLE, True), (HARMS, False)])
-def test_a_faint_name_needs_unseen_data_that_speak_for_it(shown: Shown, stays: bool) -> None:
-    """A weak finding needs a positive held-out gain; a strong one is rejected only by a significant contradiction."""
-    slightly = Shown(-0.003, 0.002, 1.001)
-    for said, faint, kept in ((shown, False, stays), (slightly, False, True), (slightly, True, False)):
-        result = validated(bench_with(spring=said), SelectedEffect(SPRING, 1e-3, ()), faint=[SPRING] if faint else [])
-        assert (result.effects == (SPRING,)) is kept
-        assert [member for member, *_ in result.refuted] == ([] if kept or faint else [SPRING])
-        assert bool(result.changes) is (not kept)
-    # A contact has ended before the held-out log begins.
-    assert validated(bench_with(external_contact=slightly), SelectedEffect(PUSH, 1e-3, ()), faint=[PUSH]).effects == (
-        PUSH,
-    )
-
-
-@pytest.mark.parametrize(
-    ("strength", "shown", "stays"),
-    [
-        (0.9, Shown(-0.003, 0.002, 1.001), True),
-        (1.1, Shown(-0.003, 0.002, 1.001), False),
-        (1.1, Shown(-0.003, 0.002, 1.001, speaks=MIN_RETAINED_GAIN), True),
-        (1.1, Shown(-0.002, 0.003, 0.999), False),
-        (1.1, Shown(0.001, 0.003, 0.999), True),
-    ],
-)
-def test_a_name_that_is_slight_beside_another_needs_unseen_data_that_speak_for_it(
-    strength: float, shown: Shown, stays: bool
-) -> None:
-    """A finding that is minor beside a stronger one needs held-out support.
-
-    It may be an error of the stronger one's formula.
-    """
-    bench = bench_with(stribeck=shown)
-    for own, kept in ((0.9 * MINOR_BIC_GAIN, stays), (1.1 * MINOR_BIC_GAIN, True)):
-        worths = {SPRING: strength * own / MINOR_SHARE, STRIBECK: own}
-        result = validated(bench, SelectedEffect(SPRING, 1e-9, ()), SelectedEffect(STRIBECK, 1e-9, ()), worths=worths)
-        assert result.effects == ((SPRING, STRIBECK) if kept else (SPRING,))
 
 
 @pytest.mark.parametrize(("speaks", "stays"), [(-0.9 * CONTRADICTION_SHARE, True), (-1.1 * CONTRADICTION_SHARE, False)])
