@@ -112,20 +112,18 @@ RULES: dict[str, Rule] = {
     "names against functions in their place": Rule(
         ("validations.name_comparison:_outperformed",), lambda *_: None, lambda result, _: result is not None, late=True
     ),
-    "held-out rejection": Rule(
-        ("validations.held_out_validation:_is_harmful",), _no, lambda result, _: bool(result), late=True
-    ),
+    "held-out rejection": Rule(("validations.validation:_is_harmful",), _no, lambda result, _: bool(result), late=True),
     "absent from held-out data": Rule(
-        ("validations.held_out_validation:_without_change",),
+        ("validations.validation:_without_change",),
         lambda *_: None,
         lambda result, _: result is not None,
         True,
     ),
     "alternatives on held-out data": Rule(
-        ("validations.held_out_validation:_alternative",), lambda *_: None, lambda result, _: result is not None, True
+        ("validations.validation:_alternative",), lambda *_: None, lambda result, _: result is not None, True
     ),
     "heat after a pause": Rule(
-        ("validations.held_out_validation:_explained_by_cooling",), _no, lambda result, _: bool(result), late=True
+        ("validations.validation:_explained_by_cooling",), _no, lambda result, _: bool(result), late=True
     ),
 }
 

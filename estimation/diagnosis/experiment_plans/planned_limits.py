@@ -12,14 +12,13 @@ from scipy.linalg import solve_toeplitz
 from estimation.diagnosis.base_models.baseline import build_baseline
 from estimation.diagnosis.experiment_plans.detection_limits import Limit, find_limits
 from estimation.diagnosis.hypothesis_tests.hypotheses import all_hypotheses
-from estimation.diagnosis.hypothesis_tests.problem import Problem
-from estimation.diagnosis.hypothesis_tests.problem_setup import build_problem
+from estimation.diagnosis.hypothesis_tests.problem import Problem, build_problem
 from estimation.diagnosis.hypothesis_tests.scan import measure
 from estimation.diagnosis.noise_models.frequency_bands import Band
 from estimation.diagnosis.noise_models.masked_rows import no_masked_rows
 from estimation.diagnosis.noise_models.whitening import Whitening
 from estimation.diagnosis.recordings.directions import SHARP, SURELY, sharpest_sign_velocity
-from estimation.diagnosis.recordings.log_reading import Recording
+from estimation.diagnosis.recordings.recording import Recording
 from estimation.regressions.parameter_priors import GaussianPrior
 from robots.base_parameters import find_base_parameters
 from robots.common.errors import InputError

@@ -30,8 +30,7 @@ from estimation.diagnosis.noise_models.noise_spectrum import (
     remove_lines,
 )
 from estimation.diagnosis.noise_models.whitening import Whitening, free_columns
-from estimation.diagnosis.recordings.log_reading import Recording
-from estimation.diagnosis.recordings.recording import rest_rows
+from estimation.diagnosis.recordings.recording import Recording, rest_rows
 from estimation.uncertainty.quantiles import NORMAL_MEDIAN, robust_deviation
 
 Array = NDArray[np.float64]

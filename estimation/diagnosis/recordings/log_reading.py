@@ -240,6 +240,3 @@ def _trim_ends(dq: Array, step: float) -> slice:
         return slice(0, len(dq))
     most = int(min(ENDS / step, 0.05 * len(dq)))
     return slice(min(int(active[0]), most), max(int(active[-1]) + 1, len(dq) - most))
-
-
-__all__ = ["Recording", "build_recording"]

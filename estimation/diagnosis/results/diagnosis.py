@@ -22,7 +22,7 @@ from estimation.diagnosis.results.actions import (
 )
 from estimation.diagnosis.results.standing import standing_of, standing_text, standing_verdict
 from estimation.diagnosis.simulations.simulation_result import Simulation
-from estimation.diagnosis.validations.prediction_settings import all_row_errors
+from estimation.diagnosis.validations.extended_model import all_row_errors
 from estimation.models.model import Model, load_model
 from robots.common.records import Finding as Remark
 from robots.common.records import Result, axes_for, effect_code, findings_of, read, read_json

@@ -16,7 +16,7 @@ from estimation.diagnosis.joint_fits.sensor_nonlinearity import fit_sensor_nonli
 from estimation.diagnosis.joint_fits.total_torque import fit_clipped_torque, fit_jointly, total_torque_from_unclipped
 from estimation.diagnosis.noise_models.noise_nuisance_basis import is_short
 from estimation.diagnosis.noise_models.whitening import Whitening
-from estimation.diagnosis.recordings.log_reading import Recording
+from estimation.diagnosis.recordings.recording import Recording
 from estimation.diagnosis.recordings.thinning import shift_motion
 from robots.terms.effect_bases.capabilities import AtReversals
 from robots.terms.effect_bases.gear_load import with_gear_load

@@ -7,18 +7,16 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from estimation.diagnosis.base_models.baseline import Baseline, build_baseline, inertia_matrix
-from estimation.diagnosis.base_models.priors import base_model_prior
+from estimation.diagnosis.base_models.baseline import Baseline, base_model_prior, build_baseline, inertia_matrix
 from estimation.diagnosis.calibration import MAX_HIGH_BAND_ERROR
 from estimation.diagnosis.hypothesis_tests.hypotheses import Hypothesis, all_hypotheses
-from estimation.diagnosis.hypothesis_tests.problem import Problem
-from estimation.diagnosis.hypothesis_tests.problem_setup import build_problem
+from estimation.diagnosis.hypothesis_tests.problem import Problem, build_problem
 from estimation.diagnosis.hypothesis_tests.scan import Entry, measure
 from estimation.diagnosis.joint_fits.total_torque import with_total_torque
 from estimation.diagnosis.noise_models.high_frequency_band import build_high_band
 from estimation.diagnosis.noise_models.noise_estimate import estimate_whitening, quiet_joints
 from estimation.diagnosis.noise_models.noise_nuisance_basis import build_nuisance_projection, is_short
-from estimation.diagnosis.recordings.log_reading import Recording
+from estimation.diagnosis.recordings.recording import Recording
 from estimation.diagnosis.reversals.reversal_timing import ReversalTiming, measure_reversal_timing
 from estimation.diagnosis.searches.refit import RefitResult, base_torque_changed, noise_decreased, refit
 from estimation.diagnosis.searches.selection import Selection, select, with_rivals

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from estimation.diagnosis.calibration import MAX_ERROR_RATIO, MIN_FIT_GAIN, MIN_UNRELIABLE_ERROR
 from estimation.diagnosis.hypothesis_tests.problem import Problem
-from estimation.diagnosis.recordings.log_reading import Recording
+from estimation.diagnosis.recordings.recording import Recording
 from estimation.regressions.moments import Moments
 from estimation.regressions.parameter_priors import GaussianPrior
 from estimation.uncertainty.blocks import moving_block_sums

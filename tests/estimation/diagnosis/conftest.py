@@ -7,10 +7,8 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from estimation.diagnosis.base_models.baseline import base_parameters, build_baseline, inertia_matrix
-from estimation.diagnosis.base_models.priors import base_model_prior
-from estimation.diagnosis.hypothesis_tests.problem import Problem
-from estimation.diagnosis.hypothesis_tests.problem_setup import build_problem
+from estimation.diagnosis.base_models.baseline import base_model_prior, base_parameters, build_baseline, inertia_matrix
+from estimation.diagnosis.hypothesis_tests.problem import Problem, build_problem
 from estimation.diagnosis.noise_models.high_frequency_band import build_high_band
 from estimation.diagnosis.noise_models.noise_estimate import estimate_whitening
 from estimation.diagnosis.noise_models.noise_nuisance_basis import build_nuisance_projection

@@ -12,9 +12,9 @@ from estimation.diagnosis.findings import Gain
 from estimation.diagnosis.hypothesis_tests.fitted_effects import Evidence, FittedEffect
 from estimation.diagnosis.hypothesis_tests.hypotheses import Hypothesis
 from estimation.diagnosis.searches.selection import SelectedEffect
-from estimation.diagnosis.validations.held_out_validation import validate_on_held_out
 from estimation.diagnosis.validations.name_comparison import ComparedNames
 from estimation.diagnosis.validations.validated_findings import ValidatedFindings
+from estimation.diagnosis.validations.validation import validate_on_held_out
 from robots.terms.discrepancies.patterns import build_pattern
 from robots.terms.effect_bases.capabilities import Persistence
 from robots.terms.effects import EFFECTS

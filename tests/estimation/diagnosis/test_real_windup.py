@@ -7,8 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from estimation.diagnosis.base_models.baseline import base_parameters, build_baseline
-from estimation.diagnosis.base_models.priors import base_model_prior
+from estimation.diagnosis.base_models.baseline import base_model_prior, base_parameters, build_baseline
 from estimation.diagnosis.recordings.log_reading import build_recording
 from estimation.diagnosis.validations.gear_compliance import measure_gear_compliance
 from tests.kr300 import kr300

@@ -9,10 +9,9 @@ import numpy as np
 import pytest
 
 from estimation import diagnose, read_log
-from estimation.diagnosis.base_models.baseline import base_parameters, build_baseline
-from estimation.diagnosis.base_models.priors import base_model_prior
+from estimation.diagnosis.base_models.baseline import base_model_prior, base_parameters, build_baseline
 from estimation.diagnosis.recordings.log_reading import build_recording
-from estimation.diagnosis.validations.prediction_settings import all_row_errors
+from estimation.diagnosis.validations.extended_model import all_row_errors
 from estimation.regressions.moments import Moments
 from estimation.regressions.parameter_priors import GaussianPrior
 from robots.loading import load_robot

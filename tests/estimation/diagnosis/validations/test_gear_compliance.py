@@ -11,8 +11,7 @@ from scipy.interpolate import CubicSpline
 from scipy.signal import lfilter
 
 from estimation.diagnosis import Diagnosis, diagnose
-from estimation.diagnosis.base_models.baseline import base_parameters, build_baseline
-from estimation.diagnosis.base_models.priors import base_model_prior
+from estimation.diagnosis.base_models.baseline import base_model_prior, base_parameters, build_baseline
 from estimation.diagnosis.recordings.log_reading import build_recording
 from estimation.diagnosis.validations.gear_compliance import MeasuredCompliance, measure_gear_compliance
 from robots.plants import simulate
