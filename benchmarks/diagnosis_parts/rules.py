@@ -122,9 +122,6 @@ RULES: dict[str, Rule] = {
     "alternatives on held-out data": Rule(
         ("validations.validation:_alternative",), lambda *_: None, lambda result, _: result is not None, True
     ),
-    "heat after a pause": Rule(
-        ("validations.validation:_explained_by_cooling",), _no, lambda result, _: bool(result), late=True
-    ),
 }
 
 

@@ -112,8 +112,8 @@ def fit_extended(problem: Problem, members: Sequence[FittedEffect], provenance: 
     free = flat[:, linear & ~known]
     # The prior is stated for plain rows of the log; `row_weight` converts it to white rows.
     pull = effects_prior(problem, members).columns(np.flatnonzero(~known[linear])).times(1.0 / white.row_weight)
-    rest = Moments.of(free[:, None], (tau - flat[:, known] @ values[known])[:, None])
-    values[linear & ~known] = rest.pulled(pull).posterior()
+    moments = Moments.of(free[:, None], (tau - flat[:, known] @ values[known])[:, None])
+    values[linear & ~known] = moments.pulled(pull).posterior()
     by_reversals = reversal_columns(members, [start for start, *_ in slices], (problem.n, flat.shape[1]))
     covariance, unseen = _covariance(np.concatenate([flat, by_reversals, *forms]))
     covariance = widened_by_blocks(covariance, flat[:plain], (tau - flat @ values)[:plain])

@@ -94,16 +94,16 @@ def build_recording(
     parts = forked(lambda each: _part(each[0], step, cap, *each[1:]), zip(prepared, spectra, found, strict=True))
     never = np.all([np.ptp(part.q, axis=0) == 0 for part in parts], axis=0)
     held = still_joints([part.q for part in parts], travel) | never
-    whole = join_recordings([_zero_resting_joints(*each) for each in zip(parts, held, strict=True)])
-    if whole.duration < shortest:
+    joined = join_recordings([_zero_resting_joints(*each) for each in zip(parts, held, strict=True)])
+    if joined.duration < shortest:
         recorded = sum(log.log.duration for log in prepared)
         raise InputError(
-            f"{whole.duration:.1f} s of usable logs ({recorded:.1f} s recorded, less filter transients at the ends)",
+            f"{joined.duration:.1f} s of usable logs ({recorded:.1f} s recorded, less filter transients at the ends)",
             file=prepared[0].log.metadata.get("file", prepared[0].log.name or None) if len(prepared) == 1 else None,
             allowed=f"{shortest:g} s or more",
             remedy="record a longer log",
         )
-    return replace(whole, names=tuple(log.log.name or f"log {i}" for i, log in enumerate(prepared, start=1)))
+    return replace(joined, names=tuple(log.log.name or f"log {i}" for i, log in enumerate(prepared, start=1)))
 
 
 def _zero_resting_joints(part: Recording, held: NDArray[np.bool_]) -> Recording:

@@ -181,9 +181,10 @@ def cut_recording(whole: Recording, rows: slice) -> Recording:
     begins = (0, *(start - rows.start for start in whole.starts if rows.start < start < rows.stop))
     first = sum(start <= rows.start for start in whole.starts) - 1
     logs = slice(first, first + len(begins))
+    own: dict[str, Any] = {name: None if (of := getattr(whole, name)) is None else of[rows] for name in PER_ROW}
     return replace(
         whole,
-        **{name: None if (values := getattr(whole, name)) is None else values[rows] for name in PER_ROW},
+        **own,
         starts=begins,
         cutoffs=None if whole.cutoffs is None else whole.cutoffs[logs],
         full_rate=None if whole.full_rate is None else cut_recording(whole.full_rate, _at_all_samples(whole, rows)),

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import reduce
 from itertools import pairwise
 from operator import add
@@ -162,23 +162,14 @@ def cross_validation_errors(problem: Problem, effects: Sequence[Array], pull: Ga
             f"each of {PARTS} stretches of the only log, predicted from the other stretches: the same kind of motion, "
             "so that the gain on another motion may differ"
         )
-    counts = ~recording.sign_unknown
-    weights = counts / problem.whitening.scales(len(recording))
+    weights = ~recording.sign_unknown / problem.whitening.scales(len(recording))
     full = np.concatenate([problem.baseline.columns, *effects], axis=2)
     parts = [Moments.of(full[fold], recording.tau[fold], weights[fold]).joined().pulled(pull) for fold in folds]
     total = reduce(add, parts)
-    chosen_by = model_columns(problem.baseline.columns.shape[2], effects)
-    errors = [np.empty_like(recording.tau) for _ in chosen_by]
-    fitted = _errors(full, recording.tau, total, chosen_by)
-    growth = np.zeros(len(chosen_by))
-    for fold, part in zip(folds, parts, strict=True):
-        rest = total - part
-        growth += _growth(problem, rest, part, chosen_by)
-        for error, own in zip(errors, _errors(full[fold], recording.tau[fold], rest, chosen_by), strict=True):
-            error[fold] = own
-    return HeldOutErrors(
-        how, recording.t, recording.step, recording.tau, tuple(errors), counts, tuple(fitted), tuple(growth)
-    )
+    tests = [(full[fold], total - part, part) for fold, part in zip(folds, parts, strict=True)]
+    found = _tested(problem, how, recording, effects, tests)
+    torques = _torques(full, total, model_columns(problem.baseline.columns.shape[2], effects))
+    return replace(found, fitted=tuple(recording.tau - torque for torque in torques))
 
 
 def held_out_errors(
@@ -207,33 +198,53 @@ def held_out_errors(
     full = np.concatenate([problem.baseline.columns, *effects], axis=2)
     fit = Moments.of(full, recording.tau, weights).joined().pulled(pull)
     other = np.concatenate([unseen_base, *unseen_effects], axis=2)
-    chosen_by = model_columns(problem.baseline.columns.shape[2], effects)
-    errors = _errors(other, unseen.tau, fit, chosen_by)
+    more = Moments.of(other, unseen.tau, ~unseen.sign_unknown / problem.whitening.scale).joined().pulled(pull)
     # Stretches of a log that was cut at gaps contain its name.
     logs = len({name.rpartition(" from ")[0] or name for name in unseen.names})
     how = f"{several(logs, 'log')} that the fit has not seen"
     how += f", in {len(unseen.runs)} stretches" if len(unseen.runs) > logs else ""
-    more = Moments.of(other, unseen.tau, ~unseen.sign_unknown / problem.whitening.scale).joined().pulled(pull)
-    growth = _growth(problem, fit, more, chosen_by)
+    return _tested(problem, how, unseen, effects, [(other, fit, more)])
+
+
+def _tested(
+    problem: Problem,
+    how: str,
+    unseen: Recording,
+    effects: Sequence[Array],
+    tests: Sequence[tuple[Array, Moments, Moments]],
+) -> HeldOutErrors:
+    """Tests the models on all rows of a recording, part by part.
+
+    Errors of the base model increase the held-out residual; in `HeldOutErrors.growth` they count as noise.
+
+    Args:
+        problem: data of the fit.
+        how: how the rows were separated.
+        unseen: the held-out rows.
+        effects: columns of each effect.
+        tests: of each part the columns (M, n, p), and the normal equations of the fit and of the part.
+    """
+    chosen_by, growth = model_columns(problem.baseline.columns.shape[2], effects), np.zeros(2 + len(effects))
+    for _, fit, more in tests:
+        both = fit + more
+        gains = np.array([both.columns(own).explained() - fit.columns(own).explained() for own in chosen_by])
+        left = (float(more.square[0]) - gains[-1]) / max(int(more.count[0]), 1)
+        growth += (gains[-1] - gains) / (problem.whitening.row_weight * max(1.0, left))
+    torques = zip(*(_torques(X, fit, chosen_by) for X, fit, _ in tests), strict=True)
     return HeldOutErrors(
-        how, unseen.t, unseen.step, unseen.tau, tuple(errors), ~unseen.sign_unknown, growth=tuple(growth)
+        how=how,
+        t=unseen.t,
+        step=unseen.step,
+        measured=unseen.tau,
+        errors=tuple(unseen.tau - np.concatenate(parts) for parts in torques),
+        counts=~unseen.sign_unknown,
+        growth=tuple(growth),
     )
 
 
-def _errors(columns: Array, tau: Array, fit: Moments, chosen_by: Sequence[NDArray[np.intp]]) -> list[Array]:
-    """Computes the torque errors (M, n) of the models of a fit on rows (M, n, p)."""
-    return [tau - columns[:, :, chosen] @ fit.columns(chosen).posterior() for chosen in chosen_by]
-
-
-def _growth(problem: Problem, fit: Moments, more: Moments, chosen_by: Sequence[NDArray[np.intp]]) -> Array:
-    """Computes `HeldOutErrors.growth` from the normal equations of the fit and of the held-out rows.
-
-    Errors of the base model increase the held-out residual; they count as noise.
-    """
-    both = fit + more
-    gains = [both.columns(chosen).explained() - fit.columns(chosen).explained() for chosen in chosen_by]
-    noise = problem.whitening.row_weight * max(1.0, (float(more.square[0]) - gains[-1]) / max(int(more.count[0]), 1))
-    return (gains[-1] - np.array(gains)) / noise
+def _torques(columns: Array, fit: Moments, chosen_by: Sequence[NDArray[np.intp]]) -> list[Array]:
+    """Evaluates the torque (M, n) of each model of a fit on rows (M, n, p)."""
+    return [columns[:, :, chosen] @ fit.columns(chosen).posterior() for chosen in chosen_by]
 
 
 def model_columns(base: int, effects: Sequence[Array]) -> list[NDArray[np.intp]]:

@@ -70,20 +70,18 @@ class HeldOutResult:
 
 
 def measure_held_out(
-    robot: Robot,
     problem: Problem,
     members: Sequence[FittedEffect],
-    held_out: Sequence[Log],
+    held_out: Recording | None,
     seed: int,
     gone: frozenset[int] = frozenset(),
 ) -> HeldOutResult:
     """Measures errors and gains on held-out logs, or by cross-validation.
 
     Args:
-        robot: the robot.
         problem: data of the fit.
         members: effects in the model.
-        held_out: logs not used in the fit; empty for cross-validation.
+        held_out: `read_held_out` of logs not used in the fit; None for cross-validation.
         seed: seed of the bootstrap intervals.
         gone: indices of members that are absent from the held-out logs.
 
@@ -93,8 +91,8 @@ def measure_held_out(
     effects = tuple(problem.dense(member.hypothesis, member.shape) for member in members)
     rng = np.random.default_rng(seed)
     pull = effects_prior(problem, members)
-    if held_out:
-        unseen, states, whole, first, columns = _on_logs(robot, problem, members, effects, held_out, pull, gone)
+    if held_out is not None:
+        unseen, states, whole, first, columns = _on_logs(problem, members, effects, held_out, pull, gone)
     else:
         unseen = _left_out(problem, effects, pull)
         states = [problem.state_for(member.hypothesis.effect) for member in members]
@@ -206,22 +204,26 @@ def _rise(unseen: HeldOutErrors, i: int, member: FittedEffect) -> float:
     return float(np.sqrt(after / max(before, 1e-300)))
 
 
+def read_held_out(robot: Robot, problem: Problem, logs: Sequence[Log]) -> Recording | None:
+    """Reads held-out logs onto the grid of the fit; None for none."""
+    if not logs:
+        return None
+    recording = problem.recording
+    travel = np.max([np.ptp(recording.q[run], axis=0) for run in recording.runs], axis=0)
+    unseen = build_recording(robot, logs, step=recording.step, shortest=SHORTEST_UNSEEN, travel=travel)
+    return subtract_known_payload(robot, unseen).with_trusted(recording.trusted)
+
+
 def _on_logs(
-    robot: Robot,
     problem: Problem,
     members: Sequence[FittedEffect],
     effects: Sequence[Array],
-    held_out: Sequence[Log],
+    other: Recording,
     pull: GaussianPrior,
     gone: frozenset[int],
 ) -> tuple[HeldOutErrors, list[Situation], Recording, int, list[Array]]:
     """Computes the errors on held-out logs, and the states and columns of the members there."""
     recording = problem.recording
-    travel = np.max([np.ptp(recording.q[run], axis=0) for run in recording.runs], axis=0)
-    other = subtract_known_payload(
-        robot, build_recording(robot, held_out, step=recording.step, shortest=SHORTEST_UNSEEN, travel=travel)
-    )
-    other = other.with_trusted(recording.trusted)
     # One clock: later held-out logs start with the heat of the logs before.
     later = bool(other.t[0] > recording.t[-1])
     whole = join_recordings([recording, other]) if later else other

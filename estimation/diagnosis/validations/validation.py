@@ -30,7 +30,7 @@ from estimation.diagnosis.recordings.recording import cut_recording
 from estimation.diagnosis.searches.selection import SelectedEffect
 from estimation.diagnosis.validations.equivalent_shapes import complete_effects, equivalent_shapes
 from estimation.diagnosis.validations.gear_compliance import MeasuredCompliance, measure_gear_compliance
-from estimation.diagnosis.validations.held_out_errors import HeldOutResult, measure_held_out
+from estimation.diagnosis.validations.held_out_errors import HeldOutResult, measure_held_out, read_held_out
 from estimation.diagnosis.validations.name_comparison import ComparedNames, free_functions
 from estimation.diagnosis.validations.validated_findings import Change, ChangedFinding, ValidatedFindings
 from robots.robot import Robot
@@ -69,9 +69,10 @@ def validate(
             or (not prepared.dated and effect.persistence is not Persistence.STATE)
         )
 
+    unseen = read_held_out(robot, problem, prepared.held_out)
     validated = validate_on_held_out(
         whole,
-        lambda members, absent: measure_held_out(robot, problem, members, prepared.held_out, seed, absent),
+        lambda members, absent: measure_held_out(problem, members, unseen, seed, absent),
         is_beyond,
         partial(equivalent_shapes, problem),
         partial(refine_member, problem),
@@ -136,15 +137,12 @@ def validate_on_held_out(
     changes: list[ChangedFinding] = []
     refuted: list[tuple[FittedEffect, float, Gain]] = []
     absent: set[Hypothesis] = set()
-    cooling_explains: set[Hypothesis] = set()
 
     def measure_members(members: Sequence[FittedEffect]) -> HeldOutResult:
         return measure(members, frozenset(i for i, member in enumerate(members) if member.hypothesis in absent))
 
     seen = measure_members(members)
-    while harmful := [
-        i for i, m in enumerate(members) if m.hypothesis not in cooling_explains and _is_harmful(seen, i, m, beyond)
-    ]:
+    while harmful := [i for i, m in enumerate(members) if _is_harmful(seen, i, m, beyond)]:
         worst = min(harmful, key=lambda i: seen.gains[i].ci95[1])
         own = members[worst].hypothesis
         if len(members) == 1 > len(selected) and _is_weak(members[0].hypothesis.effect, p_values[0]):
@@ -164,9 +162,6 @@ def validate_on_held_out(
             members[worst] = selected[worst].effect
             if members[worst].hypothesis != own:
                 changes.append(ChangedFinding(Change.REPLACED, own, members[worst].hypothesis))
-            continue
-        elif _explained_by_cooling(seen, worst, members[worst]):
-            cooling_explains.add(members[worst].hypothesis)
             continue
         else:
             selected.pop(worst)
@@ -292,17 +287,3 @@ def _is_harmful(seen: HeldOutResult, i: int, member: FittedEffect, beyond: Calla
     )
     # Contradiction does not count for thermal effects: heat stored before the held-out data is unknown.
     return (against and effect.persistence is not Persistence.HEAT) or idle or risen
-
-
-def _explained_by_cooling(seen: HeldOutResult, i: int, member: FittedEffect) -> bool:
-    """Whether unknown heat after a pause can explain that held-out data contradict a thermal effect.
-
-    Gear and housing are modelled as one thermal mass, so cooling in a pause is predicted worse than warming.
-    """
-    joint = member.hypothesis.joint
-    known = seen.cv_retained_gain[i] >= MIN_RETAINED_GAIN and not (
-        joint is not None and seen.errors.is_unreliable(joint - 1)
-    )
-    return (
-        member.hypothesis.effect.persistence is Persistence.HEAT and known and seen.rmse_ratio[i] <= REJECT_RMSE_RATIO
-    )
