@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 
 from estimation.diagnosis.base_models.baseline import Baseline, base_model_prior, build_baseline, inertia_matrix
 from estimation.diagnosis.calibration import MAX_HIGH_BAND_ERROR
+from estimation.diagnosis.hypothesis_tests.fitted_effects import FittedEffect
 from estimation.diagnosis.hypothesis_tests.hypotheses import Hypothesis, all_hypotheses
 from estimation.diagnosis.hypothesis_tests.problem import Problem, build_problem
 from estimation.diagnosis.hypothesis_tests.scan import Entry, measure
@@ -74,6 +76,7 @@ def search(
     hypotheses = all_hypotheses(base.model.robot, effects)
     recording, baseline, settled, timing = _with_reversal_rows(base, recording)
     last: Search | None = None
+    members: list[FittedEffect] = []
     blurred = False
     known: dict[Hypothesis, tuple[float, ...]] = {}
     for attempt in range(SEARCHES):
@@ -83,7 +86,6 @@ def search(
         spared = build_nuisance_projection(recording, baseline, settled.residual)
         whitening = estimate_whitening(recording, settled.residual, fitted, inertia, spared=spared)
         if last is not None:
-            members = [found.effect for found in last.selection.found]
             anew = settled.gear_load.improves_fit or noise_decreased(last.problem, whitening)
             if not (anew or base_torque_changed(last.problem, settled.values, members)):
                 break
@@ -110,20 +112,19 @@ def search(
         if timing is not None:
             posed = replace(posed, timing=timing.beside(recording))
         give_back()
-        last = _searched(
-            posed,
-            hypotheses,
-            false_alarm,
-            bar,
-            share,
-            known,
-        )
-        if not last.selection.found or attempt == SEARCHES - 1:
+        entries = measure(posed, hypotheses, lambda done, at=share: bar.update(at + 0.2 * done, "scan"))  # type: ignore[misc]
+        give_back()
+        advance = partial(bar.update, share + 0.25)
+        problem, selection = select(posed, entries, false_alarm=false_alarm, advance=advance, known=known)
+        members = [found.effect for found in selection.found]
+        last = Search(problem, with_total_torque(problem, members, hypotheses), entries, selection)
+        del entries, problem, selection
+        if not members or attempt == SEARCHES - 1:
             break
-        known = {found.effect.hypothesis: found.effect.shape for found in last.selection.found}
-        settled = refit(last.problem, [found.effect for found in last.selection.found])
+        known = {member.hypothesis: member.shape for member in members}
+        settled = refit(last.problem, members)
         # Such an effect, for example a delay, increased the estimated width of the friction sign.
-        blurred = any(found.effect.hypothesis.effect.at_reversals is AtReversals.LATE for found in last.selection.found)
+        blurred = any(member.hypothesis.effect.at_reversals is AtReversals.LATE for member in members)
     assert last is not None
     with_alternatives = with_rivals(last.searched_problem, last.entries, last.selection)
     return replace(last, selection=with_alternatives)
@@ -182,28 +183,3 @@ def fit_plain(base: BaseParameters, recording: Recording) -> tuple[Baseline, Ref
         # Effects are measured beside a base model without prior, so the noise is, too.
         left = tau - baseline.columns @ weighted.posterior()
     return baseline, RefitResult(left, values)
-
-
-def _searched(
-    problem: Problem,
-    hypotheses: Sequence[Hypothesis],
-    false_alarm: float,
-    bar: Progress,
-    share: float,
-    known: Mapping[Hypothesis, tuple[float, ...]],
-) -> Search:
-    """Measures all hypotheses on a problem and selects effects."""
-    entries = measure(problem, hypotheses, _scan_progress(bar, share, 0.2))
-    give_back()
-    advance = _note_progress(bar, share + 0.25)
-    problem, selection = select(problem, entries, false_alarm=false_alarm, advance=advance, known=known)
-    members = [found.effect for found in selection.found]
-    return Search(problem, with_total_torque(problem, members, hypotheses), entries, selection)
-
-
-def _scan_progress(bar: Progress, start: float, share: float) -> Callable[[float], None]:
-    return lambda done: bar.update(start + share * done, "scan")
-
-
-def _note_progress(bar: Progress, at: float) -> Callable[[str], None]:
-    return lambda note: bar.update(at, note)
