@@ -55,14 +55,6 @@ RULES: dict[str, Rule] = {
     ),
     "single shock": Rule(("searches.selection:exceeds_single_shock",), _yes, _denied),
     "leakage of formulas": Rule(("searches.selection:exceeds_leakage",), _yes, _denied),
-    "delay away from impacts": Rule(
-        (
-            "searches.selection:delay_supported_away_from_impacts",
-            "searches.acceptance:delay_supported_away_from_impacts",
-        ),
-        _yes,
-        _denied,
-    ),
     "event window": Rule(
         ("searches.selection:refit_event_window",),
         lambda problem, member, beside: member,
@@ -100,10 +92,11 @@ RULES: dict[str, Rule] = {
     "reversals agree (Birge ratio)": Rule(
         ("hypothesis_tests.refinement:_reversal_scatter",), lambda *_: 1.0, lambda result, _: result > 1.05
     ),
-    "errors of reversal times": Rule(
-        ("hypothesis_tests.refinement:gain_from_reversal_errors",), lambda *_: 0.0, lambda result, _: result > 1.0
+    "rows at reversals count": Rule(
+        ("searches.search:quiet_joints",),
+        lambda recording, *_: np.zeros(recording.n, dtype=bool),
+        lambda result, _: bool(result.any()),
     ),
-    "rows at reversals count": Rule(("searches.search:_trust_reversal_rows",), lambda base, recording: recording),
     "load of the gears": Rule(
         ("searches.refit:find_gear_load",), lambda *_: NO_GEAR_LOAD, lambda result, _: result is not NO_GEAR_LOAD
     ),
@@ -119,29 +112,15 @@ RULES: dict[str, Rule] = {
     "names against functions in their place": Rule(
         ("validations.name_comparison:_outperformed",), lambda *_: None, lambda result, _: result is not None, late=True
     ),
-    "held-out rejection": Rule(
-        ("validations.held_out_validation:_is_harmful",), _no, lambda result, _: bool(result), late=True
-    ),
-    "held-out support of weak effects": Rule(
-        ("validations.held_out_validation:_is_insignificant",), _no, lambda result, _: bool(result), late=True
-    ),
-    "free functions together": Rule(
-        ("validations.held_out_validation:_harmful_together",),
-        lambda *_: [],
-        lambda result, _: bool(result),
-        True,
-    ),
+    "held-out rejection": Rule(("validations.validation:_is_harmful",), _no, lambda result, _: bool(result), late=True),
     "absent from held-out data": Rule(
-        ("validations.held_out_validation:_without_change",),
+        ("validations.validation:_without_change",),
         lambda *_: None,
         lambda result, _: result is not None,
         True,
     ),
     "alternatives on held-out data": Rule(
-        ("validations.held_out_validation:_alternative",), lambda *_: None, lambda result, _: result is not None, True
-    ),
-    "heat after a pause": Rule(
-        ("validations.held_out_validation:_explained_by_cooling",), _no, lambda result, _: bool(result), late=True
+        ("validations.validation:_alternative",), lambda *_: None, lambda result, _: result is not None, True
     ),
 }
 

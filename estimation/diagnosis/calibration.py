@@ -115,9 +115,6 @@ SHOCK_COUNT = 0.01
 MAX_GLITCH_SHARE = 0.1
 """Share of a short effect's chi-square that one shock must leave; less, and it is one."""
 
-IMPACT_SHARE = 0.3
-"""Share of an effect's largest torque at impacts from which a row is one. Not studied: a lag also acts beside them."""
-
 # Search.
 
 MAX_EFFECTS = 4
@@ -161,12 +158,6 @@ MIN_RETAINED_GAIN = 0.2
 OSCILLATION_P_VALUE = 1e-5
 """p-value above which a single oscillation counts as noise if held-out data contradict it."""
 
-MINOR_SHARE = 0.1
-"""Share of the strongest BIC gain below which an effect needs support by held-out data."""
-
-MINOR_BIC_GAIN = 50.0
-"""BIC gain below which this is asked."""
-
 CONTRADICTION_SHARE = 0.1
 """Share of an effect's chi-square by which held-out data must contradict it."""
 
@@ -175,9 +166,6 @@ MAX_RMSE_RATIO = 1.05
 
 REJECT_RMSE_RATIO = 1.2
 """The same despite support by held-out rows: the formula does not extrapolate."""
-
-MAX_FREE_RMSE_RATIO = 1.02
-"""The same of a joint's free functions together."""
 
 MIN_SUPPORT = 0.4
 """Growth of chi-square on held-out rows, as a share, that supports an effect whatever the error."""

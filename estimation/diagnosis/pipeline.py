@@ -11,9 +11,9 @@ from estimation.diagnosis.hypothesis_tests.scan import measure
 from estimation.diagnosis.results.diagnosis import Diagnosis
 from estimation.diagnosis.results.report import report
 from estimation.diagnosis.searches.search import search
-from estimation.diagnosis.validations.decision import decide
 from estimation.diagnosis.validations.extended_model import fit_extended_model
 from estimation.diagnosis.validations.name_comparison import compare_with_free_functions
+from estimation.diagnosis.validations.validated_findings import decide
 from estimation.diagnosis.validations.validation import validate
 from estimation.identifications.estimate import Estimate
 from estimation.recordings import Recording, make_ready

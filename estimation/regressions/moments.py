@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from estimation.linear_algebra.positive import solve_nearly_positive, solve_positive
-from estimation.linear_algebra.scaled import LEAST_RIDGE, lengths
+from estimation.linear_algebra.scaled import LEAST_RIDGE, inverse_root, lengths
 from estimation.regressions.parameter_priors import GaussianPrior
 
 Array = NDArray[np.float64]
@@ -23,7 +23,8 @@ class Moments:
         cross: (n, p), Y_j' tau_j.
         square: (n,), tau_j' tau_j.
         count: (n,), rows.
-        pull: what the ridge of `solve` pulls to; without, to zero.
+        pull: what the ridge of `solve` pulls to; without, to zero. `posterior` takes it as it is, and it may be one of
+            the first columns only.
     """
 
     gram: Array
@@ -33,17 +34,20 @@ class Moments:
     pull: GaussianPrior | None = None
 
     @staticmethod
-    def of(Y: Array, tau: Array, mask: Array) -> Moments:
-        """Sums the rows of Y (N, n, p) and tau (N, n) where the mask (N, n) is one."""
+    def of(Y: Array, tau: Array, weights: Array | None = None) -> Moments:
+        """Sums the rows of Y (N, n, p) and tau (N, n), times weights (N, n); rows of weight zero do not count."""
         n, p = Y.shape[1:]
         gram, cross = np.zeros((n, p, p)), np.zeros((n, p))
+        weighted = tau if weights is None else weights * tau
         for joint in range(n):
             # Most columns do not act on a joint: links before it, friction of others.
             used = np.flatnonzero(Y[:, joint].any(axis=0))
-            rows = Y[:, joint][:, used] * mask[:, joint, None]
+            rows = Y[:, joint] if len(used) == p else Y[:, joint][:, used]
+            rows = rows if weights is None else rows * weights[:, joint, None]
             gram[joint][np.ix_(used, used)] = rows.T @ rows
-            cross[joint, used] = rows.T @ tau[:, joint]
-        return Moments(gram, cross, (mask * tau**2).sum(axis=0), mask.sum(axis=0))
+            cross[joint, used] = rows.T @ weighted[:, joint]
+        count = np.full(n, len(tau)) if weights is None else np.count_nonzero(weights, axis=0)
+        return Moments(gram, cross, (weighted**2).sum(axis=0), count)
 
     def __add__(self, other: Moments) -> Moments:
         return replace(
@@ -62,6 +66,12 @@ class Moments:
             square=self.square - other.square,
             count=self.count - other.count,
         )
+
+    def joined(self, weights: Array | None = None) -> Moments:
+        """Sums over the joints, their squared rows times weights (n,); gives the sums of one joint."""
+        own = np.ones(len(self.gram)) if weights is None else weights
+        sums = self._weighted(own)[None], (own @ self.cross)[None], np.array([own @ self.square])
+        return Moments(*sums, np.array([self.count.sum()]), self.pull)
 
     def pulled(self, pull: GaussianPrior | None) -> Moments:
         """Gives the same sums with another prior."""
@@ -92,6 +102,30 @@ class Moments:
         scale, unit = lengths(matrix), np.eye(len(matrix))
         inverse = solve_positive(matrix / scale[:, None] / scale + extra * unit, unit)
         return np.asarray(inverse / scale[:, None] / scale)
+
+    def posterior(self) -> Array:
+        """Finds the parameters (p,) of largest posterior density, all rows of unit variance.
+
+        Directions that neither data nor prior determine are zero, as in the least-norm solution.
+        """
+        root, aim = self._information()
+        return np.asarray(root @ (root.T @ aim))
+
+    def explained(self) -> float:
+        """Gives the squares that `posterior` explains, minus the penalty of the prior."""
+        root, aim = self._information()
+        projected = root.T @ aim
+        penalty = 0.0 if self.pull is None else self.pull.target @ self.pull.precision @ self.pull.target
+        return float(projected @ projected - penalty)
+
+    def _information(self) -> tuple[Array, Array]:
+        """The root of the inverse Gram matrix with the prior, and the right-hand side."""
+        gram, cross = self.gram.sum(axis=0), self.cross.sum(axis=0)
+        if self.pull is not None:
+            known = len(self.pull.target)
+            gram[:known, :known] += self.pull.precision
+            cross[:known] += self.pull.precision @ self.pull.target
+        return inverse_root(gram, LEAST_RIDGE), cross
 
     def _weighted(self, weights: Array) -> Array:
         return np.asarray((weights @ self.gram.reshape(len(self.gram), -1)).reshape(self.gram.shape[1:]))

@@ -1,4 +1,4 @@
-"""The base model on a recording: its columns, and the width of the friction sign of each joint."""
+"""The base model on a recording: its columns, the width of the friction sign of each joint, and its prior."""
 
 from __future__ import annotations
 
@@ -11,9 +11,19 @@ from numpy.typing import NDArray
 
 from estimation.diagnosis.base_models.payload_and_gravity import base_regressor, build_situation, friction_signs
 from estimation.diagnosis.recordings.directions import SHARP, sharpest_sign_velocity
-from estimation.diagnosis.recordings.log_reading import Recording
+from estimation.diagnosis.recordings.recording import Recording
 from estimation.diagnosis.recordings.thinning import evaluate_at_full_rate
 from estimation.linear_algebra.orthonormal import orthonormal
+from estimation.regressions.moments import Moments
+from estimation.regressions.parameter_priors import (
+    OWN_TORQUE_RATIO,
+    SILENT_COLUMN,
+    GaussianPrior,
+    friction_levels,
+    prior_from_description,
+    usual_share,
+)
+from estimation.regressions.standard_parameters import mass_from_torque, reference_bodies
 from robots.base_parameters import BaseParameters, find_base_parameters
 from robots.regressor import default_model
 from robots.robot import Robot
@@ -39,13 +49,25 @@ class Baseline:
 
     Attributes:
         base: base parameters of the model.
-        regressor: columns (N, n, b).
-        nuisance: columns (N, n, m) that are fitted too but belong to no finding: errors of the sign widths.
+        columns: columns (N, n, b + m): those of the base parameters, then others that are fitted too but belong to no
+            finding: errors of the sign widths.
     """
 
     base: BaseParameters
-    regressor: Array
-    nuisance: Array
+    columns: Array
+
+    @property
+    def regressor(self) -> Array:
+        """Columns of the base parameters (N, n, b)."""
+        return self.columns[:, :, : self.base.size]
+
+    def moments(self, weights: Array, tau: Array) -> Moments:
+        """Sums the normal equations of base parameters and nuisance for torque (N, n), rows weighted by (N, n)."""
+        return Moments.of(self.columns, tau, weights)
+
+    def fitted(self, weights: Array, tau: Array, pull: GaussianPrior) -> Array:
+        """Fits the base parameters (b,) to torque (N, n) by their posterior maximum, rows weighted by (N, n)."""
+        return self.moments(weights, tau).pulled(pull).posterior()[: self.base.size]
 
     def situation(self, recording: Recording, values: Array) -> Situation:
         """Returns the quantities on which effects may depend, with base parameters (b,)."""
@@ -115,7 +137,7 @@ def build_baseline(
         for i in signs:
             joint = base.columns[i].joint - 1
             Y[:, joint, i] = friction_signs(recording, joint, np.array([chosen[joint]]))[:, 0]
-    return Baseline(base, Y, _nuisance(recording, chosen))
+    return Baseline(base, np.concatenate([Y, _nuisance(recording, chosen)], axis=2))
 
 
 def _nuisance(recording: Recording, chosen: tuple[float, ...] | None) -> Array:
@@ -224,3 +246,53 @@ def inertia_matrix(baseline: Baseline, recording: Recording, values: Array) -> A
         unit[:, k] = 1.0
         result[:, k] = np.sqrt(np.mean((baseline.base.torque(q, zero, unit, values) - still) ** 2, axis=0))
     return result
+
+
+# Quantile of a joint's speed that counts as its largest.
+FASTEST = 0.999
+
+
+def base_model_prior(baseline: Baseline, recording: Recording, strength: float = 1.0) -> GaussianPrior:
+    """Builds the prior of the base parameters from the robot's description, as `identify` does, scaled to the noise.
+
+    Parameters scatter about the description by their own size (`prior_from_description`). Rows are weighted by the
+    inverse variance of their noise. The prior then enters with its precision, and the fit maximises the posterior
+    density. In coloured noise, rows are less informative than their number suggests. The prior is therefore multiplied
+    by the noise density at zero frequency over that of white noise.
+
+    If the description lacks inertial parameters, the prior limits the torque of each parameter to some times that of
+    the joints.
+
+    Args:
+        baseline: the base model on the data.
+        recording: the data.
+        strength: number of rows that inform as much on a slow torque as one row of white noise
+            (`Whitening.row_weight`).
+
+    Returns:
+        Prior of base parameters and nuisance (b + m), in units of rows weighted by the noise.
+    """
+    counts = ~recording.sign_unknown
+    number = np.maximum(counts.sum(axis=0), 1)
+    torque = np.sqrt((recording.tau**2 * counts).sum(axis=0) / number)
+    torque = np.maximum(torque, 1e-3 * max(float(torque.max()), 1e-12))
+    levels = np.sqrt(np.einsum("njb,nj->jb", baseline.regressor**2, counts.astype(float)) / number[:, None])
+    own = np.array([column.joint - 1 for column in baseline.base.columns])
+    raised = friction_levels(
+        baseline.base, levels[own, np.arange(len(own))], np.quantile(np.abs(recording.dq), FASTEST, axis=0)
+    )
+    robot = baseline.base.model.robot
+    bodies, _ = reference_bodies(robot, mass_from_torque(robot, float(torque.max())))
+    pull = prior_from_description(baseline.base, bodies, torque, raised)
+    if pull is None:
+        levels[own, np.arange(len(own))] = raised
+        usual = np.array([usual_share(column) for column in baseline.base.columns])
+        share = (levels / torque[:, None]).max(axis=0) / usual
+        pull = GaussianPrior(np.diag(np.maximum(share, SILENT_COLUMN) ** 2), np.zeros(len(own)))
+    b, size = len(pull.target), baseline.columns.shape[2]
+    m = size - b
+    precision = np.zeros((size, size))
+    precision[:b, :b] = pull.precision
+    # Errors of the sign widths need a bound, too: rows that hardly contain them would allow any value.
+    precision[range(b, size), range(b, size)] = 1.0 / (OWN_TORQUE_RATIO * torque[:m]) ** 2
+    return GaussianPrior(strength * precision, np.concatenate([pull.target, np.zeros(m)]))

@@ -118,6 +118,3 @@ def _situation(recording: Recording, model: TorqueModel, full: Array) -> Situati
         starts = tuple(run.start - rows.start for run, *_ in members)
         parts.append(situation(model.under(gravity), with_body(model, full, body), *motion, starts=starts))
     return join_situations(parts, model)
-
-
-__all__ = ["subtract_known_payload", "base_regressor", "build_situation"]

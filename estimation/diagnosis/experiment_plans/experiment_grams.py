@@ -18,6 +18,7 @@ from estimation.diagnosis.hypothesis_tests.power import chance_to_resolve
 from estimation.diagnosis.hypothesis_tests.problem import Problem
 from estimation.diagnosis.noise_models.masked_rows import no_masked_rows
 from estimation.diagnosis.noise_models.whitening import Whitening
+from estimation.linear_algebra.scaled import inverse_root
 from robots.base_parameters import find_base_parameters
 from robots.regressor import TorqueModel
 from robots.signals import Motion
@@ -222,13 +223,8 @@ class Grams:
         beside = np.arange(b)
         if rival is not None:
             beside = np.concatenate([beside, np.arange(edges[rival], edges[rival + 1])])
-        scale = np.sqrt(np.maximum(np.diag(gram), 1e-300))
-        unit = gram / scale[:, None] / scale
-        values, vectors = np.linalg.eigh(unit[np.ix_(beside, beside)])
-        kept = values > 1e-9 * values[-1]
-        cross = unit[np.ix_(own, beside)] @ vectors[:, kept] / np.sqrt(values[kept])
-        left: Array = (unit[np.ix_(own, own)] - cross @ cross.T) * np.outer(scale[own], scale[own])
-        return left
+        cross = gram[np.ix_(own, beside)] @ inverse_root(gram[np.ix_(beside, beside)], 1e-9)
+        return np.asarray(gram[np.ix_(own, own)] - cross @ cross.T)
 
 
 @dataclass(frozen=True, eq=False)

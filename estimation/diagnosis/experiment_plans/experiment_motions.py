@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 
-from estimation.diagnosis.recordings.log_reading import Recording
+from estimation.diagnosis.recordings.recording import Recording
 from robots.robot import Robot
 from robots.signals import Motion
 from robots.terms.effects.base_tilt import level_axes

@@ -12,14 +12,13 @@ from scipy.linalg import solve_toeplitz
 from estimation.diagnosis.base_models.baseline import build_baseline
 from estimation.diagnosis.experiment_plans.detection_limits import Limit, find_limits
 from estimation.diagnosis.hypothesis_tests.hypotheses import all_hypotheses
-from estimation.diagnosis.hypothesis_tests.problem import Problem
-from estimation.diagnosis.hypothesis_tests.problem_setup import build_problem
+from estimation.diagnosis.hypothesis_tests.problem import Problem, build_problem
 from estimation.diagnosis.hypothesis_tests.scan import measure
 from estimation.diagnosis.noise_models.frequency_bands import Band
 from estimation.diagnosis.noise_models.masked_rows import no_masked_rows
 from estimation.diagnosis.noise_models.whitening import Whitening
 from estimation.diagnosis.recordings.directions import SHARP, SURELY, sharpest_sign_velocity
-from estimation.diagnosis.recordings.log_reading import Recording
+from estimation.diagnosis.recordings.recording import Recording
 from estimation.regressions.parameter_priors import GaussianPrior
 from robots.base_parameters import find_base_parameters
 from robots.common.errors import InputError
@@ -108,7 +107,7 @@ def planned_problem(
     rough = recording.tau + ROUGH * recording.tau.std(axis=0) * np.tanh(joined.dq / SHARP)
     baseline = build_baseline(find_base_parameters(model), replace(recording, tau=rough), whitening.scale)
     # The data determine the known parameters exactly, so no prior is needed.
-    size = baseline.base.size + baseline.nuisance.shape[2]
+    size = baseline.columns.shape[2]
     free = GaussianPrior(np.zeros((size, size)), np.zeros(size))
     return build_problem(recording, baseline, whitening, pull=free)
 

@@ -1,7 +1,8 @@
-"""Fitted effects, and the BIC gain of several together."""
+"""Fitted effects with their BIC score (chi-square minus the cost of the parameters), and that of several together."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -9,11 +10,9 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from estimation.diagnosis.calibration import RARE_ODDS
-from estimation.diagnosis.hypothesis_tests.evidence import Evidence
-from estimation.diagnosis.hypothesis_tests.groups import Group
+from estimation.diagnosis.calibration import CLOSE_RIVAL_BIC, RARE_ODDS
 from estimation.diagnosis.hypothesis_tests.hypotheses import Hypothesis
-from estimation.diagnosis.hypothesis_tests.problem import Problem
+from estimation.diagnosis.hypothesis_tests.problem import Group, Problem
 from estimation.diagnosis.hypothesis_tests.scoring import Accepted, accept
 from robots.terms.effect_bases.capabilities import Persistence
 
@@ -96,6 +95,10 @@ class FittedEffect:
         counts = square[fourth > 0] ** 2 / fourth[fourth > 0]
         return max(float(counts.mean()), 2.0) if len(counts) else np.inf
 
+    def torque(self, problem: Problem) -> Array:
+        """Evaluates its torque (N0, n) [N m or N]."""
+        return problem.dense(self.hypothesis, self.shape) @ self.coefficients
+
     def gain_on(self, joints: Collection[int]) -> float:
         """Returns the part of the gain on some joints, from 0, in proportion to the torque's energy there."""
         energies = [float(np.sum((X @ self.coefficients) ** 2)) for X in self.group.columns]
@@ -125,3 +128,35 @@ def set_bic_gain(problem: Problem, members: Sequence[FittedEffect]) -> float:
 def accept_all_but(problem: Problem, members: Sequence[FittedEffect], i: int) -> Accepted:
     """Accepts the groups of all members except the i-th."""
     return accept(problem, tuple(m.group for k, m in enumerate(members) if k != i))
+
+
+@dataclass(frozen=True)
+class Evidence:
+    """Evidence for a model with an effect, compared with the model without it.
+
+    Attributes:
+        chi2: decrease of the squared whitened residual.
+        degrees: number of fitted parameters: visible coefficients and free shape parameters.
+        rows: number of data N: white rows times the joints on which the effect acts.
+        prior: twice the log of the prior odds against the effect.
+    """
+
+    chi2: float
+    degrees: int
+    rows: float
+    prior: float = 0.0
+
+    @property
+    def bic_gain(self) -> float:
+        """Decrease of the Bayesian information criterion (Schwarz 1978); larger is better."""
+        return self.chi2 - self.degrees * math.log(self.rows) - self.prior
+
+
+def is_close_rival(rare: bool, worse: float) -> bool:
+    """Whether a rival fits about as well: by the data alone, without its prior penalty, if it is rare.
+
+    Args:
+        rare: whether robots seldom have the rival.
+        worse: by how much its BIC is worse.
+    """
+    return worse < (RARE_ODDS if rare else CLOSE_RIVAL_BIC)

@@ -14,6 +14,9 @@ from robots.terms.effects import Effect, JointEffect, Situation
 
 Array = NDArray[np.float64]
 
+LARGEST = 1e15
+"""Largest value of a column, in its unit: more is a response that diverges."""
+
 
 @dataclass(frozen=True)
 class Hypothesis:
@@ -56,6 +59,14 @@ class Hypothesis:
         joints = tuple(int(j) for j in np.flatnonzero(acting(X).any(axis=1))) or (0,)
         return joints, tuple(X[:, j] for j in joints)
 
+    def dense(self, situation: Situation, shape: tuple[float, ...]) -> Array:
+        """Evaluates the columns on all joints (N, n, k), zero where it does not act; see `columns`."""
+        joints, columns = self.columns(situation, shape)
+        X = np.zeros((*situation.q.shape, columns[0].shape[1]))
+        for j, part in zip(joints, columns, strict=True):
+            X[:, j] = part
+        return X
+
     def coefficient_bounds(self, robot: Robot, shape: tuple[float, ...]) -> tuple[Array, Array]:
         """Returns the physical bounds of the coefficients, (k,) and (k,), at given shape values."""
         ranges = self.effect.ranges(robot, self.joint, shape)
@@ -68,6 +79,10 @@ def all_hypotheses(robot: Robot, effects: Sequence[Effect]) -> tuple[Hypothesis,
 
 
 def _finite(X: Array) -> Array:
+    """Sets values that are not finite to zero, and columns whose squares single precision cannot hold."""
     with np.errstate(all="ignore"):
-        finite = np.isfinite(X.sum())  # one pass in the usual case
-    return X if finite else np.where(np.isfinite(X), X, 0.0)
+        usual = max(X.max(initial=0.0), -X.min(initial=0.0)) < LARGEST
+    if usual:
+        return X
+    X = np.where(np.isfinite(X), X, 0.0)
+    return np.where(np.abs(X).max(axis=0) < LARGEST, X, 0.0)

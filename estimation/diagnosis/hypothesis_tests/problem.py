@@ -1,4 +1,4 @@
-"""Whitened regression in which all hypotheses are tested, with the base model projected out."""
+"""Whitened regression in which all hypotheses are tested: the base model is fitted and projected out."""
 
 from __future__ import annotations
 
@@ -9,24 +9,24 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from estimation.diagnosis.base_models.baseline import Baseline
+from estimation.diagnosis.base_models.baseline import FAINT, Baseline, base_model_prior
 from estimation.diagnosis.calibration import MIN_COUNTED_ENERGY, MIN_DISTANT_ENERGY
-from estimation.diagnosis.hypothesis_tests.groups import Group
 from estimation.diagnosis.hypothesis_tests.hypotheses import Hypothesis
 from estimation.diagnosis.noise_models.high_frequency_band import HighBand
 from estimation.diagnosis.noise_models.whitening import Whitening
 from estimation.diagnosis.recordings.recording import Recording
 from estimation.diagnosis.reversals.reversal_timing import ReversalTiming
-from estimation.regressions.parameter_priors import GaussianPrior
+from estimation.linear_algebra.orthonormal import orthonormal
+from estimation.regressions.parameter_priors import GaussianPrior, inflate_conflicting_prior
 from robots.terms.effect_bases.capabilities import AboveBand, AtReversals, Reading
-from robots.terms.effect_bases.gear_load import ExtraGearLoad
+from robots.terms.effect_bases.gear_load import ExtraGearLoad, with_gear_load
 from robots.terms.effects import Effect, Situation
 from robots.terms.situations.flange_body import with_body
 
 Array = NDArray[np.float64]
 Small = NDArray[np.float32]
 
-FAINT = 1e-5  # share of a column's energy below which its unmasked part is only rounding
+ROUNDED = 1e-5  # share of a column's energy below which its unmasked part is only rounding
 
 
 @dataclass(frozen=True, eq=False)
@@ -142,6 +142,10 @@ class Problem:
         """Evaluates a hypothesis: the joints on which it acts, from 0, and its columns (N0, k) on each."""
         return hypothesis.columns(self.state_for(hypothesis.effect), shape)
 
+    def dense(self, hypothesis: Hypothesis, shape: tuple[float, ...]) -> Array:
+        """Evaluates a hypothesis on all joints (N0, n, k), zero where it does not act."""
+        return hypothesis.dense(self.state_for(hypothesis.effect), shape)
+
     def measured(self, hypothesis: Hypothesis, shape: tuple[float, ...]) -> Group:
         """Evaluates a hypothesis at one shape and returns its group."""
         return self.group(*self.columns_of(hypothesis, shape), effect=hypothesis.effect)
@@ -183,7 +187,7 @@ class Problem:
         # A column may have little energy in the band and still be visible in the high band.
         power = [own + sum(map(_squares, above)) for own in power]
         raw = np.where(power[0] > MIN_COUNTED_ENERGY * power[1], power[0], np.inf)
-        doubtful = np.flatnonzero(np.isinf(raw) & (power[0] > FAINT * power[1]))
+        doubtful = np.flatnonzero(np.isinf(raw) & (power[0] > ROUNDED * power[1]))
         if effect is not None and effect.delays_all_torque and len(doubtful):
             known = self._known(joints, [part[:, doubtful] for part in columns])
             raw[doubtful] = np.where(known > MIN_DISTANT_ENERGY * power[0][doubtful], power[0][doubtful], np.inf)
@@ -288,3 +292,110 @@ class Problem:
 
 def _squares(columns: Array | Small) -> Array:
     return np.asarray((columns.T[:, None] @ columns.T[:, :, None])[:, 0, 0], dtype=float)
+
+
+@dataclass(frozen=True, eq=False)
+class Group:
+    """A hypothesis at one shape, whitened, with the base model projected out of its inner products.
+
+    Attributes:
+        joints: joints on which it acts, from 0.
+        columns: whitened columns (N, k) of each of the joints.
+        against: <X, Q> (k, b), Q the base model's orthonormal columns.
+        gram: Gram matrix of the columns (k, k), base model projected out.
+        raw: squared norms (k,) before the projection; infinite for columns that are nearly all in masked rows.
+        cross: inner products with the residual (k,).
+        high_band_columns: white columns (N', k) of each joint above its band; none for effects that are not
+            searched `above_band`.
+        reversal_columns: column of each joint's reversal timing over its error (n, k); None if the effect does not
+            delay all torque.
+    """
+
+    joints: tuple[int, ...]
+    columns: tuple[Small, ...]
+    against: Array
+    gram: Array
+    raw: Array
+    cross: Array
+    high_band_columns: tuple[Small, ...] = ()
+    reversal_columns: Array | None = None
+
+    @property
+    def size(self) -> int:
+        """Number of columns k."""
+        return len(self.raw)
+
+    @property
+    def by_reversals(self) -> bool:
+        """Whether most of its information is from reversal timing, which held-out errors do not contain."""
+        return self.reversal_columns is not None and 2.0 * float(np.sum(self.reversal_columns**2)) > float(
+            self.gram[0, 0]
+        )
+
+
+def build_problem(
+    recording: Recording,
+    baseline: Baseline,
+    whitening: Whitening,
+    *,
+    extra: Array | None = None,
+    pull: GaussianPrior | None = None,
+    upper: HighBand | None = None,
+    followed: Array | None = None,
+    bearing: ExtraGearLoad | None = None,
+) -> Problem:
+    """Builds the whitened regression and fits the base model in it.
+
+    Args:
+        recording: the data.
+        baseline: the base model.
+        whitening: filters that whiten the noise.
+        extra: torque (N, n) of known effects [N m or N], subtracted before the base parameters are fitted.
+        pull: prior of base parameters and nuisance; by default `base_model_prior`, inflated where the data contradict
+            it.
+        upper: regression above the bands.
+        followed: the part (N, n) of the known effects' torque that effects of time delay also delay [N m or N].
+        bearing: gear load of the known effects; None for none.
+    """
+    n = recording.n
+    root = np.linalg.cholesky(whitening.precision)  # P = L L'
+    columns = baseline.columns
+    norms = np.sqrt((columns**2).sum(axis=(0, 1)))
+    white = whitening.all(columns[:, :, norms > 0])
+    # A column that acts only in rows of unknown friction sign is rounding after whitening.
+    left = np.sqrt((white**2).sum(axis=(0, 1))) * whitening.scale.max() / norms[norms > 0]
+    white = white[:, :, left > FAINT]
+    N = len(white)
+    mixed = np.einsum("jk,njb->nkb", root, white, optimize=True)
+    Q = orthonormal(mixed.reshape(N * n, -1), FAINT).reshape(N, n, -1)
+    tau = whitening.all(recording.tau)
+    tilted = tau @ root
+    tilted = tilted - np.einsum("nkb,b->nk", Q, np.einsum("nkb,nk->b", Q, tilted, optimize=True), optimize=True)
+    scales = whitening.scales(len(recording))
+    own = recording.tau if extra is None else recording.tau - extra
+    weights = ~recording.sign_unknown / scales
+    moments = baseline.moments(weights, own).joined()
+    if pull is None:
+        strength = whitening.row_weight
+        pull = inflate_conflicting_prior(
+            base_model_prior(baseline, recording, strength), moments.gram[0], moments.cross[0], strength
+        )
+    values = moments.pulled(pull).posterior()[: baseline.base.size]
+    alone = values if extra is None else baseline.fitted(weights, recording.tau, pull)
+    remainder = recording.tau - baseline.regressor @ alone
+    now = with_gear_load(baseline.situation(recording, values), bearing)
+    return Problem(
+        recording=recording,
+        baseline=baseline,
+        whitening=whitening,
+        situation=now,
+        weighted_base_columns=np.ascontiguousarray(np.einsum("jk,nkb->jnb", root, Q, optimize=True), dtype=np.float32),
+        residual=tilted @ root.T,
+        white=np.linalg.solve(root.T, tilted.T).T,
+        energy=float(np.sum(tilted**2)),
+        base_residual=remainder,
+        prior=pull,
+        high_band=upper,
+        delayed_torque_state=None if followed is None else now.beside(followed),
+        extra_load=bearing,
+    )

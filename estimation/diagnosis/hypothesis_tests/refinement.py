@@ -14,7 +14,6 @@ from estimation.diagnosis.hypothesis_tests.fitted_effects import FittedEffect, a
 from estimation.diagnosis.hypothesis_tests.hypotheses import Hypothesis
 from estimation.diagnosis.hypothesis_tests.joint_agreement import per_joint_evidence
 from estimation.diagnosis.hypothesis_tests.problem import Problem
-from estimation.diagnosis.hypothesis_tests.reversal_errors import gain_from_reversal_errors
 from estimation.diagnosis.hypothesis_tests.scoring import Accepted, score
 from robots.terms.effect_bases.capabilities import AtReversals, Reading
 
@@ -114,10 +113,8 @@ def refine(
     if hypothesis.effect.at_reversals is AtReversals.LATE:
         return _with_scatter(problem, found, accepted)
     if hypothesis.effect.at_reversals is AtReversals.GRADUAL and hypothesis.joint is not None:
-        if found.shape[0] < SHORT_TRAVEL_FACTOR * bounds[0][0]:
-            return replace(found, birge_ratio=np.inf)
-        owed = gain_from_reversal_errors(problem, hypothesis.joint, found.group, found.gain, accepted)
-        return replace(found, motion_error_chi2=owed)
+        too_short = found.shape[0] < SHORT_TRAVEL_FACTOR * bounds[0][0]
+        return replace(found, birge_ratio=np.inf) if too_short else found
     return (
         replace(found, birge_ratio=_reversal_scatter(problem, found, accepted))
         if hypothesis.effect.at_reversals is AtReversals.IMPACT

@@ -13,10 +13,10 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import gammaincc
 
-from estimation.diagnosis.hypothesis_tests.groups import Group
 from estimation.diagnosis.hypothesis_tests.hypotheses import Hypothesis
-from estimation.diagnosis.hypothesis_tests.problem import Problem
+from estimation.diagnosis.hypothesis_tests.problem import Group, Problem
 from estimation.diagnosis.hypothesis_tests.scoring import Accepted, score
+from estimation.diagnosis.noise_models.whitening import acting
 from robots.common.forks import forked
 
 Array = NDArray[np.float64]
@@ -126,7 +126,7 @@ def _entry(problem: Problem, hypothesis: Hypothesis) -> Entry | None:
     batches: dict[tuple[int, ...], list[tuple[int, tuple[Array, ...]]]] = {}
     for shape in shapes:
         joints, columns = problem.columns_of(hypothesis, shape)
-        if any(part.any() for part in columns):
+        if any(acting(part).any() for part in columns):
             batches.setdefault(joints, []).append((len(kept), columns))
             kept.append(shape)
     if not kept:

@@ -9,9 +9,8 @@ from numpy.typing import NDArray
 from scipy.optimize import lsq_linear
 
 from estimation.diagnosis.calibration import MIN_VISIBLE_ENERGY
-from estimation.diagnosis.hypothesis_tests.groups import Group
 from estimation.diagnosis.hypothesis_tests.hypotheses import Hypothesis
-from estimation.diagnosis.hypothesis_tests.problem import Problem
+from estimation.diagnosis.hypothesis_tests.problem import Group, Problem
 from robots.robot import Robot
 
 Array = NDArray[np.float64]

@@ -8,9 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from estimation.diagnosis.base_models.priors import solve_map
 from estimation.diagnosis.hypothesis_tests.fitted_effects import FittedEffect, accept_all_but
-from estimation.diagnosis.hypothesis_tests.hypotheses import Hypothesis
 from estimation.diagnosis.hypothesis_tests.problem import Problem
 from estimation.diagnosis.hypothesis_tests.scoring import accept, score
 from estimation.diagnosis.joint_fits.event_window import open_event_edges
@@ -25,7 +23,7 @@ from estimation.diagnosis.joint_fits.shrinkage import effects_prior
 from estimation.identifications.verdicts import DETERMINED_ERROR, NEGLIGIBLE_TORQUE
 from estimation.models.extension import Extension
 from estimation.models.model import Model
-from estimation.regressions.parameter_priors import GaussianPrior
+from estimation.regressions.moments import Moments
 from estimation.uncertainty.blocks import widened_by_blocks
 from estimation.uncertainty.quantiles import NORMAL_95
 from robots.terms.effect_bases.capabilities import AboveBand, AtReversals
@@ -65,7 +63,7 @@ def fit_extended(problem: Problem, members: Sequence[FittedEffect], provenance: 
         provenance: origin of the model, as stored in it.
     """
     baseline, white = problem.baseline, problem.whitening
-    base = np.concatenate([baseline.regressor, baseline.nuisance], axis=2)
+    base = baseline.columns
     blocks, slices, deviations = [base], [], []
     at = base.shape[2]
     fitted_members: list[FittedEffect] = []
@@ -76,7 +74,7 @@ def fit_extended(problem: Problem, members: Sequence[FittedEffect], provenance: 
         steps = shape_errors(problem, member, accept(problem, tuple(m.group for m in rest)))
         steps = open_event_edges(problem, member, rest, widen_change_times(problem, member, rest, steps))
         fitted_members.append(member)
-        X = dense(problem, member.hypothesis, member.shape)
+        X = problem.dense(member.hypothesis, member.shape)
         slopes = [_slope(problem, member, k, abs(step)) for k, step in enumerate(steps)]
         blocks += [X, *slopes]
         slices.append((at, X.shape[2], len(member.shape)))
@@ -113,9 +111,9 @@ def fit_extended(problem: Problem, members: Sequence[FittedEffect], provenance: 
             forms[-1][:, start : start + size] = held
     free = flat[:, linear & ~known]
     # The prior is stated for plain rows of the log; `row_weight` converts it to white rows.
-    pull, kept = effects_prior(problem, members), ~known[linear]
-    pull = GaussianPrior(pull.precision[np.ix_(kept, kept)] / white.row_weight, pull.target[kept])
-    values[linear & ~known] = solve_map(free.T @ free, free.T @ (tau - flat[:, known] @ values[known]), pull)
+    pull = effects_prior(problem, members).columns(np.flatnonzero(~known[linear])).times(1.0 / white.row_weight)
+    moments = Moments.of(free[:, None], (tau - flat[:, known] @ values[known])[:, None])
+    values[linear & ~known] = moments.pulled(pull).posterior()
     by_reversals = reversal_columns(members, [start for start, *_ in slices], (problem.n, flat.shape[1]))
     covariance, unseen = _covariance(np.concatenate([flat, by_reversals, *forms]))
     covariance = widened_by_blocks(covariance, flat[:plain], (tau - flat @ values)[:plain])
@@ -179,15 +177,6 @@ def fit_extended(problem: Problem, members: Sequence[FittedEffect], provenance: 
     return ExtendedFit(model, tuple(determined_of), values[: base.shape[2]])
 
 
-def dense(problem: Problem, hypothesis: Hypothesis, shape: tuple[float, ...]) -> Array:
-    """Evaluates the columns of a hypothesis on all joints (N, n, k), zero where it does not act."""
-    joints, columns = problem.columns_of(hypothesis, shape)
-    X = np.zeros((len(problem.recording), problem.n, columns[0].shape[1]))
-    for j, part in zip(joints, columns, strict=True):
-        X[:, j] = part
-    return X
-
-
 def reversal_columns(members: Sequence[FittedEffect], starts: Sequence[int], shape: tuple[int, int]) -> Array:
     """Returns the rows by which reversal timing enters a joint fit, one per joint.
 
@@ -214,7 +203,7 @@ def _slope(problem: Problem, member: FittedEffect, k: int, step: float) -> Array
     up, down = min(value + h, high), max(value - h, low)
     if up <= down:
         return np.zeros((len(problem.recording), problem.n, 1))
-    above, below = (dense(problem, member.hypothesis, with_value(member.shape, k, x)) for x in (up, down))
+    above, below = (problem.dense(member.hypothesis, with_value(member.shape, k, x)) for x in (up, down))
     return ((above - below) @ member.coefficients * (h / (up - down)))[:, :, None]
 
 

@@ -8,11 +8,9 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from estimation.diagnosis.base_models.priors import solve_map
 from estimation.diagnosis.hypothesis_tests.fitted_effects import FittedEffect, accept_all_but
 from estimation.diagnosis.hypothesis_tests.problem import Problem
 from estimation.diagnosis.hypothesis_tests.refinement import clip_shape, refine
-from estimation.diagnosis.joint_fits.extended_fit import dense
 from estimation.diagnosis.joint_fits.total_torque import JointFit
 from robots.terms.effect_bases.capabilities import Reading
 from robots.terms.effect_bases.static import StaticJointEffect
@@ -92,13 +90,13 @@ class _Search:
             passes[:, joint - 1] += slopes[:, 0]
             by_shape = np.zeros((*passes.shape, len(loose)))
             by_shape[:, joint - 1] = slopes[:, 1:][:, loose]
-            more += [dense(now, member.hypothesis, member.shape), by_shape]
+            more += [now.dense(member.hypothesis, member.shape), by_shape]
             own += [member.coefficients, np.asarray(member.shape)[loose]]
         columns = np.concatenate([self.fit.full, *more], axis=2)
         # The distortion is evaluated at the base model's torque, so only the base columns are scaled.
         columns[:, :, : self.problem.baseline.base.size] *= passes[:, :, None]
         left = self.problem.recording.tau - self.fit.full @ values - self._distortion(now, members)
-        return solve_map(*self.fit.normal(left + columns @ np.concatenate(own), columns), self.problem.prior)
+        return self.fit.moments(left + columns @ np.concatenate(own), columns).posterior()
 
     def _moved(
         self, values: Array, members: Sequence[FittedEffect], goal: Array, share: float
@@ -120,7 +118,7 @@ class _Search:
         return replace(problem, situation=now)
 
     def _distortion(self, now: Problem, members: Sequence[FittedEffect]) -> Array:
-        return np.sum([dense(now, m.hypothesis, m.shape) @ m.coefficients for m in members], axis=0)
+        return np.sum([m.torque(now) for m in members], axis=0)
 
     def _cost(self, values: Array, now: Problem, members: Sequence[FittedEffect]) -> float:
         """Returns the weighted sum of squares of residual, prior and reversal timing."""

@@ -9,13 +9,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from estimation.diagnosis.base_models.payload_and_gravity import build_situation
-from estimation.diagnosis.base_models.priors import solve_least_squares, solve_map
 from estimation.diagnosis.hypothesis_tests.fitted_effects import FittedEffect
 from estimation.diagnosis.hypothesis_tests.hypotheses import Hypothesis
 from estimation.diagnosis.hypothesis_tests.problem import Problem
-from estimation.diagnosis.joint_fits.extended_fit import dense, reversal_columns
+from estimation.diagnosis.joint_fits.extended_fit import reversal_columns
 from estimation.diagnosis.noise_models.noise_nuisance_basis import is_short
 from estimation.diagnosis.recordings.recording import Recording
+from estimation.regressions.moments import Moments
 from robots.terms.effect_bases.capabilities import AtReversals, Reading
 from robots.terms.effect_bases.gear_load import with_gear_load
 from robots.terms.effects import Situation
@@ -43,7 +43,7 @@ def with_total_torque(problem: Problem, members: Sequence[FittedEffect], hypothe
     """
     others = [member for member in members if member.hypothesis.effect.at_reversals is not AtReversals.LATE]
     if others and any(hypothesis.effect.at_reversals is AtReversals.LATE for hypothesis in hypotheses):
-        beyond = np.sum([dense(problem, m.hypothesis, m.shape) @ m.coefficients for m in others], axis=0)
+        beyond = np.sum([m.torque(problem) for m in others], axis=0)
         problem = replace(problem, delayed_torque_state=problem.situation.beside(beyond))
     useless = np.zeros_like(problem.recording.sign_unknown)
     for hypothesis in hypotheses:
@@ -98,7 +98,7 @@ def fit_clipped_torque(problem: Problem, members: Sequence[FittedEffect]) -> Pro
 
 def _lost(problem: Problem, members: Sequence[FittedEffect]) -> Array:
     """Returns the torque (N, n) removed by effects that act on the total torque."""
-    return np.sum([dense(problem, member.hypothesis, member.shape).sum(axis=2) for member in members], axis=0)
+    return np.sum([problem.dense(member.hypothesis, member.shape).sum(axis=2) for member in members], axis=0)
 
 
 def _with_more(problem: Problem, torque: Array) -> Problem:
@@ -120,10 +120,10 @@ class JointFit:
 
     def __init__(self, problem: Problem, members: Sequence[FittedEffect], counted: Flags) -> None:
         baseline, recording = problem.baseline, problem.recording
-        blocks = [dense(problem, member.hypothesis, member.shape) for member in members]
+        blocks = [problem.dense(member.hypothesis, member.shape) for member in members]
         self.problem = problem
-        self.full = np.concatenate([baseline.regressor, baseline.nuisance, *blocks], axis=2)
-        edges = np.cumsum([baseline.regressor.shape[2] + baseline.nuisance.shape[2], *(b.shape[2] for b in blocks)])
+        self.full = np.concatenate([baseline.columns, *blocks], axis=2)
+        edges = np.cumsum([baseline.columns.shape[2], *(b.shape[2] for b in blocks)])
         self.timed = reversal_columns(members, edges[:-1].tolist(), (recording.n, self.full.shape[2]))
         self.weights = (counted & ~recording.sign_unknown) / problem.whitening.scales(len(recording))
 
@@ -134,25 +134,21 @@ class JointFit:
             tau: torque (N, n) [N m or N].
             passes: derivative of the reading by the torque (N, n); 1 by default.
         """
-        return solve_map(*self.moments(tau, passes), self.problem.prior)
+        return self.moments(tau, self.full if passes is None else self.full * passes[:, :, None]).posterior()
 
-    def moments(self, tau: Array, passes: Array | None = None) -> tuple[Array, Array]:
-        """Returns the normal equations (b, b), (b,) of the same fit."""
-        return self.normal(tau, self.full if passes is None else self.full * passes[:, :, None])
-
-    def normal(self, tau: Array, columns: Array) -> tuple[Array, Array]:
-        """Returns the normal equations of torque (N, n) for given columns.
+    def moments(self, tau: Array, columns: Array) -> Moments:
+        """Returns the normal equations of torque (N, n) for given columns, with the prior.
 
         Args:
             tau: torque (N, n) [N m or N].
             columns: (N, n, p), the first b of which correspond to `full`.
         """
-        flat = (columns * self.weights[:, :, None]).reshape(-1, columns.shape[2])
-        gram, cross, b = flat.T @ flat, flat.T @ (tau * self.weights).reshape(-1), self.full.shape[2]
-        gram[:b, :b] += self.timed.T @ self.timed
-        if self.problem.timing is not None:
-            cross[:b] += self.timed.T @ self.problem.timing.residual
-        return gram, cross
+        moments = Moments.of(columns, tau, self.weights).joined().pulled(self.problem.prior)
+        if self.problem.timing is None:
+            return moments
+        more = np.zeros((len(self.timed), 1, columns.shape[2]))
+        more[:, 0, : self.full.shape[2]] = self.timed
+        return moments + Moments.of(more, self.problem.timing.residual[:, None])
 
     def total_torque(self, values: Array) -> Problem:
         """Returns the problem with the total torque of these values (b,)."""
@@ -169,13 +165,10 @@ def fit_jointly(problem: Problem, members: Sequence[FittedEffect]) -> tuple[Arra
         All values (b,); the residual (N, n) from which the noise is estimated; all columns (N, n, b).
     """
     both, tau = JointFit(problem, members, np.ones_like(problem.recording.sign_unknown)), problem.recording.tau
-    gram, cross = both.moments(tau)
-    values = solve_map(gram, cross, problem.prior)
-    return (
-        values,
-        tau - both.full @ (values if is_short(problem.recording) else solve_least_squares(gram, cross)),
-        both.full,
-    )
+    moments = both.moments(tau, both.full)
+    values = moments.posterior()
+    free = values if is_short(problem.recording) else moments.pulled(None).posterior()
+    return values, tau - both.full @ free, both.full
 
 
 def effect_columns(
@@ -194,13 +187,13 @@ def effect_columns(
     model = problem.situation.model
     own = build_situation(recording, model, problem.parameters_without_payload)
     now = with_gear_load(replace(own, since=problem.situation.origin), problem.extra_load)
-    states, columns = [now] * len(members), [_dense(now, member) for member in members]
+    states, columns = [now] * len(members), [m.hypothesis.dense(now, m.shape) for m in members]
     late = [k for k, member in enumerate(members) if member.hypothesis.effect.at_reversals is AtReversals.LATE]
     if problem.delayed_torque_state is not None and 0 < len(late) < len(members):
         plain = [columns[k] @ member.coefficients for k, member in enumerate(members) if k not in late]
         followed = now.beside(np.sum(plain, axis=0))
         for k in late:
-            states[k], columns[k] = followed, _dense(followed, members[k])
+            states[k], columns[k] = followed, members[k].hypothesis.dense(followed, members[k].shape)
     if problem.total_torque_state is not None:
         whole = build_situation(
             recording, model, replace(problem, situation=problem.total_torque_state).parameters_without_payload
@@ -213,12 +206,5 @@ def effect_columns(
         whole = whole.beside(np.sum(parts, axis=0) if parts else None)
         for k, member in enumerate(members):
             if member.hypothesis.effect.reading is Reading.CUTS:
-                states[k], columns[k] = whole, _dense(whole, member)
+                states[k], columns[k] = whole, member.hypothesis.dense(whole, member.shape)
     return states, columns
-
-
-def _dense(state: Situation, member: FittedEffect) -> Array:
-    X = np.zeros((*state.q.shape, len(member.coefficients)))
-    for j, part in zip(*member.hypothesis.columns(state, member.shape), strict=True):
-        X[:, j] = part
-    return X

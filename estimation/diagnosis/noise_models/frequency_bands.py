@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from scipy.signal import firwin, welch
 
 from estimation.diagnosis.calibration import MAX_BIAS_CHI2, MAX_MOTION_ERROR
-from estimation.diagnosis.recordings.log_reading import Recording
+from estimation.diagnosis.recordings.recording import Recording
 
 Array = NDArray[np.float64]
 Small = NDArray[np.float32]

@@ -15,7 +15,7 @@ from estimation.diagnosis.base_models.baseline import FAINT, Baseline
 from estimation.diagnosis.calibration import MIN_HIGH_BAND
 from estimation.diagnosis.noise_models.frequency_bands import TRANSITION, Band, low_pass
 from estimation.diagnosis.noise_models.masked_rows import find_masked_rows
-from estimation.diagnosis.noise_models.spectral_lines import remove_lines
+from estimation.diagnosis.noise_models.noise_spectrum import remove_lines
 from estimation.diagnosis.noise_models.whitening import Whitening
 from estimation.diagnosis.recordings.recording import Recording, rest_rows
 from estimation.linear_algebra.orthonormal import orthonormal
@@ -151,7 +151,7 @@ def build_high_band(
         passing = _levelling(wide, recording, noise[:, j, None], counts, j, band.cutoff, length)
         left = _passed(wide, noise[:, j, None], j, passing)[:, 0] * counts
         counts *= _calmness(left, counts, round(BURST / (recording.step * wide.stride)))
-        own = np.concatenate([baseline.regressor[:, j], baseline.nuisance[:, j]], axis=1)
+        own = baseline.columns[:, j]
         base = orthonormal(_passed(wide, own[:, own.any(axis=0)], j, passing) * counts[:, None], FAINT)
         white = _passed(wide, remainder[:, j, None], j, passing)[:, 0] * counts
         joints.append(JointHighBand(passing, counts, base, white - base @ (base.T @ white), white))

@@ -38,8 +38,8 @@ class MaskedRows:
         if not len(rows):
             return series
         result = series.copy(order="K")
-        w = weight[:, *(None,) * (series.ndim - 1)]
-        result[rows] = (1 - w) * series[before] + w * series[after]
+        # Along the rows, which are contiguous in memory in the usual columns.
+        result.T[..., rows] = (1 - weight) * series.T[..., before] + weight * series.T[..., after]
         return result
 
     def bridge_adjoint(self, slope: Array, joint: int) -> Array:

@@ -1,4 +1,4 @@
-"""Estimate of the torque noise from the residual of a model: spectrum, levels, correlation and outliers."""
+"""Estimate of the torque noise from the residual of a model: spectrum, levels, correlation, bursts and outliers."""
 
 from __future__ import annotations
 
@@ -11,21 +11,26 @@ from scipy.fft import next_fast_len
 from scipy.ndimage import maximum_filter1d, uniform_filter1d
 
 from estimation.diagnosis.calibration import (
+    BURST_SIGMAS,
     IMPACT_TIME,
+    MAX_BURST_SHARE,
     MAX_MOTION_ERROR,
     MAX_REVERSAL_ERROR,
     MAX_ROW_SIGMAS,
     MIN_PUSH_TIME,
+    SPIKE_SIGMAS,
 )
-from estimation.diagnosis.noise_models.bursts import find_bursts
 from estimation.diagnosis.noise_models.frequency_bands import find_bands, unbiased_frequencies
 from estimation.diagnosis.noise_models.masked_rows import find_masked_rows
 from estimation.diagnosis.noise_models.noise_nuisance_basis import NuisanceProjection
-from estimation.diagnosis.noise_models.noise_spectrum import WITH_NUISANCE, WITHOUT_NUISANCE, fit_noise_process
-from estimation.diagnosis.noise_models.spectral_lines import remove_lines
+from estimation.diagnosis.noise_models.noise_spectrum import (
+    WITH_NUISANCE,
+    WITHOUT_NUISANCE,
+    fit_noise_process,
+    remove_lines,
+)
 from estimation.diagnosis.noise_models.whitening import Whitening, free_columns
-from estimation.diagnosis.recordings.log_reading import Recording
-from estimation.diagnosis.recordings.recording import rest_rows
+from estimation.diagnosis.recordings.recording import Recording, rest_rows
 from estimation.uncertainty.quantiles import NORMAL_MEDIAN, robust_deviation
 
 Array = NDArray[np.float64]
@@ -234,3 +239,38 @@ def _density(pieces: Sequence[Array], step: float, known: Sequence[NDArray[np.bo
         inner = np.concatenate([rows[:-2] & rows[1:-1] & rows[2:] for rows in known])
         squares[~inner & (inner.sum(axis=0) >= FEWEST_ROWS)] = np.nan
     return np.asarray(np.nanmedian(squares, axis=0) / NORMAL_MEDIAN**2 / 6 * 2 * step)
+
+
+WIDTHS = (0.3, 1.0)
+"""Durations [s] over which a residual is averaged: as long as a push, and longer than spikes of noise."""
+
+
+def find_bursts(pieces: Sequence[Array], measured: NDArray[np.bool_], step: float) -> NDArray[np.bool_]:
+    """Marks rows (M, n) in bursts, joint by joint.
+
+    A row is in a burst if a moving average over it is far larger than usual.
+
+    Args:
+        pieces: residual of each log (N, n) [N m or N], zero where it is not measured.
+        measured: rows of all logs that count (M, n).
+        step: time between rows [s].
+
+    Returns:
+        Flags (M, n); none for a joint whose bursts are too frequent to be exceptions.
+    """
+    marked = np.zeros_like(measured)
+    rows_of = np.abs(np.concatenate(pieces))
+    pairs = zip(rows_of.T, measured.T, strict=True)
+    most = SPIKE_SIGMAS * np.array([robust_deviation(x[rows]) if rows.any() else 0.0 for x, rows in pairs])
+    pieces = [np.clip(piece, -most, most) for piece in pieces]
+    for width in WIDTHS:
+        size = max(1, round(width / step))
+        means = np.concatenate([uniform_filter1d(piece, size, axis=0, mode="constant") for piece in pieces])
+        for j, (mean, counts) in enumerate(zip(np.abs(means).T, measured.T, strict=True)):
+            if counts.any():
+                far = mean > BURST_SIGMAS * robust_deviation(mean[counts])
+                # A large average marks all rows that it covers.
+                marked[:, j] |= maximum_filter1d(far.astype(np.int8), size) > 0
+    marked &= measured
+    seldom = marked.sum(axis=0) <= MAX_BURST_SHARE * measured.sum(axis=0)
+    return np.asarray(marked & seldom)

@@ -100,20 +100,13 @@ def build_nuisance_projection(recording: Recording, baseline: Baseline, residual
     known = ~recording.sign_unknown
     weights = known / np.maximum(recording.tau.std(axis=0), 1e-12)
     sign = baseline.situation(recording, np.zeros(baseline.base.size)).sign
-    size = baseline.regressor.shape[2] + baseline.nuisance.shape[2]
-    gram, shown = np.zeros((size, size)), []
+    root = inverse_root(baseline.moments(weights, recording.tau).joined().gram[0], FAINT**2)
+    result = []
     for j in range(recording.n):
-        own = np.hstack([baseline.regressor[:, j], baseline.nuisance[:, j]])
-        weighted = own * weights[:, j, None]
         columns = _functions(recording, sign, recording.tau - residual, j)
-        gram += weighted.T @ weighted
-        shown.append((columns, weighted.T @ (columns * weights[:, j, None])))
-    root = inverse_root(gram, FAINT**2)
-    for j, (columns, cross) in enumerate(shown):
-        made = root @ (root.T @ cross)
-        edge = baseline.regressor.shape[2]
-        columns -= baseline.regressor[:, j] @ made[:edge] + baseline.nuisance[:, j] @ made[edge:]
-    return tuple(columns for columns, _ in shown)
+        cross = baseline.columns[:, j].T @ (columns * weights[:, j, None] ** 2)
+        result.append(columns - baseline.columns[:, j] @ (root @ (root.T @ cross)))
+    return tuple(result)
 
 
 def _functions(recording: Recording, sign: Array, torque: Array, joint: int) -> Array:

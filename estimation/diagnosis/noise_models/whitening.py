@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from estimation.diagnosis.noise_models.frequency_bands import Band
 from estimation.diagnosis.noise_models.masked_rows import MaskedRows
 from estimation.linear_algebra.free_torque import FreeTorque, Real, span_of
+from estimation.regressions.moments import Moments
 from estimation.uncertainty.autoregressive import taps
 from robots.common.stretches import spans
 
@@ -176,6 +177,10 @@ class Whitening:
         root = np.linalg.cholesky(self.precision)  # P = L L'
         mixed = np.einsum("jk,nj...->nk...", root, self.all(series), optimize=True)
         return np.asarray(mixed.reshape(-1, *series.shape[2:]))
+
+    def moments(self, columns: Array, tau: Array) -> Moments:
+        """Sums the normal equations of columns (N, n, k) and torque (N, n), whitened also across joints."""
+        return Moments.of(self.independent(columns)[:, None], self.independent(tau)[:, None])
 
 
 def acting(columns: Array) -> NDArray[np.bool_]:

@@ -53,15 +53,6 @@ class Directions:
     reversal_acceleration_error: Array
     reversal_time_error: Array
 
-    def rows(self, kept: slice) -> Directions:
-        """Selects rows."""
-        return replace(
-            self,
-            sign_unknown=self.sign_unknown[kept],
-            sign_known_from_velocity=self.sign_known_from_velocity[kept],
-            reversal_time_error=self.reversal_time_error[kept],
-        )
-
     def spread(self, between: NDArray[np.intp]) -> Directions:
         """Marks rows whose torque is interpolated between two samples that enclose a reversal.
 

@@ -10,13 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 
-from estimation.diagnosis.recordings.constant_speed import remove_encoder_lines
-from estimation.diagnosis.recordings.directions import ALIKE, Directions, find_directions
-from estimation.diagnosis.recordings.harmonic_projection import project_on_harmonics
-from estimation.diagnosis.recordings.position_cutoff import select_position_cutoff
-from estimation.diagnosis.recordings.position_spectra import Spectra, Spectrum
-from estimation.diagnosis.recordings.recording import Recording
-from estimation.diagnosis.recordings.smoothed_motion import smooth_motion
+from estimation.diagnosis.recordings.directions import ALIKE, find_directions
+from estimation.diagnosis.recordings.position_spectra import Spectra, Spectrum, select_position_cutoff
+from estimation.diagnosis.recordings.recording import Recording, cut_recording, join_recordings
+from estimation.diagnosis.recordings.smoothed_motion import project_on_harmonics, remove_encoder_lines, smooth_motion
 from estimation.diagnosis.recordings.thinning import decimate_recording, keep_clipped_level, low_pass_rows
 from estimation.gate.measurements.resolution import lattice_step
 from estimation.preprocessing import Cycle
@@ -27,7 +24,6 @@ from robots.robot import Robot
 from robots.signals import Log
 
 Array = NDArray[np.float64]
-_Part = tuple[Array, Array, Array, Array, Array, Cycle | None, Array, Directions, Array, Array | None]
 
 # Rows beyond which logs are low-passed and decimated by an integer: more rows only cost time.
 MOST_ROWS = 20_000
@@ -96,73 +92,37 @@ def build_recording(
     highest = np.max([[spectrum.cutoff() for spectrum in own] for own in found], axis=0)
     cap = select_position_cutoff(robot, prepared, highest)
     parts = forked(lambda each: _part(each[0], step, cap, *each[1:]), zip(prepared, spectra, found, strict=True))
-    never = np.all([np.ptp(part[1], axis=0) == 0 for part in parts], axis=0)
-    parts = _zero_resting_joints(parts, still_joints([part[1] for part in parts], travel) | never)
-    lengths = [len(part[0]) for part in parts]
-    total = sum(lengths) * step
-    if total < shortest:
+    never = np.all([np.ptp(part.q, axis=0) == 0 for part in parts], axis=0)
+    held = still_joints([part.q for part in parts], travel) | never
+    joined = join_recordings([_zero_resting_joints(*each) for each in zip(parts, held, strict=True)])
+    if joined.duration < shortest:
         recorded = sum(log.log.duration for log in prepared)
         raise InputError(
-            f"{total:.1f} s of usable logs ({recorded:.1f} s recorded, less filter transients at the ends)",
+            f"{joined.duration:.1f} s of usable logs ({recorded:.1f} s recorded, less filter transients at the ends)",
             file=prepared[0].log.metadata.get("file", prepared[0].log.name or None) if len(prepared) == 1 else None,
             allowed=f"{shortest:g} s or more",
             remedy="record a longer log",
         )
-    joined = [np.concatenate([part[k] for part in parts]) for k in range(5)]
-    rests = [part[9] for part in parts if part[9] is not None]
-    return Recording(
-        t=joined[0],
-        starts=tuple(int(s) for s in np.cumsum([0, *lengths[:-1]])),
-        q=joined[1],
-        dq=joined[2],
-        ddq=joined[3],
-        tau=joined[4],
-        step=step,
-        cycles=tuple(part[5] for part in parts),
-        cutoff=min(float(part[6].min()) for part in parts),
-        floor=np.max([part[8] for part in parts], axis=0),
-        sign_unknown=np.concatenate([part[7].sign_unknown for part in parts]),
-        sign_known_from_velocity=np.concatenate([part[7].sign_known_from_velocity for part in parts]),
-        reversal_acceleration_error=np.max([part[7].reversal_acceleration_error for part in parts], axis=0),
-        reversal_time_error=np.concatenate([part[7].reversal_time_error for part in parts]),
-        position_residual=np.concatenate(rests) if len(rests) == len(parts) else None,
-        cutoffs=np.array([part[6] for part in parts]) if len(rests) == len(parts) else None,
-        names=tuple(log.log.name or f"log {i}" for i, log in enumerate(prepared, start=1)),
-        payloads=_payloads(prepared),
-        gravity_fields=_fields(prepared),
-    )
+    return replace(joined, names=tuple(log.log.name or f"log {i}" for i, log in enumerate(prepared, start=1)))
 
 
-def _zero_resting_joints(parts: Sequence[_Part], held: NDArray[np.bool_]) -> list[_Part]:
-    """Sets the motion of resting joints to zero in each log and marks their rows.
+def _zero_resting_joints(part: Recording, held: NDArray[np.bool_]) -> Recording:
+    """Sets the motion of resting joints (n,) of a log to zero and marks their rows.
 
-    Resting joints (logs, n) still move by a few encoder steps, against static friction. Derivatives of these steps are
-    accelerations that the other joints would seem to feel.
+    They still move by a few encoder steps, against static friction. Derivatives of these steps are accelerations that
+    the other joints would seem to feel.
     """
-    result = []
-    for part, stands in zip(parts, held, strict=True):
-        t, q, dq, ddq, tau, cycle, cutoffs, turns, floor, rest = part
-        dq, ddq, floor = (np.where(stands, 0.0, values) for values in (dq, ddq, floor))
-        still = replace(
-            turns,
-            sign_unknown=turns.sign_unknown | stands,
-            sign_known_from_velocity=turns.sign_known_from_velocity & ~stands,
-            reversal_acceleration_error=np.where(stands, 0.0, turns.reversal_acceleration_error),
-            reversal_time_error=np.where(stands, 0.0, turns.reversal_time_error),
-        )
-        result.append((t, q, dq, ddq, tau, cycle, cutoffs, still, floor, rest))
-    return result
-
-
-def _payloads(prepared: Sequence[Prepared]) -> tuple[Array, ...]:
-    if all(log.log.payload is None for log in prepared):
-        return ()
-    return tuple(np.zeros(10) if log.log.payload is None else np.array(log.log.payload) for log in prepared)
-
-
-def _fields(prepared: Sequence[Prepared]) -> tuple[Array | None, ...]:
-    gravities = tuple(log.log.gravity for log in prepared)
-    return () if all(gravity is None for gravity in gravities) else gravities
+    assert part.reversal_time_error is not None
+    return replace(
+        part,
+        dq=np.where(held, 0.0, part.dq),
+        ddq=np.where(held, 0.0, part.ddq),
+        floor=np.where(held, 0.0, part.floor),
+        sign_unknown=part.sign_unknown | held,
+        sign_known_from_velocity=part.sign_known_from_velocity & ~held,
+        reversal_acceleration_error=np.where(held, 0.0, part.reversal_acceleration_error),
+        reversal_time_error=np.where(held, 0.0, part.reversal_time_error),
+    )
 
 
 def _step(prepared: Sequence[Prepared]) -> float:
@@ -172,8 +132,8 @@ def _step(prepared: Sequence[Prepared]) -> float:
     return slowest * stride
 
 
-def _part(log: Prepared, step: float, cap: float, spectra: Spectra, found: Sequence[Spectrum]) -> _Part:
-    """Processes one log into its row arrays, cycle, cut-offs, directions and noise floors on the working grid.
+def _part(log: Prepared, step: float, cap: float, spectra: Spectra, found: Sequence[Spectrum]) -> Recording:
+    """Processes one log into a recording on the working grid.
 
     Positions above `cap` [Hz] are noise, whatever their power; `found` are the spectra of the positions.
     """
@@ -220,10 +180,28 @@ def _part(log: Prepared, step: float, cap: float, spectra: Spectra, found: Seque
     besides = positions[first : first + count] - q[first : first + count] if sampled else None
     turns = find_directions(states[1], states[2], cutoffs, floor, np.maximum(ends, floor), step, besides)
     turns = turns.spread(_between(log.log.t, t, period))
-    cut = slice(None) if moved is not None else _trim_ends(states[1], step)
-    q, dq, ddq = (array[cut] for array in states)
-    rests = None if besides is None else besides[cut]
-    return t[cut], q, dq, ddq, tau[cut], moved, cutoffs, turns.rows(cut), floor, rests
+    recording = Recording(
+        t=t,
+        starts=(0,),
+        q=states[0],
+        dq=states[1],
+        ddq=states[2],
+        tau=tau,
+        step=step,
+        cycles=(moved,),
+        cutoff=float(cutoffs.min()),
+        floor=floor,
+        sign_unknown=turns.sign_unknown,
+        sign_known_from_velocity=turns.sign_known_from_velocity,
+        reversal_acceleration_error=turns.reversal_acceleration_error,
+        names=(log.log.name,),
+        reversal_time_error=turns.reversal_time_error,
+        position_residual=besides,
+        cutoffs=None if besides is None else cutoffs[None],
+        payloads=() if log.log.payload is None else (np.array(log.log.payload),),
+        gravity_fields=() if log.log.gravity is None else (log.log.gravity,),
+    )
+    return recording if moved is not None else cut_recording(recording, _trim_ends(states[1], step))
 
 
 def _between(own: Array, t: Array, period: float) -> NDArray[np.intp]:
@@ -259,9 +237,6 @@ def _trim_ends(dq: Array, step: float) -> slice:
     speed = np.sqrt(np.mean(dq**2, axis=0))
     active = np.flatnonzero((np.abs(dq) > SETTLED * np.maximum(speed, 1e-9)).any(axis=1))
     if not len(active):
-        return slice(None)
+        return slice(0, len(dq))
     most = int(min(ENDS / step, 0.05 * len(dq)))
     return slice(min(int(active[0]), most), max(int(active[-1]) + 1, len(dq) - most))
-
-
-__all__ = ["Recording", "build_recording"]

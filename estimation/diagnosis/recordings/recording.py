@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,6 +16,19 @@ from estimation.preprocessing import Cycle
 from robots.common.stretches import spans
 
 Array = NDArray[np.float64]
+
+PER_ROW = (
+    "t",
+    "q",
+    "dq",
+    "ddq",
+    "tau",
+    "sign_unknown",
+    "sign_known_from_velocity",
+    "reversal_time_error",
+    "position_residual",
+)
+"""Fields of a recording with one value per row; the last two may be missing."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -166,19 +181,12 @@ def cut_recording(whole: Recording, rows: slice) -> Recording:
     begins = (0, *(start - rows.start for start in whole.starts if rows.start < start < rows.stop))
     first = sum(start <= rows.start for start in whole.starts) - 1
     logs = slice(first, first + len(begins))
+    own: dict[str, Any] = {name: None if (of := getattr(whole, name)) is None else of[rows] for name in PER_ROW}
     return replace(
         whole,
-        t=whole.t[rows],
+        **own,
         starts=begins,
-        q=whole.q[rows],
-        dq=whole.dq[rows],
-        ddq=whole.ddq[rows],
-        tau=whole.tau[rows],
-        sign_unknown=whole.sign_unknown[rows],
-        sign_known_from_velocity=whole.sign_known_from_velocity[rows],
-        reversal_time_error=None if whole.reversal_time_error is None else whole.reversal_time_error[rows],
-        position_residual=None,
-        cutoffs=None,
+        cutoffs=None if whole.cutoffs is None else whole.cutoffs[logs],
         full_rate=None if whole.full_rate is None else cut_recording(whole.full_rate, _at_all_samples(whole, rows)),
         cycles=(None,) * len(begins),
         names=whole.names[logs],
@@ -196,35 +204,29 @@ def _at_all_samples(thinned: Recording, rows: slice) -> slice:
     return slice(int(first), int(last) + 1)
 
 
-def join_recordings(first: Recording, second: Recording) -> Recording:
-    """Joins two recordings of the same sample period and clock, the first before the second."""
-    starts = (*first.starts, *(len(first) + start for start in second.starts))
+def join_recordings(parts: Sequence[Recording]) -> Recording:
+    """Joins recordings of the same sample period and clock, in the order of time."""
 
-    def both(name: str) -> Array:
-        return np.concatenate([getattr(first, name), getattr(second, name)])
+    def joined(name: str) -> Any:
+        values = [getattr(part, name) for part in parts]
+        return None if any(value is None for value in values) else np.concatenate(values)
 
+    before = np.cumsum([0, *(len(part) for part in parts)])
+    finer = [part.full_rate for part in parts if part.full_rate is not None]
     return replace(
-        first,
-        t=both("t"),
-        q=both("q"),
-        dq=both("dq"),
-        ddq=both("ddq"),
-        tau=both("tau"),
-        sign_unknown=both("sign_unknown").astype(bool),
-        sign_known_from_velocity=both("sign_known_from_velocity").astype(bool),
-        reversal_time_error=None
-        if first.reversal_time_error is None or second.reversal_time_error is None
-        else both("reversal_time_error"),
-        position_residual=None,
-        cutoffs=None,
-        full_rate=None
-        if first.full_rate is None or second.full_rate is None
-        else join_recordings(first.full_rate, second.full_rate),
-        starts=starts,
-        cycles=(*first.cycles, *second.cycles),
-        names=(*first.names, *second.names),
-        payloads=(*first.bodies, *second.bodies) if first.payloads or second.payloads else (),
-        gravity_fields=(*first.gravities, *second.gravities) if first.gravity_fields or second.gravity_fields else (),
+        parts[0],
+        **{name: joined(name) for name in (*PER_ROW, "cutoffs")},
+        starts=tuple(int(rows + start) for rows, part in zip(before, parts, strict=False) for start in part.starts),
+        cutoff=min(part.cutoff for part in parts),
+        floor=np.max([part.floor for part in parts], axis=0),
+        reversal_acceleration_error=np.max([part.reversal_acceleration_error for part in parts], axis=0),
+        full_rate=join_recordings(finer) if len(finer) == len(parts) else None,
+        cycles=tuple(cycle for part in parts for cycle in part.cycles),
+        names=tuple(name for part in parts for name in part.names),
+        payloads=tuple(b for part in parts for b in part.bodies) if any(part.payloads for part in parts) else (),
+        gravity_fields=tuple(g for part in parts for g in part.gravities)
+        if any(part.gravity_fields for part in parts)
+        else (),
     )
 
 

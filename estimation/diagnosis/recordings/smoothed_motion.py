@@ -1,4 +1,4 @@
-"""Zero-phase low-pass of positions, and their derivatives."""
+"""Motion from positions: zero-phase low-pass, projection on harmonics, and derivatives without encoder lines."""
 
 from __future__ import annotations
 
@@ -6,13 +6,15 @@ from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.interpolate import BSpline
+from scipy.interpolate import BSpline, CubicSpline
 from scipy.linalg import cho_solve_banded, cholesky_banded
 from scipy.signal import sosfiltfilt
 from scipy.sparse import csr_array, diags_array
 from scipy.special import binom
 
+from estimation.preprocessing import Cycle
 from estimation.preprocessing.smoothing import butterworth, differentiate
+from robots.common.stretches import spans
 
 Array = NDArray[np.float64]
 
@@ -101,3 +103,107 @@ def _step(x: Array) -> Array:
     """Rises from 0 to 1 over the unit interval, with two continuous derivatives."""
     x = np.clip(x, 0.0, 1.0)
     return x**3 * (10 - 15 * x + 6 * x**2)
+
+
+# Power over its error from which a harmonic is significant.
+STANDS_OUT = 4.0
+
+
+def project_on_harmonics(q: Array, step: float, cycle: Cycle) -> tuple[tuple[Array, Array, Array], Array, Array]:
+    """Projects the periodic rows on the harmonics that exceed the variation between periods.
+
+    Args:
+        q: positions (N, n) on the grid [rad or m].
+        step: sample period of the grid [s].
+        cycle: the rows that repeat.
+
+    Returns:
+        q, dq and ddq (stop - start, n) in the rows of the cycle, with noise removed; the highest frequency kept (n,)
+        [Hz]; the power density of the noise that remains in the mean over repetitions (n,) [rad^2/Hz or m^2/Hz].
+    """
+    rows = np.arange(cycle.start, cycle.stop)
+    times = (rows - cycle.start) * step
+    samples = max(8, round(cycle.period / step))
+    grid = cycle.period / samples * np.arange(samples * cycle.count)
+    grid = grid[grid <= times[-1] + 0.5 * step]
+    part = CubicSpline(times, q[rows])(grid)
+    whole = len(part) // samples
+    passes = np.fft.rfft(part[: whole * samples].reshape(whole, samples, -1), axis=1) / samples
+    mean = passes.mean(axis=0)  # (H, n)
+    scatter = (np.abs(passes - mean) ** 2).sum(axis=0) / max(whole - 1, 1) / whole
+    # Average over neighbouring harmonics: few periods determine the noise of a single one poorly.
+    scatter = _averaged(scatter)
+    # An encoder rounds each pass alike, so that its errors repeat. The upper end of the band contains no motion and
+    # shows them.
+    top = slice(-max(4, len(mean) // 4), None)
+    scatter = np.maximum(scatter, np.median(np.abs(mean[top]) ** 2, axis=0))
+    kept = mean * np.clip(1.0 - scatter / np.maximum(np.abs(mean) ** 2, 1e-300), 0.0, 1.0)
+    lost = _first_lost(np.abs(mean) ** 2 > STANDS_OUT * scatter)
+    kept[lost[None, :] <= np.arange(len(kept))[:, None]] = 0.0
+    kept[0] = mean[0]
+    omega = 2 * np.pi / cycle.period * np.arange(len(kept))[:, None]
+    signals = [np.fft.irfft(kept * factor * samples, samples, axis=0) for factor in (1.0, 1j * omega, -(omega**2))]
+    knots = cycle.period / samples * np.arange(samples + 1)
+    phase = np.mod(times, cycle.period)
+    closed = [CubicSpline(knots, np.vstack([s, s[:1]]), bc_type="periodic")(phase) for s in signals]
+    return (closed[0], closed[1], closed[2]), lost / cycle.period, 2 * cycle.period * np.median(scatter[top], axis=0)
+
+
+def _averaged(power: Array, width: int = 15) -> Array:
+    padded = np.pad(power, ((width // 2, width // 2), (0, 0)), mode="edge")
+    sums = np.cumsum(np.vstack([np.zeros((1, power.shape[1])), padded]), axis=0)
+    return (sums[width:] - sums[:-width]) / width
+
+
+def _first_lost(stands_out: NDArray[np.bool_], allowed: int = 3) -> NDArray[np.intp]:
+    """Returns per joint (n,) the harmonic from which on more than `allowed` in a row are not significant."""
+    count, joints = stands_out.shape
+    result = np.full(joints, count)
+    for j in range(joints):
+        silent = 0
+        for h in range(1, count):
+            silent = 0 if stands_out[h, j] else silent + 1
+            if silent > allowed:
+                result[j] = h - allowed
+                break
+    return result
+
+
+CRUISE = 0.4
+"""Time [s] before and after a row for which the speed must be constant."""
+
+STRAIGHT = 1.5
+"""Second difference of the position over `CRUISE` [encoder steps] up to which the speed counts as constant."""
+
+
+def remove_encoder_lines(q: Array, dq: Array, ddq: Array, counts: Array, step: float) -> tuple[Array, Array]:
+    """Removes the spectral lines of encoder steps from velocities and accelerations (N, n) at constant speed.
+
+    At constant speed, encoder steps alias to a few fixed frequencies. A spectrum cannot separate these lines from
+    motion. Times the inertia of a heavy arm they are a large torque. Where the second difference of the position over
+    `CRUISE` is at most `STRAIGHT` encoder steps, derivatives are therefore replaced by differences over `CRUISE`. These
+    neglect less motion than one encoder step.
+
+    Args:
+        q: positions (N, n) [rad or m] of one log.
+        dq: velocities (N, n) [rad/s or m/s].
+        ddq: accelerations (N, n) [rad/s2 or m/s2].
+        counts: encoder step of each joint (n,) [rad or m]; zero if it shows none.
+        step: sample period [s].
+
+    Returns:
+        Velocities and accelerations (N, n).
+    """
+    lag = round(CRUISE / step)
+    dq, ddq = dq.copy(), ddq.copy()
+    if len(q) <= 2 * lag:
+        return dq, ddq
+    for j in np.flatnonzero(counts > 0):
+        ahead, here, behind = q[2 * lag :, j], q[lag:-lag, j], q[: -2 * lag, j]
+        bend = ahead - 2 * here + behind
+        for start, stop in spans(np.abs(bend) <= STRAIGHT * counts[j]):
+            if stop - start > lag // 4:  # shorter stretches are zero crossings of the acceleration
+                rows = slice(start + lag, stop + lag)
+                dq[rows, j] = (ahead - behind)[start:stop] / (2 * lag * step)
+                ddq[rows, j] = bend[start:stop] / (lag * step) ** 2
+    return dq, ddq

@@ -12,11 +12,17 @@ from numpy.typing import NDArray
 from estimation.diagnosis.experiment_plans.detection_limits import Limit, summarise_limits
 from estimation.diagnosis.experiment_plans.next_experiment import NextExperiment
 from estimation.diagnosis.findings import Finding, list_parameters
-from estimation.diagnosis.results.actions import action_for, close_causes, sentence_for
+from estimation.diagnosis.results.actions import (
+    action_for,
+    close_causes,
+    close_rivals,
+    format_p_value,
+    sentence_for,
+    state_verdict,
+)
 from estimation.diagnosis.results.standing import standing_of, standing_text, standing_verdict
-from estimation.diagnosis.results.verdict_text import close_rivals, format_p_value, state_verdict
 from estimation.diagnosis.simulations.simulation_result import Simulation
-from estimation.diagnosis.validations.prediction_settings import all_row_errors
+from estimation.diagnosis.validations.extended_model import all_row_errors
 from estimation.models.model import Model, load_model
 from robots.common.records import Finding as Remark
 from robots.common.records import Result, axes_for, effect_code, findings_of, read, read_json

@@ -15,8 +15,7 @@ from estimation.diagnosis.calibration import (
     MIN_SPEED_RATIO,
     MIN_WORSE_RATIO,
 )
-from estimation.diagnosis.experiment_plans.detection_limits import STILL
-from estimation.diagnosis.experiment_plans.undetectable_springs import undetectable_springs
+from estimation.diagnosis.experiment_plans.detection_limits import STILL, undetectable_springs
 from estimation.diagnosis.findings import Finding
 from estimation.diagnosis.hypothesis_tests.fitted_effects import FittedEffect
 from estimation.diagnosis.hypothesis_tests.problem import Problem

@@ -26,15 +26,13 @@ from estimation.diagnosis.results.notes import (
 from estimation.diagnosis.results.wording import no_part, word_finding
 from estimation.diagnosis.searches.search import Search
 from estimation.diagnosis.searches.selection import SelectedEffect
-from estimation.diagnosis.simulations.held_out_simulation import simulate_held_out
-from estimation.diagnosis.validations.decision import Decision, Reason
-from estimation.diagnosis.validations.extended_model import ExtendedModel
+from estimation.diagnosis.simulations.forward_simulation import simulate_held_out
+from estimation.diagnosis.validations.extended_model import ExtendedModel, all_row_errors
 from estimation.diagnosis.validations.gain_intervals import HeldOutErrors
 from estimation.diagnosis.validations.gear_compliance import MeasuredCompliance
 from estimation.diagnosis.validations.name_comparison import ComparedNames
-from estimation.diagnosis.validations.prediction_settings import all_row_errors
 from estimation.diagnosis.validations.residual_shares import residual_shares
-from estimation.diagnosis.validations.validated_findings import ValidatedFindings
+from estimation.diagnosis.validations.validated_findings import Decision, Reason, ValidatedFindings
 from robots.robot import Robot
 
 Array = NDArray[np.float64]

@@ -209,8 +209,9 @@ def impulse_columns(
     N, step = len(recording), recording.step
     columns = [np.zeros((N, tables[0].values.shape[2])) for _ in range(3)]
     away, nearest = np.full(N, np.inf), np.zeros(N, dtype=np.intp)
+    runs = recording.runs
     for r, (moment, way, k, inertia) in enumerate(zip(at, turns.way, turns.run, turns.inertia, strict=True)):
-        table, rows = tables[k], recording.runs[k]
+        table, rows = tables[k], runs[k]
         reach = table.x[-1] / step
         start = max(rows.start, int(np.ceil(moment - reach)))
         stop = min(rows.stop, int(moment + reach) + 1, start + table.most)
@@ -234,6 +235,8 @@ def shift_reversals(recording: Recording, turns: Reversals, at: Array, dq: Array
     for way in (-1.0, 1.0):
         same, chosen = own[np.sign(rate) == way], turns.way == way
         if len(same) and chosen.any():
-            found = same[np.abs(same[None, :] - at[chosen, None]).argmin(axis=1)]
+            after = np.clip(np.searchsorted(same, at[chosen]), 1, max(len(same) - 1, 1))
+            beside = same[np.stack([after - 1, np.minimum(after, len(same) - 1)])]
+            found = np.take_along_axis(beside, np.abs(beside - at[chosen]).argmin(axis=0)[None], axis=0)[0]
             result[chosen] = np.where(np.abs(found - at[chosen]) * recording.step < MOVES, found, at[chosen])
     return result

@@ -1,23 +1,21 @@
-"""Acceptance of effects: BIC gain, beyond what errors of other effects' formulas or noise shocks can explain."""
+"""Acceptance of effects: BIC gain, beyond what formula errors of other effects or one shock of the noise explain."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.ndimage import maximum_filter1d
+from scipy.signal import correlate
 
-from estimation.diagnosis.calibration import IMPACT_SHARE, MIN_BIC_GAIN
+from estimation.diagnosis.calibration import MAX_GLITCH_SHARE, MIN_BIC_GAIN, SHOCK_COUNT
 from estimation.diagnosis.hypothesis_tests.fitted_effects import FittedEffect
-from estimation.diagnosis.hypothesis_tests.joint_agreement import per_joint_evidence, shared_coefficient_gain
-from estimation.diagnosis.hypothesis_tests.problem import Problem
+from estimation.diagnosis.hypothesis_tests.joint_agreement import per_joint_evidence
+from estimation.diagnosis.hypothesis_tests.problem import Group, Problem
 from estimation.diagnosis.hypothesis_tests.scoring import Accepted, accept, score
-from estimation.diagnosis.hypothesis_tests.shocks import gain_beside_shock
-from robots.terms.effect_bases.capabilities import AtReversals
 
-# Time [s] before and after an impact of another effect in which the drives respond to it; share of the rows from which
-# such times no longer count as impacts; share of a delay that the other rows must show.
-ANSWERS, MOSTLY, ASIDE = 0.2, 0.8, 0.5
 # p-value over the false-alarm threshold below which an effect is certain, on joints without other effects.
 SURE = 0.2
 
@@ -110,52 +108,8 @@ def exceeds_leakage(problem: Problem, candidate: FittedEffect, members: Sequence
     return not members or candidate.bic_gain - lost > MIN_BIC_GAIN
 
 
-def delay_supported_away_from_impacts(
-    problem: Problem, candidate: FittedEffect, members: Sequence[FittedEffect]
-) -> bool:
-    """Whether a shared delay is also significant away from impacts of an acceleration-driven effect.
-
-    After backlash the link hits the other tooth flank and pushes the motor back. The base model takes the logged
-    position for that of motor and link. The torque, which responds to the impact, then seems to be ahead of the motion
-    on all joints that the impact reaches.
-
-    Args:
-        problem: whitened data.
-        candidate: effect; any other than a shared delay passes.
-        members: other effects in the model.
-    """
-    kicks = [member for member in members if member.hypothesis.effect.at_reversals is AtReversals.IMPACT]
-    if not kicks or not candidate.hypothesis.effect.delays_all_torque:
-        return True
-    reach = round(ANSWERS / (problem.recording.step * problem.whitening.stride))
-    beside = np.zeros(problem.rows, dtype=bool)
-    for member in kicks:
-        near = maximum_filter1d(member.acts(IMPACT_SHARE), 2 * reach + 1)
-        beside |= near & (near.mean() < MOSTLY)
-    if not beside.any():
-        return True
-    accepted = accept(problem, tuple(m.group for m in members))
-    per_joint = []
-    for j, X in zip(*problem.columns_of(candidate.hypothesis, candidate.shape), strict=True):
-        group = problem.group((j,), (X,), effect=candidate.hypothesis.effect)
-        parts = score(problem, problem.split(group, np.ones(1), beside), accepted)
-        if parts.gram[0, 0] > 0:
-            # Eliminates the coefficient in the rows near impacts.
-            onto = parts.gram[1, 0] / parts.gram[0, 0]
-            per_joint.append((parts.gram[1, 1] - onto * parts.gram[0, 1], parts.cross[1] - onto * parts.cross[0]))
-    gram, cross = np.array([each for each in per_joint if each[0] > 0]).reshape(-1, 2).T
-    if not len(gram):
-        return False
-    whole = float(candidate.coefficients[0])
-    share = float(cross.sum() / gram.sum()) / whole if whole else 0.0
-    paid = candidate.degrees * float(np.log(problem.rows * len(gram)))
-    return share > ASIDE and shared_coefficient_gain(gram, cross) - paid > MIN_BIC_GAIN
-
-
 def _joints_agree(problem: Problem, candidate: FittedEffect, members: Sequence[FittedEffect]) -> bool:
     """Whether the joints on which no other effect explains more determine a common coefficient."""
-    if not delay_supported_away_from_impacts(problem, candidate, members):
-        return False
     beside = accept(problem, tuple(m.group for m in members))
     evidence = per_joint_evidence(problem, candidate.hypothesis, candidate.shape, beside)
     others = [
@@ -170,3 +124,95 @@ def _joints_agree(problem: Problem, candidate: FittedEffect, members: Sequence[F
     return (
         evidence.gain(surely=True) - candidate.degrees * float(np.log(problem.rows * len(evidence.gram))) > MIN_BIC_GAIN
     )
+
+
+Array = NDArray[np.float64]
+
+# Number of positions between two white rows at which a shock is searched.
+BETWEEN = 9
+# The largest shocks elsewhere give the tail of the noise: this share of all, with a least and a largest number.
+TAIL, FEWEST, MOST = 0.02, 5, 20
+
+
+def gain_beside_shock(problem: Problem, member: FittedEffect, accepted: Accepted) -> FittedEffect:
+    """Refits an effect beside the accepted groups and one noise shock, if the noise may contain such a shock.
+
+    A single outlier of the innovations (innovational outlier, Fox 1972) makes a bump that decays like the noise, and a
+    bump of white rows after the low-pass. With heavy tails, one of many thousands is as large as a contact.
+
+    If the tail makes shocks of this size likely, one shock on each joint is fitted beside the effect. Otherwise one on
+    a single joint is fitted, and counts only if it explains nearly all of the effect.
+
+    Args:
+        problem: data and base model.
+        member: the effect.
+        accepted: groups already in the model.
+
+    Returns:
+        The effect with its gain beside the shock, or unchanged.
+    """
+    joints, stride = member.group.joints, problem.whitening.stride
+    acts = member.acts()
+    left = problem.white - accepted.torque(problem.white)
+    offsets = np.linspace(-0.5, 0.5, BETWEEN) * stride
+    sizes = np.array([_sizes(problem, left, joints, float(offset)) for offset in offsets])  # (offsets, N, joints)
+    within = np.where(acts, (sizes**2).sum(axis=2), -np.inf)
+    best, place = (int(k) for k in np.unravel_index(int(np.argmax(within)), within.shape))
+    reach = max(len(_bump(problem, j, 0.0)) for j in joints)
+    elsewhere = np.where(maximum_filter1d(acts, reach)[:, None], 0.0, sizes[BETWEEN // 2])
+    offset, largest = float(offsets[best]), int(np.argmax(sizes[best, place]))
+    likely = _chance(problem, elsewhere, joints, float(sizes[best, place].max())) >= SHOCK_COUNT
+    struck = joints if likely else joints[largest : largest + 1]
+    beside = accept(problem, (*accepted.groups, _shock(problem, struck, place, offset)))
+    gain = score(problem, member.group, beside).limited(member.hypothesis, problem.situation.robot, member.shape).gain
+    return replace(member, gain=gain) if likely or gain < MAX_GLITCH_SHARE * member.gain else member
+
+
+def _bump(problem: Problem, joint: int, offset: float) -> Array:
+    """Returns the white rows of a unit shock, `offset` recording rows after the middle white row."""
+    band, stride = problem.whitening.bands[joint], problem.whitening.stride
+    if not len(band.taps):
+        return np.ones(1)
+    half = len(band.taps) // 2
+    reach = half // stride + 1
+    rows = stride * np.arange(-reach, reach + 1) - offset
+    bump = np.interp(rows, np.arange(-half, half + 1), band.taps, 0.0, 0.0)
+    return np.asarray(bump / np.linalg.norm(bump))
+
+
+def _sizes(problem: Problem, left: Array, joints: tuple[int, ...], offset: float) -> Array:
+    """Returns the best-fitting size of a shock (N, joints) at `offset` recording rows after each white row."""
+    weights = problem.whitening.weights
+    # Outliers have a smaller weight; the shock's full size is needed here.
+    whole = left if weights is None else left / np.maximum(weights, 1e-3)
+    columns = [correlate(whole[:, j], _bump(problem, j, offset), mode="same", method="direct") for j in joints]
+    return np.abs(np.column_stack(columns))
+
+
+def _chance(problem: Problem, sizes: Array, joints: tuple[int, ...], size: float) -> float:
+    """Returns the expected number of noise shocks as large as `size`, by the tail of the others (Hill 1975)."""
+    step = problem.recording.step * problem.whitening.stride
+    peaks = []
+    for k, j in enumerate(joints):
+        width = max(1, round(1.0 / (problem.whitening.bands[j].cutoff * step)))
+        whole = len(sizes) // width * width
+        peaks.append(sizes[:whole, k].reshape(-1, width).max(axis=1))
+    falling = np.sort(np.concatenate(peaks))[::-1]
+    count = int(np.clip(TAIL * len(falling), FEWEST, MOST))
+    if len(falling) <= count or falling[count] <= 0:
+        return np.inf
+    steepness = 1.0 / max(float(np.mean(np.log(falling[:count] / falling[count]))), 1e-6)
+    return float(count * (falling[count] / max(size, falling[count])) ** steepness)
+
+
+def _shock(problem: Problem, joints: tuple[int, ...], place: int, offset: float) -> Group:
+    """Builds the group of a shock at `offset` recording rows after a white row, with one size per joint."""
+    columns = []
+    for k, j in enumerate(joints):
+        bump = _bump(problem, j, offset)
+        white = np.zeros((problem.rows, len(joints)))
+        first = place - len(bump) // 2
+        within = slice(max(first, 0), min(first + len(bump), problem.rows))
+        white[within, k] = bump[within.start - first : within.stop - first]
+        columns.append(problem.whitening.counted(white, j))
+    return problem.white_group(joints, columns)

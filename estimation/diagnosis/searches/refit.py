@@ -11,13 +11,12 @@ from numpy.typing import NDArray
 from estimation.diagnosis.hypothesis_tests.fitted_effects import FittedEffect
 from estimation.diagnosis.hypothesis_tests.problem import Problem
 from estimation.diagnosis.hypothesis_tests.refinement import refine_member
-from estimation.diagnosis.joint_fits.extended_fit import dense
 from estimation.diagnosis.joint_fits.gear_load import NO_GEAR_LOAD, GearLoadFit, find_gear_load
 from estimation.diagnosis.joint_fits.sensor_nonlinearity import fit_sensor_nonlinearity
 from estimation.diagnosis.joint_fits.total_torque import fit_clipped_torque, fit_jointly, total_torque_from_unclipped
 from estimation.diagnosis.noise_models.noise_nuisance_basis import is_short
 from estimation.diagnosis.noise_models.whitening import Whitening
-from estimation.diagnosis.recordings.log_reading import Recording
+from estimation.diagnosis.recordings.recording import Recording
 from estimation.diagnosis.recordings.thinning import shift_motion
 from robots.terms.effect_bases.capabilities import AtReversals
 from robots.terms.effect_bases.gear_load import with_gear_load
@@ -157,7 +156,7 @@ def base_torque_changed(problem: Problem, values: Array, members: Sequence[Fitte
     state = problem.baseline.situation(problem.recording, values[: base.size])
     now = replace(problem, situation=with_gear_load(state, problem.extra_load))
     for member in members:
-        before, after = (dense(p, member.hypothesis, member.shape) @ member.coefficients for p in (problem, now))
+        before, after = (member.torque(p) for p in (problem, now))
         if np.sum((after - before) ** 2) > MIN_EFFECT_CHANGE**2 * np.sum(before**2):
             return True
     return False
@@ -169,5 +168,5 @@ def _unusable_rows(problem: Problem, member: FittedEffect) -> NDArray[np.bool_] 
     flags = hypothesis.effect.gate(problem.situation, hypothesis.joint, problem.recording.tau)
     if flags is None:
         return None
-    lost = np.abs(dense(problem, hypothesis, member.shape)).max(axis=2)
+    lost = np.abs(problem.dense(hypothesis, member.shape)).max(axis=2)
     return np.asarray(flags | (lost > CUT * lost.max()))

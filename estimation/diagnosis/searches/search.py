@@ -2,24 +2,24 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 
-from estimation.diagnosis.base_models.baseline import Baseline, build_baseline, inertia_matrix
-from estimation.diagnosis.base_models.priors import base_model_prior, solve_least_squares, solve_map
+from estimation.diagnosis.base_models.baseline import Baseline, base_model_prior, build_baseline, inertia_matrix
 from estimation.diagnosis.calibration import MAX_HIGH_BAND_ERROR
+from estimation.diagnosis.hypothesis_tests.fitted_effects import FittedEffect
 from estimation.diagnosis.hypothesis_tests.hypotheses import Hypothesis, all_hypotheses
-from estimation.diagnosis.hypothesis_tests.problem import Problem
-from estimation.diagnosis.hypothesis_tests.problem_setup import build_problem, normal_equations
+from estimation.diagnosis.hypothesis_tests.problem import Problem, build_problem
 from estimation.diagnosis.hypothesis_tests.scan import Entry, measure
 from estimation.diagnosis.joint_fits.total_torque import with_total_torque
 from estimation.diagnosis.noise_models.high_frequency_band import build_high_band
 from estimation.diagnosis.noise_models.noise_estimate import estimate_whitening, quiet_joints
 from estimation.diagnosis.noise_models.noise_nuisance_basis import build_nuisance_projection, is_short
-from estimation.diagnosis.recordings.log_reading import Recording
-from estimation.diagnosis.reversals.reversal_timing import measure_reversal_timing
+from estimation.diagnosis.recordings.recording import Recording
+from estimation.diagnosis.reversals.reversal_timing import ReversalTiming, measure_reversal_timing
 from estimation.diagnosis.searches.refit import RefitResult, base_torque_changed, noise_decreased, refit
 from estimation.diagnosis.searches.selection import Selection, select, with_rivals
 from estimation.regressions.parameter_priors import inflate_conflicting_prior
@@ -74,9 +74,9 @@ def search(
         The last search, with the rivals of each selected effect.
     """
     hypotheses = all_hypotheses(base.model.robot, effects)
-    recording = _trust_reversal_rows(base, recording)
-    baseline, settled = fit_plain(base, recording)
+    recording, baseline, settled, timing = _with_reversal_rows(base, recording)
     last: Search | None = None
+    members: list[FittedEffect] = []
     blurred = False
     known: dict[Hypothesis, tuple[float, ...]] = {}
     for attempt in range(SEARCHES):
@@ -86,7 +86,6 @@ def search(
         spared = build_nuisance_projection(recording, baseline, settled.residual)
         whitening = estimate_whitening(recording, settled.residual, fitted, inertia, spared=spared)
         if last is not None:
-            members = [found.effect for found in last.selection.found]
             anew = settled.gear_load.improves_fit or noise_decreased(last.problem, whitening)
             if not (anew or base_torque_changed(last.problem, settled.values, members)):
                 break
@@ -108,41 +107,49 @@ def search(
             # A base model fitted beside effects may leave a very different residual than the base model alone.
             upper = build_high_band(recording, baseline, posed.base_residual, settled.residual, whitening.bands, wide)
             posed = replace(posed, high_band=upper)
-        timing = measure_reversal_timing(recording, baseline, settled.values, *settled.without_delay())
+        if attempt:
+            timing = measure_reversal_timing(recording, baseline, settled.values, *settled.without_delay())
         if timing is not None:
             posed = replace(posed, timing=timing.beside(recording))
         give_back()
-        last = _searched(
-            posed,
-            hypotheses,
-            false_alarm,
-            bar,
-            share,
-            known,
-        )
-        if not last.selection.found or attempt == SEARCHES - 1:
+        entries = measure(posed, hypotheses, lambda done, at=share: bar.update(at + 0.2 * done, "scan"))  # type: ignore[misc]
+        give_back()
+        advance = partial(bar.update, share + 0.25)
+        problem, selection = select(posed, entries, false_alarm=false_alarm, advance=advance, known=known)
+        members = [found.effect for found in selection.found]
+        last = Search(problem, with_total_torque(problem, members, hypotheses), entries, selection)
+        del entries, problem, selection
+        if not members or attempt == SEARCHES - 1:
             break
-        known = {found.effect.hypothesis: found.effect.shape for found in last.selection.found}
-        settled = refit(last.problem, [found.effect for found in last.selection.found])
+        known = {member.hypothesis: member.shape for member in members}
+        settled = refit(last.problem, members)
         # Such an effect, for example a delay, increased the estimated width of the friction sign.
-        blurred = any(found.effect.hypothesis.effect.at_reversals is AtReversals.LATE for found in last.selection.found)
+        blurred = any(member.hypothesis.effect.at_reversals is AtReversals.LATE for member in members)
     assert last is not None
     with_alternatives = with_rivals(last.searched_problem, last.entries, last.selection)
     return replace(last, selection=with_alternatives)
 
 
-def _trust_reversal_rows(base: BaseParameters, recording: Recording) -> Recording:
-    """Includes rows at reversals of joints whose acceleration errors are small, as checked with the base model."""
-    if not recording.sign_known_from_velocity.any():
-        return recording
+def _with_reversal_rows(
+    base: BaseParameters, recording: Recording
+) -> tuple[Recording, Baseline, RefitResult, ReversalTiming | None]:
+    """Includes rows at reversals of joints whose acceleration errors are small, as checked with the base model.
+
+    Returns:
+        The recording, the base model and its fit on it, and the timing of the torque at reversals.
+    """
     baseline, settled = fit_plain(base, recording)
-    inertia = inertia_matrix(baseline, recording, settled.values)
-    trusted = quiet_joints(recording, settled.residual, inertia)
     timing = measure_reversal_timing(recording, baseline, settled.values, settled.residual)
+    if not recording.sign_known_from_velocity.any():
+        return recording, baseline, settled, timing
+    trusted = quiet_joints(recording, settled.residual, inertia_matrix(baseline, recording, settled.values))
     if timing is not None and recording.reversal_time_error is not None:
         # Impulses in the torque may show a larger velocity error than the positions alone.
         trusted &= timing.kicks <= np.max(recording.reversal_time_error * np.abs(recording.ddq), axis=0)
-    return recording.with_trusted(trusted)
+    more = recording.with_trusted(trusted)
+    if not more.counted_rows.any():
+        return more, baseline, settled, timing
+    return more, *fit_plain(base, more), timing
 
 
 def fit_plain(base: BaseParameters, recording: Recording) -> tuple[Baseline, RefitResult]:
@@ -161,14 +168,12 @@ def fit_plain(base: BaseParameters, recording: Recording) -> tuple[Baseline, Ref
     """
     baseline, tau = build_baseline(base, recording), recording.tau
     counts, size = ~recording.sign_unknown, tau.std(axis=0) + 1e-12
-    pull, (grams, crosses) = (
-        base_model_prior(baseline, recording),
-        normal_equations(baseline, counts.astype(float), tau),
-    )
+    pull, moments = base_model_prior(baseline, recording), baseline.moments(counts.astype(float), tau)
     scale = size
     for _ in range(ROUNDS):
-        gram, cross = np.tensordot(scale**-2.0, grams, 1), scale**-2.0 @ crosses
-        values = solve_map(gram, cross, inflate_conflicting_prior(pull, gram, cross))[: baseline.base.size]
+        weighted = moments.joined(scale**-2.0)
+        prior = inflate_conflicting_prior(pull, weighted.gram[0], weighted.cross[0])
+        values = weighted.pulled(prior).posterior()[: baseline.base.size]
         left = tau - baseline.regressor @ values
         noise = np.sqrt((left**2 * counts).sum(axis=0) / np.maximum(counts.sum(axis=0), 1))
         before, scale = scale, np.clip(noise, QUIETEST * size, scale)
@@ -176,30 +181,5 @@ def fit_plain(base: BaseParameters, recording: Recording) -> tuple[Baseline, Ref
             break
     if not is_short(recording):
         # Effects are measured beside a base model without prior, so the noise is, too.
-        left = tau - np.concatenate([baseline.regressor, baseline.nuisance], axis=2) @ solve_least_squares(gram, cross)
+        left = tau - baseline.columns @ weighted.posterior()
     return baseline, RefitResult(left, values)
-
-
-def _searched(
-    problem: Problem,
-    hypotheses: Sequence[Hypothesis],
-    false_alarm: float,
-    bar: Progress,
-    share: float,
-    known: Mapping[Hypothesis, tuple[float, ...]],
-) -> Search:
-    """Measures all hypotheses on a problem and selects effects."""
-    entries = measure(problem, hypotheses, _scan_progress(bar, share, 0.2))
-    give_back()
-    advance = _note_progress(bar, share + 0.25)
-    problem, selection = select(problem, entries, false_alarm=false_alarm, advance=advance, known=known)
-    members = [found.effect for found in selection.found]
-    return Search(problem, with_total_torque(problem, members, hypotheses), entries, selection)
-
-
-def _scan_progress(bar: Progress, start: float, share: float) -> Callable[[float], None]:
-    return lambda done: bar.update(start + share * done, "scan")
-
-
-def _note_progress(bar: Progress, at: float) -> Callable[[str], None]:
-    return lambda note: bar.update(at, note)

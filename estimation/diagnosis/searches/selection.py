@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from itertools import compress
 
 from estimation.diagnosis.calibration import MAX_EFFECTS, MIN_CANDIDATE_GAIN
 from estimation.diagnosis.hypothesis_tests.fitted_effects import FittedEffect, accept_all_but
@@ -17,16 +16,13 @@ from estimation.diagnosis.joint_fits.event_window import refit_event_window
 from estimation.diagnosis.joint_fits.total_torque import with_total_torque
 from estimation.diagnosis.searches.acceptance import (
     SURE,
-    delay_supported_away_from_impacts,
     exceeds_leakage,
     exceeds_single_shock,
     is_accepted,
     is_certain,
 )
-from estimation.diagnosis.searches.candidate_screening import screen_candidates
-from estimation.diagnosis.searches.joint_shape_refinement import refine_shapes_jointly
-from estimation.diagnosis.searches.relinearisation import relinearise
-from estimation.diagnosis.searches.swap_search import refine_candidates, refine_with_swaps, remeasure
+from estimation.diagnosis.searches.joint_refinement import refine_shapes_jointly, relinearise
+from estimation.diagnosis.searches.swap_search import refine_candidates, refine_with_swaps, remeasure, screen_candidates
 from robots.terms.effect_bases.capabilities import Persistence
 
 FAR_MORE = 1.5  # ratio of gains by which a joint refinement must strengthen a candidate
@@ -135,13 +131,6 @@ def select(
             members, p_values = refine_with_swaps(problem, entries, members, p_values, seen, won, false_alarm)
             if len({(m.hypothesis.name, m.hypothesis.joint) for m in members}) < len(members):
                 break
-        # A delay selected before an acceleration-driven effect may be the drives' response to its impacts.
-        held = [
-            delay_supported_away_from_impacts(problem, m, [*members[:i], *members[i + 1 :]])
-            for i, m in enumerate(members)
-        ]
-        spurned |= {m.hypothesis for m, own in zip(members, held, strict=True) if not own}
-        members, p_values = list(compress(members, held)), list(compress(p_values, held))
         now = {member.hypothesis for member in members}
         if candidates[0].hypothesis not in now:
             spurned.add(candidates[0].hypothesis)

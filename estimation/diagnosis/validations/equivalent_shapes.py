@@ -12,16 +12,14 @@ from dataclasses import replace
 
 import numpy as np
 
-from estimation.diagnosis.base_models.priors import explained_chi2
 from estimation.diagnosis.calibration import MAX_SHAPE_CHI2, MIN_BIC_GAIN
 from estimation.diagnosis.hypothesis_tests.fitted_effects import FittedEffect, accept_all_but
 from estimation.diagnosis.hypothesis_tests.problem import Problem
 from estimation.diagnosis.hypothesis_tests.refinement import refine
 from estimation.diagnosis.hypothesis_tests.scoring import accept
-from estimation.diagnosis.joint_fits.extended_fit import dense
 from estimation.diagnosis.joint_fits.shrinkage import effects_prior
 from estimation.diagnosis.searches.selection import SelectedEffect
-from estimation.regressions.parameter_priors import GaussianPrior
+from estimation.regressions.moments import Moments
 
 
 def equivalent_shapes(problem: Problem, members: Sequence[FittedEffect], i: int) -> list[FittedEffect]:
@@ -71,18 +69,17 @@ def complete_effects(problem: Problem, founds: Sequence[SelectedEffect]) -> tupl
 def _evidence(problem: Problem, others: Sequence[FittedEffect]) -> Callable[[FittedEffect], float]:
     """Returns the function that computes twice the log evidence of a shape, up to a constant for all shapes."""
     baseline, white = problem.baseline, problem.whitening
-    blocks = [baseline.regressor, baseline.nuisance, *(dense(problem, m.hypothesis, m.shape) for m in others)]
+    blocks = [baseline.columns, *(problem.dense(m.hypothesis, m.shape) for m in others)]
     known, tau = white.independent(np.concatenate(blocks, axis=2)), white.independent(problem.recording.tau)
 
     def evidence(form: FittedEffect) -> float:
-        flat = np.hstack([known, white.independent(dense(problem, form.hypothesis, form.shape))])
-        pull = effects_prior(problem, [*others, form])
-        precision = pull.precision / white.row_weight
-        gram = flat.T @ flat
-        both = gram + precision
+        flat = np.hstack([known, white.independent(problem.dense(form.hypothesis, form.shape))])
+        pull = effects_prior(problem, [*others, form]).times(1.0 / white.row_weight)
+        moments = Moments.of(flat[:, None], tau[:, None]).pulled(pull)
+        both = moments.gram[0] + pull.precision
         scale = np.sqrt(np.maximum(np.diag(both), 1e-300))
         volume = np.linalg.slogdet(both / scale[:, None] / scale)[1] + 2.0 * float(np.sum(np.log(scale)))
-        prior = float(np.sum(np.log(np.maximum(np.diag(precision)[known.shape[1] :], 1e-300))))
-        return explained_chi2(gram, flat.T @ tau, GaussianPrior(precision, pull.target)) - float(volume) + prior
+        prior = float(np.sum(np.log(np.maximum(np.diag(pull.precision)[known.shape[1] :], 1e-300))))
+        return moments.explained() - float(volume) + prior
 
     return evidence

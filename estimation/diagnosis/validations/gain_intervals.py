@@ -3,16 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import reduce
 from itertools import pairwise
+from operator import add
 
 import numpy as np
 from numpy.typing import NDArray
 
-from estimation.diagnosis.base_models.priors import explained_chi2, solve_map
 from estimation.diagnosis.calibration import MAX_ERROR_RATIO, MIN_FIT_GAIN, MIN_UNRELIABLE_ERROR
 from estimation.diagnosis.hypothesis_tests.problem import Problem
-from estimation.diagnosis.recordings.log_reading import Recording
+from estimation.diagnosis.recordings.recording import Recording
+from estimation.regressions.moments import Moments
 from estimation.regressions.parameter_priors import GaussianPrior
 from estimation.uncertainty.blocks import moving_block_sums
 from estimation.uncertainty.correlations import correlation_rows
@@ -160,31 +162,14 @@ def cross_validation_errors(problem: Problem, effects: Sequence[Array], pull: Ga
             f"each of {PARTS} stretches of the only log, predicted from the other stretches: the same kind of motion, "
             "so that the gain on another motion may differ"
         )
-    base = np.concatenate([problem.baseline.regressor, problem.baseline.nuisance], axis=2)
-    counts = ~recording.sign_unknown
-    weights = counts / problem.whitening.scales(len(recording))
-    full = np.concatenate([base, *effects], axis=2)
-    weighted = full * weights[:, :, None]
-    target = recording.tau * weights
-    grams: list[tuple[Array, Array]] = [_moments(weighted[fold], target[fold]) for fold in folds]
-    total = (np.sum([g for g, _ in grams], axis=0), np.sum([c for _, c in grams], axis=0))
-    chosen_by = model_columns(base.shape[2], effects)
-    errors = [np.empty_like(recording.tau) for _ in chosen_by]
-    fitted = [
-        recording.tau
-        - full[:, :, chosen] @ solve_map(total[0][np.ix_(chosen, chosen)], total[1][chosen], pull.columns(chosen))
-        for chosen in chosen_by
-    ]
-    growth = np.zeros(len(chosen_by))
-    for fold, (gram, cross) in zip(folds, grams, strict=True):
-        rest = (total[0] - gram, total[1] - cross)
-        growth += _growth(problem, rest, (gram, cross), float(np.sum(target[fold] ** 2)), counts[fold], pull, chosen_by)
-        for error, chosen in zip(errors, chosen_by, strict=True):
-            values = solve_map(rest[0][np.ix_(chosen, chosen)], rest[1][chosen], pull.columns(chosen))
-            error[fold] = recording.tau[fold] - full[fold][:, :, chosen] @ values
-    return HeldOutErrors(
-        how, recording.t, recording.step, recording.tau, tuple(errors), counts, tuple(fitted), tuple(growth)
-    )
+    weights = ~recording.sign_unknown / problem.whitening.scales(len(recording))
+    full = np.concatenate([problem.baseline.columns, *effects], axis=2)
+    parts = [Moments.of(full[fold], recording.tau[fold], weights[fold]).joined().pulled(pull) for fold in folds]
+    total = reduce(add, parts)
+    tests = [(full[fold], total - part, part) for fold, part in zip(folds, parts, strict=True)]
+    found = _tested(problem, how, recording, effects, tests)
+    torques = _torques(full, total, model_columns(problem.baseline.columns.shape[2], effects))
+    return replace(found, fitted=tuple(recording.tau - torque for torque in torques))
 
 
 def held_out_errors(
@@ -209,49 +194,57 @@ def held_out_errors(
         The errors on the held-out logs.
     """
     recording = problem.recording
-    base = np.concatenate([problem.baseline.regressor, problem.baseline.nuisance], axis=2)
     weights = ~recording.sign_unknown / problem.whitening.scales(len(recording))
-    full = np.concatenate([base, *effects], axis=2)
-    gram, cross = _moments(full * weights[:, :, None], recording.tau * weights)
+    full = np.concatenate([problem.baseline.columns, *effects], axis=2)
+    fit = Moments.of(full, recording.tau, weights).joined().pulled(pull)
     other = np.concatenate([unseen_base, *unseen_effects], axis=2)
-    errors = []
-    for chosen in model_columns(base.shape[2], effects):
-        values = solve_map(gram[np.ix_(chosen, chosen)], cross[chosen], pull.columns(chosen))
-        errors.append(unseen.tau - other[:, :, chosen] @ values)
+    more = Moments.of(other, unseen.tau, ~unseen.sign_unknown / problem.whitening.scale).joined().pulled(pull)
     # Stretches of a log that was cut at gaps contain its name.
     logs = len({name.rpartition(" from ")[0] or name for name in unseen.names})
     how = f"{several(logs, 'log')} that the fit has not seen"
     how += f", in {len(unseen.runs)} stretches" if len(unseen.runs) > logs else ""
-    weights = ~unseen.sign_unknown / problem.whitening.scale
-    target = unseen.tau * weights
-    more, square = _moments(other * weights[:, :, None], target), float(np.sum(target**2))
-    chosen_by = model_columns(base.shape[2], effects)
-    growth = _growth(problem, (gram, cross), more, square, ~unseen.sign_unknown, pull, chosen_by)
+    return _tested(problem, how, unseen, effects, [(other, fit, more)])
+
+
+def _tested(
+    problem: Problem,
+    how: str,
+    unseen: Recording,
+    effects: Sequence[Array],
+    tests: Sequence[tuple[Array, Moments, Moments]],
+) -> HeldOutErrors:
+    """Tests the models on all rows of a recording, part by part.
+
+    Errors of the base model increase the held-out residual; in `HeldOutErrors.growth` they count as noise.
+
+    Args:
+        problem: data of the fit.
+        how: how the rows were separated.
+        unseen: the held-out rows.
+        effects: columns of each effect.
+        tests: of each part the columns (M, n, p), and the normal equations of the fit and of the part.
+    """
+    chosen_by, growth = model_columns(problem.baseline.columns.shape[2], effects), np.zeros(2 + len(effects))
+    for _, fit, more in tests:
+        both = fit + more
+        gains = np.array([both.columns(own).explained() - fit.columns(own).explained() for own in chosen_by])
+        left = (float(more.square[0]) - gains[-1]) / max(int(more.count[0]), 1)
+        growth += (gains[-1] - gains) / (problem.whitening.row_weight * max(1.0, left))
+    torques = zip(*(_torques(X, fit, chosen_by) for X, fit, _ in tests), strict=True)
     return HeldOutErrors(
-        how, unseen.t, unseen.step, unseen.tau, tuple(errors), ~unseen.sign_unknown, growth=tuple(growth)
+        how=how,
+        t=unseen.t,
+        step=unseen.step,
+        measured=unseen.tau,
+        errors=tuple(unseen.tau - np.concatenate(parts) for parts in torques),
+        counts=~unseen.sign_unknown,
+        growth=tuple(growth),
     )
 
 
-def _growth(
-    problem: Problem,
-    fit: tuple[Array, Array],
-    more: tuple[Array, Array],
-    square: float,
-    counts: NDArray[np.bool_],
-    pull: GaussianPrior,
-    chosen_by: Sequence[NDArray[np.intp]],
-) -> Array:
-    """Computes `HeldOutErrors.growth` from the normal equations of the fit and of the held-out rows.
-
-    Errors of the base model increase the held-out residual; they count as noise.
-    """
-    gains = []
-    for chosen in chosen_by:
-        own, place = pull.columns(chosen), np.ix_(chosen, chosen)
-        both = fit[0][place] + more[0][place], fit[1][chosen] + more[1][chosen]
-        gains.append(explained_chi2(*both, own) - explained_chi2(fit[0][place], fit[1][chosen], own))
-    noise = problem.whitening.row_weight * max(1.0, (square - gains[-1]) / max(int(counts.sum()), 1))
-    return (gains[-1] - np.array(gains)) / noise
+def _torques(columns: Array, fit: Moments, chosen_by: Sequence[NDArray[np.intp]]) -> list[Array]:
+    """Evaluates the torque (M, n) of each model of a fit on rows (M, n, p)."""
+    return [columns[:, :, chosen] @ fit.columns(chosen).posterior() for chosen in chosen_by]
 
 
 def model_columns(base: int, effects: Sequence[Array]) -> list[NDArray[np.intp]]:
@@ -268,8 +261,3 @@ def model_columns(base: int, effects: Sequence[Array]) -> list[NDArray[np.intp]]
     own = [np.arange(a, b) for a, b in pairwise(edges)]
     everything = np.arange(edges[-1])
     return [np.arange(base), *(np.setdiff1d(everything, part) for part in own), everything]
-
-
-def _moments(Y: Array, target: Array) -> tuple[Array, Array]:
-    flat = Y.reshape(-1, Y.shape[2])
-    return flat.T @ flat, flat.T @ target.reshape(-1)

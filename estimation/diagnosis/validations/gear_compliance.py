@@ -12,7 +12,7 @@ from scipy.stats import t as student
 
 from estimation.diagnosis.calibration import MIN_COMPLIANCE_ENERGY
 from estimation.diagnosis.findings import Finding, Gain, Parameter
-from estimation.diagnosis.recordings.log_reading import Recording
+from estimation.diagnosis.recordings.recording import Recording
 from estimation.models.extension import Extension
 from estimation.uncertainty.blocks import block_numbers, jackknife_errors
 from estimation.uncertainty.correlations import effective_rows

@@ -14,7 +14,6 @@ from estimation.diagnosis.calibration import MIN_JOINT_GAIN, ONE_LOG_ENERGY
 from estimation.diagnosis.findings import Gain
 from estimation.diagnosis.hypothesis_tests.fitted_effects import FittedEffect
 from estimation.diagnosis.hypothesis_tests.problem import Problem
-from estimation.diagnosis.joint_fits.extended_fit import dense
 from estimation.diagnosis.joint_fits.shrinkage import effects_prior
 from estimation.diagnosis.joint_fits.total_torque import effect_columns
 from estimation.diagnosis.recordings.log_reading import build_recording
@@ -71,31 +70,29 @@ class HeldOutResult:
 
 
 def measure_held_out(
-    robot: Robot,
     problem: Problem,
     members: Sequence[FittedEffect],
-    held_out: Sequence[Log],
+    held_out: Recording | None,
     seed: int,
     gone: frozenset[int] = frozenset(),
 ) -> HeldOutResult:
     """Measures errors and gains on held-out logs, or by cross-validation.
 
     Args:
-        robot: the robot.
         problem: data of the fit.
         members: effects in the model.
-        held_out: logs not used in the fit; empty for cross-validation.
+        held_out: `read_held_out` of logs not used in the fit; None for cross-validation.
         seed: seed of the bootstrap intervals.
         gone: indices of members that are absent from the held-out logs.
 
     Returns:
         Errors, gains and support of each member.
     """
-    effects = tuple(dense(problem, member.hypothesis, member.shape) for member in members)
+    effects = tuple(problem.dense(member.hypothesis, member.shape) for member in members)
     rng = np.random.default_rng(seed)
     pull = effects_prior(problem, members)
-    if held_out:
-        unseen, states, whole, first, columns = _on_logs(robot, problem, members, effects, held_out, pull, gone)
+    if held_out is not None:
+        unseen, states, whole, first, columns = _on_logs(problem, members, effects, held_out, pull, gone)
     else:
         unseen = _left_out(problem, effects, pull)
         states = [problem.state_for(member.hypothesis.effect) for member in members]
@@ -207,30 +204,34 @@ def _rise(unseen: HeldOutErrors, i: int, member: FittedEffect) -> float:
     return float(np.sqrt(after / max(before, 1e-300)))
 
 
+def read_held_out(robot: Robot, problem: Problem, logs: Sequence[Log]) -> Recording | None:
+    """Reads held-out logs onto the grid of the fit; None for none."""
+    if not logs:
+        return None
+    recording = problem.recording
+    travel = np.max([np.ptp(recording.q[run], axis=0) for run in recording.runs], axis=0)
+    unseen = build_recording(robot, logs, step=recording.step, shortest=SHORTEST_UNSEEN, travel=travel)
+    return subtract_known_payload(robot, unseen).with_trusted(recording.trusted)
+
+
 def _on_logs(
-    robot: Robot,
     problem: Problem,
     members: Sequence[FittedEffect],
     effects: Sequence[Array],
-    held_out: Sequence[Log],
+    other: Recording,
     pull: GaussianPrior,
     gone: frozenset[int],
 ) -> tuple[HeldOutErrors, list[Situation], Recording, int, list[Array]]:
     """Computes the errors on held-out logs, and the states and columns of the members there."""
     recording = problem.recording
-    travel = np.max([np.ptp(recording.q[run], axis=0) for run in recording.runs], axis=0)
-    other = subtract_known_payload(
-        robot, build_recording(robot, held_out, step=recording.step, shortest=SHORTEST_UNSEEN, travel=travel)
-    )
-    other = other.with_trusted(recording.trusted)
     # One clock: later held-out logs start with the heat of the logs before.
     later = bool(other.t[0] > recording.t[-1])
-    whole = join_recordings(recording, other) if later else other
+    whole = join_recordings([recording, other]) if later else other
     first = len(recording) if later else 0
     states, columns = effect_columns(problem, whole, members)
     columns = [X[first:] * (i not in gone) for i, X in enumerate(columns)]
     baseline = problem.baseline
-    base = base_regressor(baseline.base, other)
-    nuisance = np.zeros((len(other), robot.n, baseline.nuisance.shape[2]))
-    unseen = held_out_errors(problem, effects, other, np.concatenate([base, nuisance], axis=2), columns, pull)
+    base = np.zeros((len(other), *baseline.columns.shape[1:]))
+    base[:, :, : baseline.base.size] = base_regressor(baseline.base, other)
+    unseen = held_out_errors(problem, effects, other, base, columns, pull)
     return unseen, states, whole, first, columns

@@ -10,19 +10,21 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 from estimation.diagnosis.calibration import (
+    FREE_P_VALUE,
+    MAX_FREE_FUNCTIONS,
     MIN_BIC_GAIN,
     MIN_EXPLAINED_SHARE,
+    MIN_FREE_SHARE,
     MIN_RETAINED_CHI2,
     NEARLY_EXPLAINED_SHARE,
 )
-from estimation.diagnosis.hypothesis_tests.evidence import is_close_rival
-from estimation.diagnosis.hypothesis_tests.fitted_effects import FittedEffect
+from estimation.diagnosis.hypothesis_tests.fitted_effects import FittedEffect, is_close_rival
 from estimation.diagnosis.hypothesis_tests.problem import Problem
 from estimation.diagnosis.hypothesis_tests.refinement import refine
-from estimation.diagnosis.hypothesis_tests.scan import Entry
+from estimation.diagnosis.hypothesis_tests.scan import Entry, scan
 from estimation.diagnosis.hypothesis_tests.scoring import accept
 from estimation.diagnosis.searches.selection import SelectedEffect, Selection
-from estimation.diagnosis.validations.free_functions import free_functions
+from estimation.diagnosis.searches.swap_search import refine_candidates
 
 
 @dataclass(frozen=True, eq=False)
@@ -103,7 +105,7 @@ def _outperformed(
             continue
         names, others = [f.effect for f in own], [f.effect for f in kept if f not in own]
         here = [entry for entry in patterns if entry.hypothesis.joint in joints]
-        free, _ = free_functions(problem, here, others, false_alarm)
+        free, _ = free_functions(problem, here, others, false_alarm, most=1)
         if free and not _explain_as_well(problem, names, others, free[0]):
             return min(own, key=lambda f: f.effect.gain)
     return None
@@ -162,3 +164,53 @@ def _is_plausible(problem: Problem, member: FittedEffect) -> bool:
     """Whether the fitted parameters are physically plausible."""
     place, robot = member.hypothesis, problem.situation.robot
     return place.effect.is_plausible(robot, place.joint, member.coefficients, member.shape)
+
+
+# Number of candidates that are refined. The scan on a grid underrates narrow functions with few parameters.
+CONTENDERS = 3
+
+
+def free_functions(
+    problem: Problem,
+    patterns: Sequence[Entry],
+    named: Sequence[FittedEffect],
+    false_alarm: float,
+    *,
+    alone: bool = False,
+    most: int = MAX_FREE_FUNCTIONS,
+) -> tuple[list[FittedEffect], list[float]]:
+    """Adds free functions beside named effects, as long as the strongest is significant and improves the BIC.
+
+    A free function must also explain a minimum share of what the other effects explain on its joints.
+
+    Args:
+        problem: whitened data.
+        patterns: candidate free functions, measured.
+        named: named effects in the model.
+        false_alarm: largest p-value of a free function.
+        alone: whether a very small p-value suffices for the first free function if no named effect is in the model.
+        most: largest number of free functions.
+
+    Returns:
+        The free functions in the order of their selection, and the p-value of each.
+    """
+    members: list[FittedEffect] = []
+    p_values: list[float] = []
+    while len(members) < most:
+        accepted = accept(problem, tuple(m.group for m in (*named, *members)))
+        result = scan(problem, patterns, accepted)
+        if not result.outcomes:
+            break
+        p = result.p_value(result.outcomes[0])
+        if not p <= false_alarm:
+            break
+        near = [o for o in result.outcomes[:CONTENDERS] if o.degrees]
+        member = refine_candidates(problem, near, accepted)[0]
+        before = (*named, *members)
+        if member.excess_chi2 < MIN_FREE_SHARE * sum(m.gain_on(member.group.joints) for m in before):
+            break
+        if member.bic_gain < MIN_BIC_GAIN and (before or not alone or p > FREE_P_VALUE):
+            break
+        members.append(member)
+        p_values.append(p)
+    return members, p_values

@@ -1,4 +1,4 @@
-"""Findings after the validation on held-out data, and its changes."""
+"""Findings after the validation on held-out data, its changes, and the verdict."""
 
 from __future__ import annotations
 
@@ -11,6 +11,7 @@ from estimation.diagnosis.hypothesis_tests.hypotheses import Hypothesis
 from estimation.diagnosis.searches.selection import SelectedEffect
 from estimation.diagnosis.validations.gear_compliance import MeasuredCompliance
 from estimation.diagnosis.validations.held_out_errors import HeldOutResult
+from estimation.diagnosis.validations.name_comparison import has_close_rivals
 
 
 class Change(Enum):
@@ -70,3 +71,49 @@ class ValidatedFindings:
     changes: tuple[ChangedFinding, ...]
     refuted: tuple[tuple[FittedEffect, float, Gain], ...]
     compliances: tuple[MeasuredCompliance, ...] = ()
+
+
+class Reason(Enum):
+    """Reason for a verdict."""
+
+    NOTHING_SIGNIFICANT = "nothing significant"
+    CAUSES_FOUND = "causes found"
+    CLOSE_RIVALS = "close rivals"
+    FREE_FUNCTION = "only a free function explains part of the residual"
+    REJECTED_FREE_FUNCTION = "held-out data reject the free function of a significant residual"
+    REJECTED_CAUSES = "held-out data reject all causes of a significant residual"
+
+
+@dataclass(frozen=True)
+class Decision:
+    """A verdict and its reason.
+
+    Attributes:
+        verdict: ``none``, ``named``, ``ambiguous`` or ``unexplained``.
+        reason: reason for the verdict.
+    """
+
+    verdict: str
+    reason: Reason
+
+
+def decide(validated: ValidatedFindings) -> Decision:
+    """Decides the verdict. No other function sets or changes it.
+
+    Args:
+        validated: findings after the validation on held-out data.
+
+    Returns:
+        The verdict and its reason.
+    """
+    if len(validated.effects) > len(validated.findings):
+        return Decision("unexplained", Reason.FREE_FUNCTION)
+    if validated.rejected_discrepancies:
+        return Decision("unexplained", Reason.REJECTED_FREE_FUNCTION)
+    if validated.findings or validated.compliances:
+        if any(map(has_close_rivals, validated.findings)):
+            return Decision("ambiguous", Reason.CLOSE_RIVALS)
+        return Decision("named", Reason.CAUSES_FOUND)
+    if validated.refuted:
+        return Decision("unexplained", Reason.REJECTED_CAUSES)
+    return Decision("none", Reason.NOTHING_SIGNIFICANT)

@@ -222,5 +222,9 @@ def _oscillation(situation: Situation, static: Array, shape: tuple[float, ...]) 
                 band[1 + k - j + 2 * back, first : first + 2 * len(block) : 2] = block[:, k, j]
         push = -(m @ (x[2:] - 2.0 * x[1:-1] + x[:-2]) + d @ (x[2:] - x[:-2]))
         right = np.concatenate([np.zeros_like(x[:2]), push]).reshape(rows, -1)
-        tilt[run] += solve_banded((5, 1), band, right).reshape(x.shape)
+        try:
+            tilt[run] += solve_banded((5, 1), band, right).reshape(x.shape)
+        except np.linalg.LinAlgError:
+            # Inertia and damping of a base model that fits badly may have no motion of the base at all.
+            continue
     return tilt, *situation.derivatives(tilt)

@@ -12,8 +12,8 @@ import pytest
 
 from estimation.diagnosis.hypothesis_tests import fitted_effects
 from estimation.diagnosis.hypothesis_tests.fitted_effects import FittedEffect
-from estimation.diagnosis.hypothesis_tests.groups import Group
 from estimation.diagnosis.hypothesis_tests.hypotheses import Hypothesis
+from estimation.diagnosis.hypothesis_tests.problem import Group
 from estimation.diagnosis.validations import name_comparison
 from robots.terms.effects import EFFECTS
 

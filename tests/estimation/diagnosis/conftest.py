@@ -7,10 +7,8 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from estimation.diagnosis.base_models.baseline import base_parameters, build_baseline, inertia_matrix
-from estimation.diagnosis.base_models.priors import base_model_prior
-from estimation.diagnosis.hypothesis_tests.problem import Problem
-from estimation.diagnosis.hypothesis_tests.problem_setup import build_problem, fit_values
+from estimation.diagnosis.base_models.baseline import base_model_prior, base_parameters, build_baseline, inertia_matrix
+from estimation.diagnosis.hypothesis_tests.problem import Problem, build_problem
 from estimation.diagnosis.noise_models.high_frequency_band import build_high_band
 from estimation.diagnosis.noise_models.noise_estimate import estimate_whitening
 from estimation.diagnosis.noise_models.noise_nuisance_basis import build_nuisance_projection
@@ -28,7 +26,7 @@ def pose_arm(arm: Robot) -> Callable[..., Problem]:
     def build(recording: Recording, wider: float | None = None) -> Problem:
         baseline = build_baseline(base_parameters(arm, "coulomb-viscous", (0.001, 0.001)), recording)
         pull = base_model_prior(baseline, recording)
-        values = fit_values(baseline, recording.tau.std(axis=0), recording.sign_unknown, recording.tau, pull)
+        values = baseline.fitted(~recording.sign_unknown / recording.tau.std(axis=0), recording.tau, pull)
         residual = recording.tau - baseline.regressor @ values
         inertia = inertia_matrix(baseline, recording, values)
         spared = build_nuisance_projection(recording, baseline, residual)

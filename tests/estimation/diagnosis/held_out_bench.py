@@ -4,19 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from functools import partial
 from types import SimpleNamespace
 
 import numpy as np
 
 from estimation.diagnosis.findings import Gain
-from estimation.diagnosis.hypothesis_tests.evidence import Evidence
-from estimation.diagnosis.hypothesis_tests.fitted_effects import FittedEffect
+from estimation.diagnosis.hypothesis_tests.fitted_effects import Evidence, FittedEffect
 from estimation.diagnosis.hypothesis_tests.hypotheses import Hypothesis
 from estimation.diagnosis.searches.selection import SelectedEffect
-from estimation.diagnosis.validations.held_out_validation import validate_on_held_out
 from estimation.diagnosis.validations.name_comparison import ComparedNames
 from estimation.diagnosis.validations.validated_findings import ValidatedFindings
+from estimation.diagnosis.validations.validation import validate_on_held_out
 from robots.terms.discrepancies.patterns import build_pattern
 from robots.terms.effect_bases.capabilities import Persistence
 from robots.terms.effects import EFFECTS
@@ -41,15 +39,13 @@ HELPS, IDLE, HARMS = Shown(), Shown(-0.001, 0.002, 1.0), Shown(-0.004, -0.001, 1
 class Bench:
     """Replacement for the measurement: the result of each label, and a record of the calls.
 
-    The result may differ beside certain other effects, or after removal. On some joints, several effects together have
-    an additional error.
+    The result may differ beside certain other effects, or after removal.
     """
 
     shows: dict[str, Shown]
     beside: dict[tuple[str, str], Shown] = field(default_factory=dict)
     asked: list[tuple[str, ...]] = field(default_factory=list)
     without: dict[str, Shown] = field(default_factory=dict)
-    extra: dict[int, float] = field(default_factory=dict)
 
     def __call__(self, members: Sequence[FittedEffect], gone: frozenset[int] = frozenset()) -> SimpleNamespace:
         labels = tuple(label_of(member) for member in members)
@@ -64,7 +60,7 @@ class Bench:
         ]
         lost = {m.hypothesis.joint - 1 for m, s in zip(members, shown, strict=True) if m.hypothesis.joint and s.astray}
         return SimpleNamespace(
-            errors=SimpleNamespace(is_unreliable=lost.__contains__, nrmse=partial(self._left, members, shown)),
+            errors=SimpleNamespace(is_unreliable=lost.__contains__),
             gains=tuple(
                 Gain(nrmse_before=0.03, nrmse_after=0.03 - (s.low + s.high) / 2, ci95=(s.low, s.high)) for s in shown
             ),
@@ -73,16 +69,6 @@ class Bench:
             cv_retained_gain=tuple(s.kept for s in shown),
             support=tuple(s.speaks for s in shown),
         )
-
-    def _left(self, members: Sequence[FittedEffect], shown: Sequence[Shown], model: int) -> np.ndarray:
-        """Returns the errors of the base model (0) and of all effects together (-1) on each of eight joints."""
-        error = np.full(8, 0.03)
-        for member, what in zip(members, shown, strict=True) if model else ():
-            if member.hypothesis.joint is not None:
-                error[member.hypothesis.joint - 1] -= (what.low + what.high) / 2
-        for joint, more in self.extra.items():
-            error[joint - 1] += more * bool(model and sum(m.hypothesis.joint == joint for m in members) > 1)
-        return error
 
 
 def label_of(member: FittedEffect) -> str:
@@ -121,8 +107,6 @@ def validated(
     p_values: Sequence[float] = (),
     held_out: bool = True,
     forms: Sequence[FittedEffect] = (),
-    faint: Sequence[FittedEffect] = (),
-    worths: Mapping[FittedEffect, float] | None = None,
     unnamed: tuple[FittedEffect, float] | None = None,
     alone: Mapping[FittedEffect, float] | None = None,
 ) -> ValidatedFindings:
@@ -133,9 +117,8 @@ def validated(
     compared = ComparedNames(founds, tuple(free), tuple(p_values), 1.0)
     for found in founds:
         for member in (found.effect, *(rival for rival, _ in found.rivals)):
-            worth = (worths or {}).get(member, 1.0 if member in faint else 100.0)
             # Nothing was fitted, so the cached evidence is set directly.
-            vars(member)["local_evidence"] = Evidence(worth, 0, 1.0)
+            vars(member)["local_evidence"] = Evidence(100.0, 0, 1.0)
 
     def again(members: Sequence[FittedEffect], i: int) -> FittedEffect:
         if members[i] not in (alone or {}):

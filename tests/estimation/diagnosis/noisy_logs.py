@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from scipy.signal import lfilter
 
-from estimation.diagnosis.recordings.log_reading import Recording
+from estimation.diagnosis.recordings.recording import Recording
 
 STEP = 0.004
 

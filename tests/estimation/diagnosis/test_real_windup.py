@@ -7,9 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from estimation.diagnosis.base_models.baseline import base_parameters, build_baseline
-from estimation.diagnosis.base_models.priors import base_model_prior
-from estimation.diagnosis.hypothesis_tests.problem_setup import fit_values
+from estimation.diagnosis.base_models.baseline import base_model_prior, base_parameters, build_baseline
 from estimation.diagnosis.recordings.log_reading import build_recording
 from estimation.diagnosis.validations.gear_compliance import measure_gear_compliance
 from tests.kr300 import kr300
@@ -25,9 +23,8 @@ def test_a_heavy_arm_s_gears(data: Callable[[str], Path], tmp_path: Path) -> Non
     robot, log = kr300(data("kuka_kr300_weigand"), tmp_path / "kr300.yaml")
     recording = build_recording(robot, [log])
     base = build_baseline(base_parameters(robot, "polynomial", (0.001,) * 6), recording)
-    values = fit_values(
-        base, recording.tau.std(axis=0), recording.sign_unknown, recording.tau, base_model_prior(base, recording)
-    )
+    weights = ~recording.sign_unknown / recording.tau.std(axis=0)
+    values = base.fitted(weights, recording.tau, base_model_prior(base, recording))
     found = measure_gear_compliance(base.situation(recording, values), recording, [log], false_alarm=0.01)
     assert [windup.finding.joint for windup in found] == [2, 3]
     for windup, nominal in zip(found, (7.52e6, 4.10e6), strict=True):

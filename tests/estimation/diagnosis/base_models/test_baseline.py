@@ -10,7 +10,8 @@ import pytest
 
 from estimation.diagnosis.base_models.baseline import base_parameters, build_baseline
 from estimation.diagnosis.pipeline import diagnose
-from estimation.diagnosis.recordings.log_reading import Recording, build_recording
+from estimation.diagnosis.recordings.log_reading import build_recording
+from estimation.diagnosis.recordings.recording import Recording
 from estimation.diagnosis.recordings.thinning import shift_motion
 from estimation.diagnosis.searches.search import fit_plain
 from robots.plants import simulate

@@ -9,11 +9,10 @@ import numpy as np
 import pytest
 
 from estimation import diagnose, read_log
-from estimation.diagnosis.base_models.baseline import base_parameters, build_baseline
-from estimation.diagnosis.base_models.priors import base_model_prior, solve_map
-from estimation.diagnosis.hypothesis_tests.problem_setup import fit_values
+from estimation.diagnosis.base_models.baseline import base_model_prior, base_parameters, build_baseline
 from estimation.diagnosis.recordings.log_reading import build_recording
-from estimation.diagnosis.validations.prediction_settings import all_row_errors
+from estimation.diagnosis.validations.extended_model import all_row_errors
+from estimation.regressions.moments import Moments
 from estimation.regressions.parameter_priors import GaussianPrior
 from robots.loading import load_robot
 from robots.robot import Robot
@@ -27,16 +26,15 @@ def test_the_fit_is_that_of_rows_and_pull_together() -> None:
     weights = np.array([2.0, 5.0])
     rows = np.vstack([Y, np.column_stack([np.diag(weights), np.zeros(2)])])
     expected = np.linalg.lstsq(rows, np.concatenate([tau, weights * target]), rcond=None)[0]
-    assert solve_map(Y.T @ Y, Y.T @ tau, GaussianPrior(np.diag(weights**2), target)) == pytest.approx(
-        expected, rel=1e-9
-    )
+    moments = Moments.of(Y[:, None], tau[:, None]).pulled(GaussianPrior(np.diag(weights**2), target))
+    assert moments.posterior() == pytest.approx(expected, rel=1e-9)
 
 
 def test_a_direction_without_data_goes_to_the_target() -> None:
     """A parameter whose column is zero takes the prior's mean, and another one the value of the data."""
-    gram, cross = np.diag([100.0, 0.0]), np.array([300.0, 0.0])
-    values = solve_map(gram, cross, GaussianPrior(np.diag([1e-9, 1e-9]), np.array([7.0, 5.0])))
-    assert values == pytest.approx([3.0, 5.0], rel=1e-6)
+    moments = Moments.of(np.array([[[10.0, 0.0]]]), np.array([[30.0]]))
+    pulled = moments.pulled(GaussianPrior(np.diag([1e-9, 1e-9]), np.array([7.0, 5.0])))
+    assert pulled.posterior() == pytest.approx([3.0, 5.0], rel=1e-6)
 
 
 @pytest.mark.slow
@@ -51,8 +49,8 @@ def test_a_standing_joint_does_not_make_another_motion_absurd(arm: Robot, arm_lo
     q[:, 1] = 0.3 + 1e-5 * np.random.default_rng(1).standard_normal(len(q))
     recording = build_recording(arm, [replace(log, q=q, dq=None, ddq=None)])
     baseline = build_baseline(base_parameters(arm, "polynomial", (0.001, 0.001)), recording)
-    scale = 0.02 * recording.tau.std(axis=0)
-    values = fit_values(baseline, scale, recording.sign_unknown, recording.tau, base_model_prior(baseline, recording))
+    weights = ~recording.sign_unknown / (0.02 * recording.tau.std(axis=0))
+    values = baseline.fitted(weights, recording.tau, base_model_prior(baseline, recording))
     error = other.tau - baseline.base.torque(other.q, other.dq, other.ddq, values)
     # The prior allows errors of the torque's own size, and for friction of three times that, at high speed.
     assert np.all(np.sqrt((error**2).mean(axis=0)) < 4 * np.sqrt((other.tau**2).mean(axis=0)))

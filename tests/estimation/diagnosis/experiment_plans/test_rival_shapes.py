@@ -9,9 +9,8 @@ import pytest
 
 from estimation.diagnosis.experiment_plans.experiment_grams import Grams
 from estimation.diagnosis.experiment_plans.experiment_motions import MAKERS, motion_range
-from estimation.diagnosis.experiment_plans.next_experiment import plan_next
+from estimation.diagnosis.experiment_plans.next_experiment import RivalShape, find_rival_shapes, plan_next
 from estimation.diagnosis.experiment_plans.planned_limits import planned_problem
-from estimation.diagnosis.experiment_plans.rival_shapes import RivalShape, find_rival_shapes
 from estimation.diagnosis.hypothesis_tests.hypotheses import Hypothesis
 from estimation.diagnosis.hypothesis_tests.problem import Problem
 from robots.loading import load_robot

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -29,7 +30,7 @@ def problem(arm: Robot, arm_log: Callable[..., Log], pose_arm: Callable[..., Pro
 def _written_out(problem: Problem, extra: np.ndarray) -> tuple[float, float]:
     """Computes the squared white residual of the base model without and with more columns, by numpy's least squares."""
     root = np.linalg.cholesky(problem.whitening.precision)
-    base = np.concatenate([problem.baseline.regressor, problem.baseline.nuisance], axis=2)
+    base = problem.baseline.columns
     tau = (problem.whitening.all(problem.recording.tau) @ root).reshape(-1)
     left = []
     for columns in (base, np.concatenate([base, extra], axis=2)):
@@ -60,6 +61,17 @@ def test_a_score_is_the_fall_of_the_squared_residual(problem: Problem, name: str
     assert problem.energy == pytest.approx(before, rel=1e-6)
     # Columns are stored in single precision, and directions with almost no energy are left out.
     assert result.gain == pytest.approx(before - after, abs=0.02 * (before - after) + 0.3)
+
+
+def test_a_response_that_diverges_acts_nowhere() -> None:
+    """A column too large for single precision is zero, as on a base model without a stable motion; others stay."""
+    X = np.ones((5, 2, 3))
+    X[1:, 0, 1], X[0, 1, 2] = 1e20, np.nan
+    effect = SimpleNamespace(needs_full_rate=False, columns=lambda *_: X)
+    joints, columns = Hypothesis(effect, None).columns(SimpleNamespace(), ())  # type: ignore[arg-type]
+    assert joints == (0, 1)
+    assert columns[0].tolist() == [[1.0, 0.0, 1.0]] * 5
+    assert columns[1].tolist() == [[1.0, 1.0, 0.0], *[[1.0, 1.0, 1.0]] * 4]
 
 
 def test_accepted_effects_are_projected_out(problem: Problem) -> None:

@@ -12,14 +12,14 @@ import pytest
 from estimation.diagnosis.calibration import MIN_BIC_GAIN, RARE_ODDS
 from estimation.diagnosis.hypothesis_tests import refinement
 from estimation.diagnosis.hypothesis_tests.fitted_effects import FittedEffect
-from estimation.diagnosis.hypothesis_tests.groups import Group
 from estimation.diagnosis.hypothesis_tests.hypotheses import Hypothesis
 from estimation.diagnosis.hypothesis_tests.joint_agreement import PerJointEvidence
+from estimation.diagnosis.hypothesis_tests.problem import Group
 from estimation.diagnosis.hypothesis_tests.scan import Outcome
 from estimation.diagnosis.hypothesis_tests.scoring import Limited
 from estimation.diagnosis.searches import acceptance
 from estimation.diagnosis.searches.acceptance import SURE, exceeds_leakage, is_certain, passes_bic
-from estimation.diagnosis.searches.candidate_screening import screen_candidates
+from estimation.diagnosis.searches.swap_search import screen_candidates
 from robots.terms.effects import EFFECTS, Shape
 from robots.terms.effects.stribeck import Stribeck
 
@@ -291,7 +291,6 @@ def test_friction_that_turns_round_over_no_way_is_no_presliding(
         return SimpleNamespace(limited=lambda *_: Limited(float(gain), np.ones(1), 1), visible=1.0)
 
     monkeypatch.setattr(refinement, "score", score)
-    monkeypatch.setattr(refinement, "gain_from_reversal_errors", lambda *_: 0.0)
     monkeypatch.setattr(Hypothesis, "coefficient_bounds", lambda *_: ((0.0, np.inf),))
 
     class _Shape(tuple):  # type: ignore[type-arg]

@@ -11,8 +11,8 @@ import pytest
 from scipy.signal import lfilter
 
 from estimation import diagnose
-from estimation.diagnosis.hypothesis_tests.shocks import _bump, _sizes
 from estimation.diagnosis.noise_models.frequency_bands import low_pass
+from estimation.diagnosis.searches.acceptance import _bump, _sizes
 from robots.robot import Robot
 from robots.signals import Log
 

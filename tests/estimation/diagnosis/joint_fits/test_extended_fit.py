@@ -14,7 +14,7 @@ from estimation.diagnosis.hypothesis_tests.hypotheses import Hypothesis
 from estimation.diagnosis.hypothesis_tests.problem import Problem
 from estimation.diagnosis.hypothesis_tests.refinement import refine
 from estimation.diagnosis.hypothesis_tests.scoring import accept
-from estimation.diagnosis.joint_fits.extended_fit import _covariance, _narrowed, dense, fit_extended
+from estimation.diagnosis.joint_fits.extended_fit import _covariance, _narrowed, fit_extended
 from estimation.diagnosis.joint_fits.total_torque import effect_columns
 from estimation.diagnosis.recordings.log_reading import build_recording
 from estimation.diagnosis.recordings.recording import Recording
@@ -36,8 +36,7 @@ def recording(arm: Robot, arm_log: Callable[..., Log]) -> Recording:
 
 def _estimable(problem: Problem, member: FittedEffect) -> np.ndarray:
     """Returns which coefficients the rows determine, by the null space of all columns."""
-    blocks = [problem.baseline.regressor, problem.baseline.nuisance]
-    known = np.concatenate([*blocks, dense(problem, member.hypothesis, member.shape)], axis=2)[::7]
+    known = np.concatenate([problem.baseline.columns, problem.dense(member.hypothesis, member.shape)], axis=2)[::7]
     flat = known.reshape(-1, known.shape[2])
     norms = np.linalg.norm(flat, axis=0)
     flat = flat / np.where(norms > 0, norms, 1.0)
@@ -65,7 +64,7 @@ def test_what_a_log_leaves_open_has_no_interval(
     hypothesis = Hypothesis(EFFECTS[name], joint)
     problem = pose_arm(recording)
     point = shape or hypothesis.effect.grid(problem.situation, joint)[1]
-    columns = dense(problem, hypothesis, point)
+    columns = problem.dense(hypothesis, point)
     posed = pose_arm(replace(recording, tau=recording.tau + 0.5 * columns[:, :, 0]))
     member = refine(posed, hypothesis, point, accept(posed, ()))
     fitted = fit_extended(posed, [member], {})
@@ -101,7 +100,7 @@ def test_a_change_between_two_logs_is_within_the_pause(
     first, hypothesis = arm_log(torque_noise=0.02), Hypothesis(EFFECTS[effect], joint)
     logs = build_recording(arm, [first, replace(first, t=first.t + float(np.ptp(first.t)) + 30.0)])
     ends, begins = (float(logs.t[at]) for at in (logs.starts[1] - 1, logs.starts[1]))
-    columns = dense(pose_arm(logs), hypothesis, (begins, *known))
+    columns = pose_arm(logs).dense(hypothesis, (begins, *known))
     posed = pose_arm(replace(logs, tau=logs.tau + columns @ np.array(size)))
     member = refine(posed, hypothesis, (begins, *known), accept(posed, ()))
     extension = fit_extended(posed, [member], {}).model.extensions[0]
@@ -123,13 +122,13 @@ def test_the_model_is_what_was_fitted(
     effect = find_effect(name)
     hypothesis, problem = Hypothesis(effect, 1), pose_arm(recording)
     shape = effect.grid(problem.situation, 1)[0]
-    columns = dense(problem, hypothesis, shape)
+    columns = problem.dense(hypothesis, shape)
     size = 0.2 * recording.tau[:, 0].std() / columns[:, 0].std(axis=0).max()
     posed = pose_arm(replace(recording, tau=recording.tau + size * columns[:, :, 0]))
     member = refine(posed, hypothesis, shape, accept(posed, ()))
     fitted = fit_extended(posed, [member], {"gravities": []})
     base = posed.baseline.regressor @ fitted.values[: posed.baseline.base.size]
-    own = dense(posed, hypothesis, member.shape) @ fitted.model.extensions[0].coefficients
+    own = posed.dense(hypothesis, member.shape) @ fitted.model.extensions[0].coefficients
     motion = (recording.q, recording.dq, recording.ddq, recording.t)
     fitted.model.save(tmp_path / "model.json")
     for model in (fitted.model, load_model(tmp_path)):
@@ -177,7 +176,7 @@ def test_no_log_knows_a_delay_better_than_its_formula(
     hypothesis = Hypothesis(EFFECTS["time_delay"], None)
     delay = 0.01
     problem = pose_arm(recording)
-    columns = dense(problem, hypothesis, (delay,))
+    columns = problem.dense(hypothesis, (delay,))
     posed = pose_arm(replace(recording, tau=recording.tau + delay * columns[:, :, 0]))
     member = refine(posed, hypothesis, (0.008,), accept(posed, ()))
     extension = fit_extended(posed, [member], {}).model.extensions[0]

@@ -13,11 +13,10 @@ import pytest
 from estimation import load_model
 from estimation.diagnosis.hypothesis_tests.fitted_effects import FittedEffect
 from estimation.diagnosis.hypothesis_tests.hypotheses import Hypothesis
-from estimation.diagnosis.hypothesis_tests.problem import Problem
-from estimation.diagnosis.hypothesis_tests.problem_setup import build_problem
+from estimation.diagnosis.hypothesis_tests.problem import Problem, build_problem
 from estimation.diagnosis.hypothesis_tests.refinement import refine
 from estimation.diagnosis.hypothesis_tests.scoring import accept
-from estimation.diagnosis.joint_fits.extended_fit import dense, fit_extended
+from estimation.diagnosis.joint_fits.extended_fit import fit_extended
 from estimation.diagnosis.joint_fits.gear_load import NO_GEAR_LOAD, find_gear_load
 from estimation.diagnosis.joint_fits.total_torque import fit_jointly
 from estimation.diagnosis.recordings.log_reading import build_recording
@@ -125,7 +124,7 @@ def test_the_model_is_what_was_fitted_with_a_load_that_the_gear_bears(
     assert abs(by_load.coefficients[0] - SHARE) < max(3 * error, 0.03 * SHARE)
     expected = posed.baseline.regressor @ fitted.values[: posed.baseline.base.size]
     for member, extension in zip(members, fitted.model.extensions, strict=True):
-        expected = expected + dense(posed, member.hypothesis, member.shape) @ extension.coefficients
+        expected = expected + posed.dense(member.hypothesis, member.shape) @ extension.coefficients
     motion = (recording.q, recording.dq, recording.ddq, recording.t)
     fitted.model.save(tmp_path / "model.json")
     for model in (fitted.model, load_model(tmp_path)):

@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 from scipy.stats import multivariate_normal
 
-from estimation.diagnosis.base_models.priors import solve_map
 from estimation.diagnosis.hypothesis_tests.fitted_effects import FittedEffect
-from estimation.diagnosis.hypothesis_tests.groups import Group
+from estimation.diagnosis.hypothesis_tests.problem import Group
 from estimation.diagnosis.hypothesis_tests.scoring import Score, visible_root
 from estimation.diagnosis.joint_fits.shrinkage import shrinkage_precision
+from estimation.regressions.moments import Moments
 from estimation.regressions.parameter_priors import GaussianPrior
 
 
@@ -55,7 +55,8 @@ def test_what_is_well_measured_stays_and_what_two_columns_share_is_shared() -> N
     def fit(X: np.ndarray, pulled: bool) -> np.ndarray:
         Y = np.column_stack([base, X])
         own = shrinkage_precision(_score(X, base, y)) if pulled else np.zeros(X.shape[1])
-        return solve_map(Y.T @ Y, Y.T @ y, GaussianPrior(np.diag([0.0, 0.0, 0.0, *own]), np.zeros(Y.shape[1])))[3:]
+        prior = GaussianPrior(np.diag([0.0, 0.0, 0.0, *own]), np.zeros(Y.shape[1]))
+        return Moments.of(Y[:, None], y[:, None]).pulled(prior).posterior()[3:]
 
     alone = x[:, None]
     assert fit(alone, True) == pytest.approx(fit(alone, False), rel=0.01)
@@ -72,7 +73,8 @@ def test_a_column_that_never_acts_stays_at_zero() -> None:
     y = 2 * X[:, 0] + rng.standard_normal(200)
     own = shrinkage_precision(_score(X, base, y))
     Y = np.column_stack([base, X])
-    values = solve_map(Y.T @ Y, Y.T @ y, GaussianPrior(np.diag([0.0, 0.0, *own]), np.zeros(4)))
+    prior = GaussianPrior(np.diag([0.0, 0.0, *own]), np.zeros(4))
+    values = Moments.of(Y[:, None], y[:, None]).pulled(prior).posterior()
     assert values[2] == pytest.approx(2.0, abs=0.4)
     assert abs(values[3]) < 1e-6
 

@@ -10,7 +10,7 @@ import pytest
 from scipy.signal import lfilter
 
 from estimation import diagnose
-from estimation.diagnosis.noise_models.bursts import find_bursts
+from estimation.diagnosis.noise_models.noise_estimate import find_bursts
 from robots.plants import simulate
 from robots.robot import Robot
 from robots.signals import Motion

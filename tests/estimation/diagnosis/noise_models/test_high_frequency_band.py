@@ -226,7 +226,7 @@ def test_a_log_in_which_a_joint_stands_levels_no_noise(clean: Recording, pose_ar
             tau=clean.tau + [3.0, 0.0] + NOISE * rng.standard_normal(clean.tau.shape),
             sign_unknown=clean.sign_unknown | np.array([True, False]),
         )
-        whole = join_recordings(whole, stands)
+        whole = join_recordings([whole, stands])
     upper = pose_arm(whole, wider=MAX_HIGH_BAND_ERROR).high_band
     assert upper is not None
     above = upper.joints[0]

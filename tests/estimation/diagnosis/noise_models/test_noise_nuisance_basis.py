@@ -9,9 +9,7 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter
 
-from estimation.diagnosis.base_models.baseline import base_parameters, build_baseline
-from estimation.diagnosis.base_models.priors import base_model_prior
-from estimation.diagnosis.hypothesis_tests.problem_setup import fit_values
+from estimation.diagnosis.base_models.baseline import base_model_prior, base_parameters, build_baseline
 from estimation.diagnosis.noise_models.noise_estimate import estimate_whitening
 from estimation.diagnosis.noise_models.noise_nuisance_basis import build_nuisance_projection
 from estimation.diagnosis.noise_models.whitening import Whitening
@@ -65,7 +63,7 @@ def test_neither_rests_nor_effects_colour_the_noise(arm: Robot, arm_plant: Calla
     recording = build_recording(arm, [replace(log, tau=tau)])
     baseline = build_baseline(base_parameters(arm, "coulomb-viscous", (0.001, 0.001)), recording)
     pull = base_model_prior(baseline, recording)
-    values = fit_values(baseline, recording.tau.std(axis=0), recording.sign_unknown, recording.tau, pull)
+    values = baseline.fitted(~recording.sign_unknown / recording.tau.std(axis=0), recording.tau, pull)
     residual = recording.tau - baseline.regressor @ values
     assert recording.sign_unknown.mean() > 0.2
     spared = build_nuisance_projection(recording, baseline, residual)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter
 
-from estimation.diagnosis.noise_models.spectral_lines import remove_lines
+from estimation.diagnosis.noise_models.noise_spectrum import remove_lines
 
 ROWS, STEP = 15_000, 0.004
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from estimation.diagnosis.recordings.constant_speed import CRUISE, remove_encoder_lines
+from estimation.diagnosis.recordings.smoothed_motion import CRUISE, remove_encoder_lines
 
 STEP, COUNT = 0.004, 5e-5
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from estimation.diagnosis.recordings.harmonic_projection import project_on_harmonics
+from estimation.diagnosis.recordings.smoothed_motion import project_on_harmonics
 from estimation.preprocessing import find_cycle
 from tests.estimation.periodic_motion import STEP, periodic_motion
 

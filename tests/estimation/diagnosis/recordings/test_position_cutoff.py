@@ -10,8 +10,7 @@ import pytest
 from scipy.signal import lfilter
 
 from estimation.diagnosis.recordings.log_reading import build_recording
-from estimation.diagnosis.recordings.position_cutoff import CAPS, select_position_cutoff
-from estimation.diagnosis.recordings.position_spectra import Spectra
+from estimation.diagnosis.recordings.position_spectra import CAPS, Spectra, select_position_cutoff
 from estimation.diagnosis.recordings.smoothed_motion import smooth_motion
 from estimation.regressions.preparation import prepare
 from robots.plants import simulate

@@ -72,7 +72,7 @@ def test_parts_of_a_thinned_log_keep_all_their_samples(thin_log: Recording) -> N
     for part in (first, second):
         assert part.full_rate is not None
         np.testing.assert_array_equal(part.t, part.full_rate.t[::2])
-    whole = join_recordings(first, second)
+    whole = join_recordings([first, second])
     assert whole.full_rate is not None
     assert whole.stride == 2
     assert len(whole.full_rate.starts) == 2

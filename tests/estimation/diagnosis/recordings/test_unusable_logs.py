@@ -10,8 +10,8 @@ import pytest
 
 from estimation import diagnose
 from estimation.diagnosis.base_models.baseline import base_parameters
+from estimation.diagnosis.base_models.prepared_logs import find_unusable_logs
 from estimation.diagnosis.recordings.log_reading import build_recording
-from estimation.diagnosis.recordings.unusable_logs import find_unusable_logs
 from robots.robot import Robot
 from robots.signals import Log
 

@@ -7,9 +7,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from scipy.ndimage import maximum_filter1d
 
-from estimation.diagnosis.calibration import IMPACT_SHARE, MAX_HIGH_BAND_ERROR, REVERSAL_MARGIN
+from estimation.diagnosis.calibration import MAX_HIGH_BAND_ERROR, REVERSAL_MARGIN
 from estimation.diagnosis.hypothesis_tests.fitted_effects import FittedEffect
 from estimation.diagnosis.hypothesis_tests.hypotheses import Hypothesis
 from estimation.diagnosis.hypothesis_tests.problem import Problem
@@ -18,7 +17,6 @@ from estimation.diagnosis.hypothesis_tests.scoring import accept, score
 from estimation.diagnosis.recordings.log_reading import build_recording
 from estimation.diagnosis.recordings.recording import Recording
 from estimation.diagnosis.reversals.reversal_impulses import find_reversals
-from estimation.diagnosis.searches.acceptance import ANSWERS, MOSTLY, delay_supported_away_from_impacts
 from robots.plants import simulate
 from robots.robot import Robot
 from robots.signals import Log, Motion
@@ -119,30 +117,6 @@ def test_kicks_without_the_rest_are_no_effect(problem: Problem) -> None:
     assert parts.gram.sum(axis=1)[0] ** 2 / parts.gram[0, 0] > 20, "calm rows show too little for this test"
     assert _reversal_scatter(_with(problem, member, -0.2, 1.0), member, nothing) == np.inf
     assert 1.0 < _reversal_scatter(_with(problem, member, 0.55, 2.0), member, nothing) < np.inf
-
-
-@pytest.mark.parametrize(("aside", "reported"), [(1.0, True), (0.0, False), (0.3, False)])
-def test_a_delay_must_be_reported_aside_from_the_kicks_of_a_play(
-    problem: Problem, aside: float, reported: bool
-) -> None:
-    """A delay that shows only near the impacts of backlash is not supported."""
-    reach = round(ANSWERS / (problem.recording.step * problem.whitening.stride))
-    # The link must cross seldom enough that rows without impacts are left.
-    for shape in PLAY.effect.grid(problem.situation, 2):
-        play = FittedEffect(PLAY, shape, problem.measured(PLAY, shape), 1e3, np.array([1e-3]), 4, 1.0)
-        torque = np.max([np.abs(part @ play.coefficients) for part in play.group.columns], axis=0)
-        near = maximum_filter1d(torque > IMPACT_SHARE * torque.max(), 2 * reach + 1)
-        if near.mean() < MOSTLY:
-            break
-    assert 0.05 < near.mean() < MOSTLY
-    lag = Hypothesis(EFFECTS["time_delay"], None)
-    at = lag.effect.grid(problem.state_for(lag.effect), None)[0]
-    group = problem.measured(lag, at)
-    late = FittedEffect(lag, at, group, 1e4, np.array([50.0 / np.sqrt(group.gram[0, 0])]), 1, 1.0)
-    data = _sized(problem, late, np.where(near, 1.0, aside))
-    assert delay_supported_away_from_impacts(data, late, [play]) is reported
-    # Without an effect that causes impacts, no support is required.
-    assert delay_supported_away_from_impacts(data, late, [])
 
 
 def test_above_the_bands_play_counts_in_calm_rows(problem: Problem) -> None:

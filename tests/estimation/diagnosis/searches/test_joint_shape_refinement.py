@@ -13,7 +13,7 @@ from estimation.diagnosis.hypothesis_tests.problem import Problem
 from estimation.diagnosis.hypothesis_tests.refinement import refine
 from estimation.diagnosis.hypothesis_tests.scoring import accept
 from estimation.diagnosis.recordings.log_reading import build_recording
-from estimation.diagnosis.searches.joint_shape_refinement import refine_shapes_jointly
+from estimation.diagnosis.searches.joint_refinement import refine_shapes_jointly
 from estimation.diagnosis.searches.selection import FAR_MORE, _refit_with_candidate
 from robots.robot import Robot
 from robots.signals import Log

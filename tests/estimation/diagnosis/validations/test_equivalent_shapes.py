@@ -11,9 +11,8 @@ import pytest
 from estimation.diagnosis.base_models.baseline import base_parameters, build_baseline
 from estimation.diagnosis.calibration import MAX_SHAPE_CHI2
 from estimation.diagnosis.experiment_plans.planned_limits import planned_problem
-from estimation.diagnosis.hypothesis_tests.groups import Group
 from estimation.diagnosis.hypothesis_tests.hypotheses import Hypothesis
-from estimation.diagnosis.hypothesis_tests.problem import Problem
+from estimation.diagnosis.hypothesis_tests.problem import Group, Problem
 from estimation.diagnosis.hypothesis_tests.refinement import refine
 from estimation.diagnosis.hypothesis_tests.scoring import Accepted, accept
 from estimation.diagnosis.joint_fits.extended_fit import fit_extended

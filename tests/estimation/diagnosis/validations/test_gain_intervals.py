@@ -111,7 +111,7 @@ def _other_motion(seed: int, effect: float, there: float) -> HeldOutErrors:
     moving = np.zeros((rows, 1), dtype=bool)
     problem = SimpleNamespace(
         recording=Rows(sign_unknown=moving, tau=tau),
-        baseline=SimpleNamespace(regressor=Y, nuisance=np.zeros((rows, 1, 0))),
+        baseline=SimpleNamespace(columns=Y),
         whitening=SimpleNamespace(scales=lambda count: np.ones((count, 1)), scale=np.ones(1), row_weight=1.0),
     )
     other = Rows(sign_unknown=moving, tau=unseen, t=t, step=0.01, runs=[slice(0, rows)], names=("other",))

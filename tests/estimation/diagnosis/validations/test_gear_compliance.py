@@ -11,9 +11,7 @@ from scipy.interpolate import CubicSpline
 from scipy.signal import lfilter
 
 from estimation.diagnosis import Diagnosis, diagnose
-from estimation.diagnosis.base_models.baseline import base_parameters, build_baseline
-from estimation.diagnosis.base_models.priors import base_model_prior
-from estimation.diagnosis.hypothesis_tests.problem_setup import fit_values
+from estimation.diagnosis.base_models.baseline import base_model_prior, base_parameters, build_baseline
 from estimation.diagnosis.recordings.log_reading import build_recording
 from estimation.diagnosis.validations.gear_compliance import MeasuredCompliance, measure_gear_compliance
 from robots.plants import simulate
@@ -42,8 +40,8 @@ def found_in(robot: Robot, log: Log, **options: object) -> tuple[MeasuredComplia
     """Measures the gear compliance with a fit of the base model only."""
     recording = build_recording(robot, [log])
     base = build_baseline(base_parameters(robot, "coulomb-viscous", (0.001,) * robot.n), recording)
-    scale = recording.tau.std(axis=0)
-    values = fit_values(base, scale, recording.sign_unknown, recording.tau, base_model_prior(base, recording))
+    weights = ~recording.sign_unknown / recording.tau.std(axis=0)
+    values = base.fitted(weights, recording.tau, base_model_prior(base, recording))
     return measure_gear_compliance(base.situation(recording, values), recording, [log], false_alarm=0.01, **options)
 
 

@@ -39,7 +39,13 @@ def _compared(
     adding(monkeypatch, {id(m.group): m.gain for m in (*names, *in_place, *left)})
 
     def free(
-        problem: object, entries: object, beside: Sequence[FittedEffect], chance: float, *, alone: bool = False
+        problem: object,
+        entries: object,
+        beside: Sequence[FittedEffect],
+        chance: float,
+        *,
+        alone: bool = False,
+        most: int = 0,
     ) -> tuple[list[FittedEffect], list[float]]:
         functions = list(left) if alone else list(in_place)
         return functions, [1e-30] * len(functions)
@@ -87,7 +93,13 @@ def test_of_several_names_on_a_joint_the_weakest_goes_first(monkeypatch: pytest.
     adding(monkeypatch, {id(m.group): m.gain for m in (*names, here)})
 
     def free(
-        problem: object, entries: object, beside: Sequence[FittedEffect], chance: float, *, alone: bool = False
+        problem: object,
+        entries: object,
+        beside: Sequence[FittedEffect],
+        chance: float,
+        *,
+        alone: bool = False,
+        most: int = 0,
     ) -> tuple[list[FittedEffect], list[float]]:
         if alone or {m.hypothesis.joint for m in beside} != {2}:
             return [], []

@@ -10,8 +10,8 @@ import pytest
 
 from estimation import diagnose
 from estimation.diagnosis.recordings.log_reading import build_recording
+from estimation.diagnosis.validations.extended_model import with_band, with_best_cutoff, with_best_sign_sharpness
 from estimation.diagnosis.validations.gain_intervals import HeldOutErrors
-from estimation.diagnosis.validations.prediction_settings import with_band, with_best_cutoff, with_best_sign_sharpness
 from estimation.models.extension import Extension
 from estimation.models.model import Model
 from estimation.predictions.prediction import predict

@@ -12,9 +12,8 @@ from estimation.diagnosis.hypothesis_tests.hypotheses import Hypothesis
 from estimation.diagnosis.hypothesis_tests.problem import Problem
 from estimation.diagnosis.hypothesis_tests.refinement import refine
 from estimation.diagnosis.hypothesis_tests.scoring import accept
-from estimation.diagnosis.joint_fits.extended_fit import dense
 from estimation.diagnosis.recordings.log_reading import build_recording
-from estimation.diagnosis.searches.relinearisation import relinearise
+from estimation.diagnosis.searches.joint_refinement import relinearise
 from robots.robot import Robot
 from robots.signals import Log
 from robots.terms.effects import EFFECTS
@@ -29,7 +28,7 @@ def test_compliance_is_that_of_the_robot_without_the_effect(
     hypothesis = Hypothesis(EFFECTS["joint_elasticity"], 1)
     plain = pose_arm(recording)
     shape = hypothesis.effect.grid(plain.situation, 1)[5]
-    columns = dense(plain, hypothesis, shape)[:, :, 0]
+    columns = plain.dense(hypothesis, shape)[:, :, 0]
     compliance = 0.5 * recording.tau[:, 0].std() / columns[:, 0].std()
     posed = pose_arm(replace(recording, tau=recording.tau + compliance * columns))
     first = refine(posed, hypothesis, shape, accept(posed, ()), effort=10)

@@ -1,4 +1,8 @@
-"""Joint refinement of the shapes of several effects on one joint, which converges slowly one at a time."""
+"""Refinement of several effects together: with the base model beside them, and of shapes on one joint.
+
+The torque of an elastic or loose gear is linear in the base model's load and inertia. A base model that was fitted
+without the effect has absorbed part of it, so the effect's first fit is biased.
+"""
 
 from __future__ import annotations
 
@@ -11,7 +15,63 @@ from estimation.diagnosis.hypothesis_tests.fitted_effects import FittedEffect, a
 from estimation.diagnosis.hypothesis_tests.problem import Problem
 from estimation.diagnosis.hypothesis_tests.refinement import refine
 from estimation.diagnosis.hypothesis_tests.scoring import accept
-from robots.terms.effect_bases.capabilities import Reading
+from estimation.diagnosis.searches.swap_search import remeasure
+from robots.terms.effect_bases.capabilities import AtReversals, Reading
+from robots.terms.effect_bases.gear_load import with_gear_load
+
+RELINEARISATIONS = 3
+# Change of the effects' torque, as a share, below which base model and effects agree.
+CONVERGED = 0.03
+# Evaluations per shape parameter in each round: the shapes change little.
+EFFORT = 10
+
+
+def relinearise(problem: Problem, members: Sequence[FittedEffect]) -> tuple[Problem, list[FittedEffect]]:
+    """Repeats the fits of base model and effects until the effects change little.
+
+    Only effects that follow accelerations need this. Effects on the reading of the torque exclude it.
+
+    Args:
+        problem: whitened data.
+        members: effects in the model.
+
+    Returns:
+        The data with the base model beside the effects, and the effects fitted there.
+    """
+    effects = [member.hypothesis.effect for member in members]
+    driven = any(effect.at_reversals is AtReversals.IMPACT for effect in effects)
+    if not driven or any(effect.reading is not Reading.ADDS for effect in effects):
+        return problem, list(members)
+    members = list(members)
+    torques = [m.torque(problem) for m in members]
+    for _ in range(RELINEARISATIONS):
+        problem = _with_base_model_beside(problem, np.sum(torques, axis=0))
+        members = [replace(m, group=problem.measured(m.hypothesis, m.shape)) for m in members]
+        for i, member in enumerate(members):
+            members[i] = refine(
+                problem,
+                member.hypothesis,
+                member.shape,
+                accept_all_but(problem, members, i),
+                effort=EFFORT,
+                others=False,
+            )
+        members = [remeasure(problem, m, accept_all_but(problem, members, i)) for i, m in enumerate(members)]
+        before, torques = torques, [m.torque(problem) for m in members]
+        changes = [np.sum((b - a) ** 2) / max(np.sum(a**2), 1e-300) for a, b in zip(before, torques, strict=True)]
+        if max(changes) < CONVERGED**2:
+            break
+    return problem, members
+
+
+def _with_base_model_beside(problem: Problem, extra: np.ndarray) -> Problem:
+    """Fits the base model to the whitened torque without that of effects (N, n), and evaluates the situation there."""
+    baseline, white = problem.baseline, problem.whitening
+    moments = white.moments(baseline.columns, problem.recording.tau - extra)
+    values = moments.pulled(problem.prior.times(1.0 / white.row_weight)).posterior()[: baseline.base.size]
+    now = with_gear_load(baseline.situation(problem.recording, values), problem.extra_load)
+    return replace(problem, situation=now)
+
 
 ROUNDS = 8  # largest number of rounds
 # Gain of chi2 by a round below which the refinement stops.
