@@ -31,7 +31,7 @@ class Travel(Check):
     def run(self, context: Context) -> list[Finding]:
         """Compares the travel of each joint with its range; the log is refused if no joint moves."""
         robot, columns = context.robot, context.recorded.columns
-        travel, share = columns.travel, travel_shares(robot, columns)
+        travel, share = columns.travel, travel_shares(robot, columns.extremes)
         if not (travel > 0).any():
             return [
                 Finding(

@@ -56,7 +56,7 @@ class TooFewSmoothedRows(Check):
         can_be_fitted = context.smoothed.rows is not None
         if can_be_fitted or not (cleaned.columns.varies.any() and cleaned.columns.travel.any()):
             return []
-        if (travel_shares(context.robot, cleaned.columns) < HARDLY).all():
+        if (travel_shares(context.robot, cleaned.columns.extremes) < HARDLY).all():
             return [
                 Finding(
                     name="no_motion",

@@ -54,6 +54,11 @@ class Columns:
         return Columns(q, signal, prefix, q.min(axis=1), q.max(axis=1), spread, varies)
 
     @property
+    def extremes(self) -> Array:
+        """Lowest and highest positions (2, n)."""
+        return np.array([self.lowest, self.highest])
+
+    @property
     def travel(self) -> Array:
         """Range of the positions (n,)."""
         return self.highest - self.lowest

@@ -16,6 +16,9 @@ Array = NDArray[np.float64]
 AROUND, CHANGE = 0.05, 1e-3
 # Share of a joint's range, or of a turn, below which it hardly moves.
 HARDLY = 0.01
+# A joint is beyond a limit by more than this share of its range: limits of a URDF are often not exact. Without limits,
+# it is beyond its range from so many turns on.
+BEYOND, TURNS = 0.25, 8.0
 
 
 def moving_rows(log: Log, columns: Columns, steps: float = 0.0) -> NDArray[np.bool_]:
@@ -39,11 +42,31 @@ def moving_rows(log: Log, columns: Columns, steps: float = 0.0) -> NDArray[np.bo
     return np.concatenate([edge, moving, edge])
 
 
-def travel_shares(robot: Robot, columns: Columns) -> Array:
-    """Divides the travel of each joint by its range, or by a turn if that is less (n,)."""
+def travel_shares(robot: Robot, q: Array) -> Array:
+    """Divides the travel of each joint by its range, or by a turn if that is less (n,).
+
+    Args:
+        robot: with n joints.
+        q: positions (N, n), or the lowest and highest ones (2, n).
+    """
     range_ = np.asarray(robot.limits.upper) - np.asarray(robot.limits.lower)
     range_ = np.where(np.isfinite(range_), range_, 2 * np.pi)
-    return np.asarray(columns.travel / np.maximum(np.minimum(range_, 2 * np.pi), 1e-12))
+    return np.asarray(np.ptp(q, axis=0) / np.maximum(np.minimum(range_, 2 * np.pi), 1e-12))
+
+
+def beyond_limits(robot: Robot, q: Array) -> NDArray[np.bool_]:
+    """Finds the joints (n,) whose positions are beyond their limits, by more than these are inexact.
+
+    Args:
+        robot: with n joints.
+        q: positions (N, n), or the lowest and highest ones (2, n).
+    """
+    lower, upper = np.asarray(robot.limits.lower, dtype=float), np.asarray(robot.limits.upper, dtype=float)
+    low, high = q.min(axis=0), q.max(axis=0)
+    known = np.isfinite(lower) & np.isfinite(upper)
+    slack = np.where(known, BEYOND * np.maximum(upper - lower, 1e-9), 0.0)
+    lower, upper = np.where(known, lower - slack, -TURNS * 2 * np.pi), np.where(known, upper + slack, TURNS * 2 * np.pi)
+    return np.asarray((low < lower) | (high > upper))
 
 
 def standing_joints(robot: Robot, columns: Columns) -> NDArray[np.bool_]:
@@ -56,5 +79,5 @@ def standing_joints(robot: Robot, columns: Columns) -> NDArray[np.bool_]:
         robot: with n joints.
         columns: of the log.
     """
-    stands: NDArray[np.bool_] = travel_shares(robot, columns) < TREMBLE
+    stands: NDArray[np.bool_] = travel_shares(robot, columns.extremes) < TREMBLE
     return stands

@@ -28,19 +28,17 @@ def gravity_rows(robot: Robot, q: Array) -> Array:
     """
     rows, n = q.shape
     frame = np.tile(np.eye(4), (rows, 1, 1))
-    rotations, origins, axes = [], [], []
+    moved, origins, axes = np.zeros((n, rows, 3, HEAVY)), np.zeros((n, rows, 3)), []
     for j, joint in enumerate(robot.chain.joints):
         frame = frame @ joint.transform(q[:, j])
-        rotations.append(frame[:, :3, :3])
-        origins.append(frame[:, :3, 3])
+        origins[j], moved[j, :, :, 1:] = frame[:, :3, 3], frame[:, :3, :3]
         axes.append(frame[:, :3, :3] @ np.asarray(joint.axis))
-    result = np.zeros((n, rows, 3, LINK * n))
+    result = np.zeros((n, rows, 3, n, LINK))
     for j, joint in enumerate(robot.chain.joints):
-        for i in range(j, n):
-            if joint.kind == "revolute":
-                moved = [np.cross(axes[j], origins[i] - origins[j])]
-                moved += [np.cross(axes[j], rotations[i][:, :, k]) for k in range(3)]
-            else:
-                moved = [axes[j], *(np.zeros((rows, 3)) for _ in range(3))]
-            result[j, :, :, LINK * i : LINK * i + HEAVY] = -np.stack(moved, axis=-1)
-    return result
+        if joint.kind == "revolute":
+            moved[j:, :, :, 0] = origins[j:] - origins[j]
+            turned = np.cross(axes[j][None, :, :, None], moved[j:], axis=2)
+            result[j, :, :, j:, :HEAVY] = -turned.transpose(1, 2, 0, 3)
+        else:
+            result[j, :, :, j:, 0] = -axes[j][:, :, None]
+    return result.reshape(n, rows, 3, LINK * n)

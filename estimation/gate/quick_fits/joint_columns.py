@@ -35,6 +35,20 @@ class JointColumns:
     scale: Array
     used: NDArray[np.intp]
 
+    def with_shared(self, columns: Array, first: int) -> JointColumns:
+        """Appends columns (M, k) of parameters that joints share, after those of the rigid body.
+
+        Args:
+            columns: not scaled.
+            first: number of the first of their parameters.
+        """
+        scale = np.maximum(np.sqrt(np.mean(columns**2, axis=0)), np.finfo(float).tiny)
+        return JointColumns(
+            np.hstack([self.Y[:, :-OWN], columns / scale, self.Y[:, -OWN:]]),
+            np.concatenate([self.scale[:-OWN], scale, self.scale[-OWN:]]),
+            np.concatenate([self.used, first + np.arange(len(scale))]),
+        )
+
 
 def under_gravity(
     robot: Robot, q: Array, bodies: tuple[Array, ...], used: tuple[Places, ...], gravity: Array

@@ -11,6 +11,7 @@ from estimation.gate.quick_fits.cutoff_choice import CHOICE_ROWS
 from estimation.gate.quick_fits.delays import Delay, estimate_delays
 from estimation.gate.quick_fits.joint_fit import JointFit, Rows
 from estimation.gate.quick_fits.joint_physics import JointPhysics, joint_physics, mean_inertias
+from estimation.gate.quick_fits.reading import Reading, as_read
 from estimation.gate.quick_fits.whole_fit import LIKE_A_CONSTANT, fit_all
 from estimation.gate.stages.cleaned import Cleaned
 from estimation.gate.stages.smoothed import Smoothed
@@ -30,10 +31,17 @@ class Fitted:
     """
 
     def __init__(self, cleaned: Cleaned, smoothed: Smoothed, rows: Rows, sharp: Rows) -> None:
-        self.robot, self.rows, self.sharp, self._smoothed = cleaned.robot, rows, sharp, smoothed
+        self.robot, self.rows, self.sharp = cleaned.robot, rows, sharp
+        self._cleaned, self._smoothed = cleaned, smoothed
         self._joints = np.flatnonzero(cleaned.spread > 0)
         self.logged_spread = np.zeros(self.robot.n)
         self.logged_spread[self._joints] = [rows.spread(j, raw=True) for j in self._joints.tolist()]
+
+    def read_as(self, reading: Reading) -> Fitted:
+        """Gives quick fits of these excerpts under a reading."""
+        rows = as_read(self.robot, self.rows, reading)
+        sharp = rows if self.sharp is self.rows else as_read(self.robot, self.sharp, reading)
+        return Fitted(self._cleaned, self._smoothed, rows, sharp)
 
     @cached_property
     def fits(self) -> tuple[JointFit | None, ...]:

@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from estimation.gate.quick_fits.joint_columns import OWN
 from estimation.gate.quick_fits.joint_fit import FOLDS
+from estimation.gate.quick_fits.whole_fit import WholeFit
 from estimation.gate.stages.fitted import Fitted
 
 Array = NDArray[np.float64]
@@ -20,8 +21,8 @@ OWN_WEIGHT = 10.0
 RIDGES = tuple(10.0 ** np.arange(-6, 1))
 
 
-def any_arm(fitted: Fitted) -> Array:
-    """Gives the held-out error of any arm over the torque's standard deviation (n,), NaN for a joint without a fit.
+def any_arm(fitted: Fitted) -> WholeFit:
+    """Gives the held-out error of any arm over the torque's standard deviation, as the fit of the described one does.
 
     Gravity and inertia of any serial arm are sums of products of 1, sin q_k and cos q_k over the joints k, those of the
     inertia times an acceleration. A kernel ridge regression holds all these products, ``prod_k (1 + c cos(q_k - q_k'))
@@ -40,18 +41,22 @@ def any_arm(fitted: Fitted) -> Array:
     counted = ~rows.rest[kept][:, joints]
     own = np.hstack([part.Y[kept, -OWN:] for part in rows.joints])
     kernel = _links(rows.q[kept], fitted.robot.chain.kinds, rows.ddq[kept]) + OWN_WEIGHT * own @ own.T
-    squares = np.zeros((len(RIDGES), len(joints)))
-    for held in np.array_split(np.arange(len(kept)), FOLDS):
+    squares = np.zeros((len(RIDGES), len(joints), FOLDS))
+    folds = np.array_split(np.arange(len(kept)), FOLDS)
+    for fold, held in enumerate(folds):
         others = np.setdiff1d(np.arange(len(kept)), held)
         values, ways = np.linalg.eigh(kernel[np.ix_(others, others)])
         parts, across = ways.T @ tau[others], kernel[np.ix_(held, others)] @ ways
         size = float(np.mean(values))
         for place, ridge in enumerate(RIDGES):
             found = across @ (parts / (np.maximum(values, 0.0) + ridge * size * len(others))[:, None])
-            squares[place] += np.sum((tau[held] - found) ** 2 * counted[held], axis=0)
-    errors = np.full(len(spread), np.nan)
-    errors[joints] = np.sqrt(squares.min(axis=0) / np.maximum(counted.sum(axis=0), 1))
-    return errors
+            squares[place, :, fold] = np.sum((tau[held] - found) ** 2 * counted[held], axis=0)
+    rows = np.array([np.count_nonzero(counted[held], axis=0) for held in folds]).T
+    best = np.take_along_axis(squares, squares.sum(axis=2).argmin(axis=0)[None, :, None], axis=0)[0]
+    errors, by_fold = np.full(len(spread), np.nan), np.full((len(spread), FOLDS), np.nan)
+    errors[joints] = np.sqrt(best.sum(axis=1) / np.maximum(rows.sum(axis=1), 1))
+    by_fold[joints] = np.where(rows > 0, np.sqrt(best / np.maximum(rows, 1)), np.nan)
+    return WholeFit(errors, by_fold)
 
 
 def _links(q: Array, kinds: tuple[str, ...], ddq: Array) -> Array:

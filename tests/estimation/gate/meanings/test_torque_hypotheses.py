@@ -7,8 +7,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from estimation.gate.candidates.torque_evidence import FACTORS, STEP, JointEvidence
-from estimation.gate.candidates.torque_hypotheses import hypotheses
+from estimation.gate.meanings.described import FACTORS, STEP, JointEvidence
+from estimation.gate.meanings.hypotheses import hypotheses
 
 
 def evidence_of(joint: int, factor: float, *, described: float = 1000.0, multiple: float = 1000.0) -> JointEvidence:
@@ -23,6 +23,7 @@ def evidence_of(joint: int, factor: float, *, described: float = 1000.0, multipl
         multiple=multiple + fit,
         weightless=0.0,
         external=0.0,
+        alone=0.0,
         size=factor,
         friction=0.1,
     )
@@ -34,13 +35,16 @@ def test_each_joint_may_be_described_wrong_by_its_own_factor(er3a):
     assert best.odds < 4.0
 
 
-@pytest.mark.parametrize(("factor", "likely"), [(1 / 20, True), (54.0, False)])
-def test_a_current_on_one_joint_is_smaller_than_the_torque(er3a, factor, likely):
-    """Beside torques of other joints, a column is a current [A] but no other unit."""
+@pytest.mark.parametrize(("factor", "kind"), [(1 / 20, "current"), (54.0, None), (1000.0, "unit")])
+def test_a_current_on_one_joint_is_smaller_than_the_torque(er3a, factor, kind):
+    """Beside torques of other joints, a column is a current [A] or in another unit, but no other multiple."""
     others = [evidence_of(joint, 1.0) for joint in range(5)]
     far = evidence_of(5, factor, multiple=25.0)
     far = replace(far, described=np.zeros_like(far.factors))
-    assert (hypotheses(er3a, [*others, far])[0].odds > 8.0) is likely
+    best = hypotheses(er3a, [*others, far])[0]
+    assert (best.kind if best.odds > 8.0 else None) == kind
+    assert best.joints == (5,) or kind is None
+    assert best.unit == (factor if kind == "unit" else None)
 
 
 def test_all_joints_may_have_any_unit(er3a):

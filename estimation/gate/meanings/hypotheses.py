@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.special import logsumexp
 
-from estimation.gate.candidates.torque_evidence import FACTORS, JointEvidence
+from estimation.gate.meanings.described import FACTORS, JointEvidence
 from robots.robot import Robot
 
 Array = NDArray[np.float64]
@@ -19,6 +20,8 @@ Factor = Callable[[JointEvidence], float]
 GEARS = (15.0, 400.0)
 # Factors of currents [A] on the torque [N m], where other joints have torques. Other units are those of a whole log.
 CURRENTS = (1 / 300, 3.0)
+# Factors of other units on a torque. Those of single joints have none but these.
+UNITS = {1e3: "mN m (N mm)", 1e-3: "kN m"}
 # From this gear ratio on, a stated one is a gear.
 GEARED = 2.0
 
@@ -32,12 +35,14 @@ class Hypothesis:
         odds: log of its evidence over that of joint torques.
         joints: to which it applies, counted from 0.
         factors: most likely factor on the described torque of each of these joints.
+        unit: of the torque, as its factor; None for no known one.
     """
 
     kind: str
     odds: float
     joints: tuple[int, ...]
     factors: tuple[float, ...]
+    unit: float | None = None
 
 
 def hypotheses(robot: Robot, evidence: Sequence[JointEvidence]) -> list[Hypothesis]:
@@ -74,6 +79,10 @@ def hypotheses(robot: Robot, evidence: Sequence[JointEvidence]) -> list[Hypothes
         _some("current", evidence, right, lambda one: one.between(*CURRENTS)),
         _some("motor", evidence, right, _geared(robot)),
     ]
+    for unit in UNITS:
+        odds = shared.at(unit) - right - float(np.log(len(UNITS)))
+        found.append(Hypothesis("unit", odds, joints, (best_factor(shared),) * len(joints), unit))
+        found.append(replace(_some("unit", evidence, right, partial(JointEvidence.at, factor=unit)), unit=unit))
     for kind, scale in (("current", np.abs(robot.torque_constant)), ("percent", np.asarray(robot.limits.torque) / 100)):
         stated = np.asarray(scale, dtype=float)[list(joints)]
         if np.isfinite(stated).all() and (stated > 0).all():

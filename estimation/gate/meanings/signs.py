@@ -2,24 +2,17 @@
 
 from __future__ import annotations
 
-from typing import ClassVar
-
 import numpy as np
-from numpy.typing import NDArray
 
-from estimation.gate.candidates.candidate_fits import CandidateFits, Meaning
-from estimation.gate.candidates.cause_findings import opposite
-from estimation.gate.check import Check
-from estimation.gate.context import Context, Stage
 from estimation.gate.finding import Finding
+from estimation.gate.meanings.comparison import Comparison
 from estimation.gate.quick_fits.joint_columns import OWN
 from estimation.gate.quick_fits.joint_fit import JointFit
 from estimation.gate.quick_fits.joint_physics import JointPhysics, described_ratio
+from estimation.gate.quick_fits.reading import Reading, scaled
 from estimation.gate.quick_fits.whole_fit import POORLY_EXPLAINED
 from estimation.gate.stages.fitted import Fitted
 from robots.robot import Robot
-
-Array = NDArray[np.float64]
 
 # Standard errors below zero from which inertia or friction is negative. The second one is for friction alone: a spring
 # or a balancer that the model lacks can look like negative friction.
@@ -36,56 +29,51 @@ SMALL_TORQUE = 0.01
 COMPACT, GRAVITY = 0.01, 9.81
 
 
-class TorqueSigns(Check):
-    """Finds torques with a negative inertia or a driving friction, unless the other joints contradict."""
+def sign_findings(fitted: Fitted, prefix: str, *, likely: bool) -> tuple[list[Finding], list[Finding]]:
+    """Finds torques with a negative inertia or a driving friction, unless the other joints contradict.
 
-    name: ClassVar[str] = "torque_signs"
-    stage: ClassVar[Stage] = Stage.FITTED
-    order: ClassVar[int] = 20
+    Args:
+        fitted: the log as it is read.
+        prefix: of its torques or currents.
+        likely: whether the columns hold torques: those of another meaning may have any sign.
 
-    def run(self, context: Context) -> list[Finding]:
-        """Looks at inertia and friction of each joint, then at the fit of all joints."""
-        fitted, prefix = context.fitted, context.cleaned.columns.prefix
-        significances = [(0.0, 0.0) if found is None else found.significances for found in fitted.physics]
-        backwards = 2 * sum(friction < -CLEARLY_NEGATIVE for _, friction in significances) > len(significances)
-        plausible = [inertia > NEGATIVE or friction > CLEARLY_NEGATIVE for inertia, friction in significances]
-        findings = []
-        opposite: dict[int, bool] = {}  # joints with a torque of opposite sign, and whether that is certain
-        for joint, (fit, found) in enumerate(zip(fitted.fits, fitted.physics, strict=True)):
-            if fit is None or found is None:
+    Returns:
+        Torques with the opposite sign, without an action; and what else contradicts physics.
+    """
+    robot = fitted.robot
+    significances = [(0.0, 0.0) if found is None else found.significances for found in fitted.physics]
+    backwards = 2 * sum(friction < -CLEARLY_NEGATIVE for _, friction in significances) > len(significances)
+    plausible = [inertia > NEGATIVE or friction > CLEARLY_NEGATIVE for inertia, friction in significances]
+    opposite, others = [], []
+    for joint, (fit, found) in enumerate(zip(fitted.fits, fitted.physics, strict=True)):
+        if fit is None or found is None:
+            continue
+        inertia, friction = significances[joint]
+        drives = -found.loss > DRIVING_SHARE * found.power
+        negative = inertia < -NEGATIVE and friction < NEGATIVE / 2
+        # The other joints move the same links: the opposite sign would fit them better if this one were wrong.
+        contradicted = any(plausible[:joint] + plausible[joint + 1 :]) and _sign_cost(fitted, joint) > SIGN_COST
+        if _is_moved_by_others(fit, found, joint, robot):
+            others.append(_moved_by_others(found, prefix, joint))
+        elif friction < -CLEARLY_NEGATIVE and inertia > NEGATIVE and drives:
+            # Time that runs backwards makes the friction of all joints drive.
+            certain = backwards and fitted.unexplained[joint] < POORLY_EXPLAINED
+            others.append(_negative_friction(found, prefix, joint, certain))
+        elif (negative or (friction < -NEGATIVE and inertia < NEGATIVE / 2 and drives)) and not contradicted:
+            described = described_ratio(robot, fit)
+            if described is not None and described[0] > 0 and described[1] > SAME_SIGN:
                 continue
-            inertia, friction = significances[joint]
-            drives = -found.loss > DRIVING_SHARE * found.power
-            negative = inertia < -NEGATIVE and friction < NEGATIVE / 2
-            # The other joints move the same links: the opposite sign would fit them better if this one were wrong.
-            contradicted = any(plausible[:joint] + plausible[joint + 1 :]) and _sign_cost(fitted, joint) > SIGN_COST
-            if _is_moved_by_others(fit, found, joint, context.robot):
-                findings.append(_moved_by_others(found, prefix, joint))
-            elif friction < -CLEARLY_NEGATIVE and inertia > NEGATIVE and drives:
-                # Time that runs backwards makes the friction of all joints drive.
-                certain = backwards and fitted.unexplained[joint] < POORLY_EXPLAINED
-                findings.append(_negative_friction(found, prefix, joint, certain))
-            elif (negative or (friction < -NEGATIVE and inertia < NEGATIVE / 2 and drives)) and not contradicted:
-                described = described_ratio(context.robot, fit)
-                if described is not None and described[0] > 0 and described[1] > SAME_SIGN:
-                    continue
-                large = _rms_torque(fitted, joint) > SMALL_TORQUE * _finite(context.robot.limits.torque[joint])
-                opposite[joint] = fitted.unexplained[joint] < POORLY_EXPLAINED and (
-                    negative or (friction < -CLEARLY_NEGATIVE and large)
-                )
-        return findings + [
-            _torque_sign(found, prefix, joint, certain, fitted.robot.n)
-            for joint, certain in opposite.items()
-            for found in [fitted.physics[joint]]
-            if found is not None
-        ]
+            large = _rms_torque(fitted, joint) > SMALL_TORQUE * _finite(robot.limits.torque[joint])
+            clear = negative or (friction < -CLEARLY_NEGATIVE and large)
+            certain = likely and clear and fitted.unexplained[joint] < POORLY_EXPLAINED
+            opposite.append(_opposite(found, prefix, joint, certain))
+    return opposite, others
 
 
 def _sign_cost(fitted: Fitted, joint: int) -> float:
     """Gives the increase of the error (mean log) by the opposite sign of a joint's torque."""
-    fits, sign = CandidateFits(fitted), np.ones(fitted.robot.n)
-    sign[joint] = -1.0
-    return fits.cost(Meaning(tau_factor=sign)) - fits.cost(Meaning())
+    fits = Comparison(fitted)
+    return fits.cost(scaled(fitted.robot.n, joint, tau=-1.0)) - fits.cost(Reading())
 
 
 def _rms_torque(fitted: Fitted, joint: int) -> float:
@@ -138,14 +126,14 @@ def _negative_friction(found: JointPhysics, prefix: str, joint: int, certain: bo
     )
 
 
-def _torque_sign(found: JointPhysics, prefix: str, joint: int, certain: bool, joints: int) -> Finding:
+def _opposite(found: JointPhysics, prefix: str, joint: int, certain: bool) -> Finding:
     return Finding(
         name="torque_sign",
         severity="refuse" if certain else "warning",
         text=f"implausible: with this torque the joint's inertia is {found.inertia:.3g} (standard error "
         f"{found.inertia_error:.2g}) and its friction power is {found.loss:.3g} W ({found.loss_error:.2g}): "
         + ("its sign is inverted" if certain else "it accelerates instead of braking"),
-        action=f"state {opposite(joints, joint)} for the torque in a mapping (--mapping)",
+        action="",
         value=found.loss,
         unit="W",
         column=f"{prefix}{joint + 1}",
