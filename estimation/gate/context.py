@@ -7,11 +7,11 @@ from enum import IntEnum
 from functools import cached_property
 
 from estimation.gate.finding import Finding
+from estimation.gate.quick_fits.cutoff_choice import Smoothed
+from estimation.gate.quick_fits.fitted import Fitted
 from estimation.gate.quick_fits.reading import Reading
-from estimation.gate.stages.cleaned import Cleaned
-from estimation.gate.stages.fitted import Fitted
-from estimation.gate.stages.recorded import Recorded
-from estimation.gate.stages.smoothed import Smoothed
+from estimation.recordings.rows.one_log import Recorded
+from estimation.recordings.rows.row_flags import Cleaned
 from robots.robot import Robot
 from robots.signals import Log
 
@@ -20,6 +20,7 @@ CAUSES = (
     "motor_side_position",
     "other_robot",
     "row_counter",
+    "short",
     "static_poses",
     "unit_of_position",
     "unit_of_time",

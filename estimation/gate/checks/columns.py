@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from estimation.gate.check import Check
 from estimation.gate.context import Context, Stage
 from estimation.gate.finding import Finding
-from estimation.gate.measurements.columns import Columns
+from estimation.recordings.rows.columns import Columns
 from robots.common.stretches import ends
 
 Array = NDArray[np.float64]

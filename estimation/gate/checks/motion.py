@@ -12,8 +12,8 @@ from scipy.ndimage import maximum_filter1d
 from estimation.gate.check import Check
 from estimation.gate.context import Context, Stage
 from estimation.gate.finding import Finding
-from estimation.gate.measurements.motion import HARDLY, travel_shares
-from estimation.gate.measurements.wraps import Wraps
+from estimation.recordings.rows.motion import HARDLY, travel_shares
+from estimation.recordings.rows.wraps import Wraps
 from robots.common.plain import percent, several
 from robots.common.stretches import spans
 from robots.robot import Robot

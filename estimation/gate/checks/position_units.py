@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 from estimation.gate.check import Check
 from estimation.gate.context import Context, Stage
 from estimation.gate.finding import Finding
-from estimation.gate.measurements.columns import Columns
-from estimation.gate.measurements.motion import beyond_limits
+from estimation.recordings.rows.columns import Columns
+from estimation.recordings.rows.motion import beyond_limits
 from robots.robot import Robot
 
 Array = NDArray[np.float64]

@@ -7,16 +7,20 @@ from typing import ClassVar
 from estimation.gate.check import Check
 from estimation.gate.context import Context, Stage
 from estimation.gate.finding import Finding
-from estimation.gate.measurements.late_rows import Rounding, Stalls
-from estimation.gate.measurements.motion import HARDLY, travel_shares
-from estimation.gate.measurements.outliers import are_isolated
-from estimation.gate.measurements.timing import FEWEST
+from estimation.gate.quick_fits.whole_fit import LIKE_A_CONSTANT
+from estimation.recordings.rows.late_rows import Rounding, Stalls
+from estimation.recordings.rows.motion import HARDLY, travel_shares
+from estimation.recordings.rows.outliers import are_isolated
+from estimation.recordings.rows.row_flags import flagged
+from estimation.recordings.rows.timing import FEWEST
 from robots.common.plain import several
 
 # Parameters of a joint: ten of its link, and rotor inertia, Coulomb and viscous friction, and offset.
 PER_JOINT = 14
 # Rows per parameter below which standard errors are unreliable.
 ROWS_PER_PARAMETER = 10
+# Share of the log in which the arm moves, up to which it stands nearly always.
+RESTING = 0.1
 
 
 class TooFewRows(Check):
@@ -76,6 +80,32 @@ class TooFewSmoothedRows(Check):
                 action="record a longer log, without gaps",
                 value=float(longest),
                 unit="rows",
+            )
+        ]
+
+
+class LittleMotion(Check):
+    """Refuses a log in which the arm stands nearly always, and moves too little for a fit."""
+
+    name: ClassVar[str] = "little_motion"
+    stage: ClassVar[Stage] = Stage.FITTED
+    order: ClassVar[int] = 5
+
+    def run(self, context: Context) -> list[Finding]:
+        """Looks at the rows in which any joint moves, if none of the torques follows from the motion."""
+        moved = float(1 - flagged(context.recorded, "at rest").all(axis=1).mean()) * context.recorded.log.duration
+        explained = bool((context.logged.unexplained < LIKE_A_CONSTANT).any())
+        if explained or moved > RESTING * context.recorded.log.duration:
+            return []
+        return [
+            Finding(
+                name="short",
+                severity="refuse",
+                text=f"the arm moves in {moved:.2g} s of {context.recorded.log.duration:.4g} s, and stands in the others: "
+                "too little to fit and validate a model",
+                action="record a longer motion; rows at rest tell nothing",
+                value=moved,
+                unit="s",
             )
         ]
 

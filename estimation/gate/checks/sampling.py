@@ -9,8 +9,7 @@ import numpy as np
 from estimation.gate.check import Check
 from estimation.gate.context import Context, Stage
 from estimation.gate.finding import Finding
-from estimation.gate.measurements.clock_steps import ClockSteps
-from estimation.gate.measurements.timing import FEWEST, Timing
+from estimation.recordings.rows.timing import FEWEST, ClockSteps, Timing
 from robots.common.plain import several
 from robots.signals import Log
 

@@ -10,9 +10,9 @@ from numpy.typing import NDArray
 from estimation.gate.check import Check
 from estimation.gate.context import Context, Stage
 from estimation.gate.finding import Finding
-from estimation.gate.quick_fits.gravity_rows import gravity_rows
+from estimation.gate.quick_fits.fitted import Fitted
 from estimation.gate.quick_fits.joint_columns import OWN
-from estimation.gate.stages.fitted import Fitted
+from estimation.gate.quick_fits.rigid_body import gravity_rows
 from robots.common.plain import joints_in_words, two_digits
 from robots.common.stretches import joined_spans
 

@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from estimation.gate.quick_fits.fitted import Fitted
 from estimation.gate.quick_fits.joint_columns import OWN
 from estimation.gate.quick_fits.joint_fit import FOLDS
 from estimation.gate.quick_fits.whole_fit import WholeFit
-from estimation.gate.stages.fitted import Fitted
 
 Array = NDArray[np.float64]
 

@@ -10,12 +10,12 @@ from numpy.typing import NDArray
 from scipy.optimize import minimize
 
 from estimation.gate.quick_fits.cutoff_choice import CHOICE_ROWS
-from estimation.gate.quick_fits.gravity_rows import gravity_rows
+from estimation.gate.quick_fits.fitted import Fitted
 from estimation.gate.quick_fits.joint_columns import OWN, SHARP
 from estimation.gate.quick_fits.joint_fit import Rows
 from estimation.gate.quick_fits.reading import Reading, moved, with_torques
+from estimation.gate.quick_fits.rigid_body import gravity_rows
 from estimation.gate.quick_fits.whole_fit import RIDGES, WholeFit, fit_all
-from estimation.gate.stages.fitted import Fitted
 from robots.robot import Robot
 
 Array = NDArray[np.float64]

@@ -10,10 +10,10 @@ from scipy.special import logsumexp
 from scipy.stats import norm
 
 from estimation.gate.quick_fits.cutoff_choice import CHOICE_ROWS
-from estimation.gate.quick_fits.gravity_rows import HEAVY, LINK, gravity_rows
+from estimation.gate.quick_fits.fitted import Fitted
 from estimation.gate.quick_fits.joint_columns import OWN
 from estimation.gate.quick_fits.joint_fit import OWN_RIDGE
-from estimation.gate.stages.fitted import Fitted
+from estimation.gate.quick_fits.rigid_body import HEAVY, LINK, gravity_rows
 from estimation.linear_algebra.scaled import solve_ridge
 from estimation.regressions.parameter_priors import link_spreads
 

@@ -13,10 +13,10 @@ from estimation.gate.meanings.changes import SAME, Change, angle_between, column
 from estimation.gate.meanings.comparison import STANDARD, Comparison, mean_log
 from estimation.gate.meanings.described import JointEvidence
 from estimation.gate.meanings.hypotheses import hypotheses
-from estimation.gate.measurements.motion import HARDLY, beyond_limits, travel_shares
+from estimation.gate.quick_fits.fitted import Fitted
 from estimation.gate.quick_fits.reading import Reading
 from estimation.gate.quick_fits.whole_fit import POORLY_EXPLAINED, WholeFit
-from estimation.gate.stages.fitted import Fitted
+from estimation.recordings.rows.motion import HARDLY, beyond_limits, travel_shares
 from robots.robot import Robot
 
 Array = NDArray[np.float64]

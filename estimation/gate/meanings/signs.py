@@ -6,12 +6,12 @@ import numpy as np
 
 from estimation.gate.finding import Finding
 from estimation.gate.meanings.comparison import Comparison
+from estimation.gate.quick_fits.fitted import Fitted
 from estimation.gate.quick_fits.joint_columns import OWN
 from estimation.gate.quick_fits.joint_fit import JointFit
 from estimation.gate.quick_fits.joint_physics import JointPhysics, described_ratio
 from estimation.gate.quick_fits.reading import Reading, scaled
 from estimation.gate.quick_fits.whole_fit import POORLY_EXPLAINED
-from estimation.gate.stages.fitted import Fitted
 from robots.robot import Robot
 
 # Standard errors below zero from which inertia or friction is negative. The second one is for friction alone: a spring

@@ -11,8 +11,8 @@ from estimation.gate.finding import Finding, Severity
 from estimation.gate.meanings.described import JointEvidence
 from estimation.gate.meanings.findings import WITHOUT_GRAVITY, remedy
 from estimation.gate.meanings.hypotheses import GEARED, UNITS, Hypothesis, hypotheses
+from estimation.gate.quick_fits.fitted import Fitted
 from estimation.gate.quick_fits.reading import Reading
-from estimation.gate.stages.fitted import Fitted
 from robots.common.plain import joints_in_words, percent, two_digits
 from robots.robot import Robot
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from estimation.gate.quick_fits.gravity_rows import gravity_rows
+from estimation.gate.quick_fits.rigid_body import gravity_rows
 from robots.robot import Robot
 
 Array = NDArray[np.float64]

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from estimation.gate.measurements.timing import FEWEST, measure_timing
 from estimation.logs.clocks import uniform_times
+from estimation.recordings.rows.timing import FEWEST, measure_timing
 from robots.signals import Log
 
 Array = NDArray[np.float64]

@@ -8,16 +8,21 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from estimation.gate.measurements.clock_steps import ClockSteps, find_clock_steps
-from estimation.gate.measurements.columns import Columns
-from estimation.gate.measurements.held_torque import between_updates, find_updates
-from estimation.gate.measurements.hung_columns import Hang, cut_hangs, find_hangs
-from estimation.gate.measurements.late_rows import CorrectedTimes, correct_times
-from estimation.gate.measurements.motion import moving_rows, standing_joints
-from estimation.gate.measurements.outliers import find_outliers, isolated_rows
-from estimation.gate.measurements.repeated_rows import RepeatedRows, find_repeated_rows
-from estimation.gate.measurements.timing import Timing, measure_timing
-from estimation.gate.measurements.wraps import Wraps, find_wraps
+from estimation.recordings.rows.columns import Columns
+from estimation.recordings.rows.held_values import (
+    Hang,
+    RepeatedRows,
+    between_updates,
+    cut_hangs,
+    find_hangs,
+    find_repeated_rows,
+    find_updates,
+)
+from estimation.recordings.rows.late_rows import CorrectedTimes, correct_times
+from estimation.recordings.rows.motion import moving_rows, standing_joints
+from estimation.recordings.rows.outliers import find_outliers, isolated_rows
+from estimation.recordings.rows.timing import ClockSteps, Timing, find_clock_steps, measure_timing
+from estimation.recordings.rows.wraps import Wraps, find_wraps
 from robots.robot import Robot
 from robots.signals import Log
 

@@ -1,18 +1,21 @@
-"""Columns that hung: constant while the arm moves, then a jump."""
+"""Values that are old: columns that hung, rows that repeat the row before, torques that are updated less often."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from estimation.gate.measurements.columns import Columns
-from estimation.gate.measurements.timing import FEWEST
+from estimation.recordings.rows.columns import Columns
+from estimation.recordings.rows.motion import moving_rows
+from estimation.recordings.rows.timing import FEWEST
 from robots.common.stretches import ends
+from robots.signals import Log
 
 Array = NDArray[np.float64]
+Rows = NDArray[np.intp]
 
 # A column jumps by a step above this many times its 99th percentile; that is estimated from some of the steps.
 JUMP, QUANTILE, SAMPLES = 3.0, 0.99, 50_000
@@ -23,6 +26,18 @@ COARSE = 0.5
 # Rows in motion for which a column must be constant, over the longest run that chance explains.
 LONG = 3.0
 HALF = FEWEST // 2  # rows
+
+# Encoder steps per row above which a moving joint has a new position in each row.
+FAST = 2.0
+# Share of such rows that repeat the row before, from which they are copies: the logger samples faster than the
+# controller answers. A single message that comes twice delays nothing.
+COPIED = 0.1
+Rows = NDArray[np.intp]
+
+# Share of the updates that come as many rows after the one before as most, give or take one. A torque that repeats by
+# its own resolution changes irregularly.
+REGULAR = 0.9
+UPDATES = 20  # updates
 
 
 @dataclass(frozen=True)
@@ -110,3 +125,80 @@ def _local_jump(steps: Array, start: int, stop: int) -> float:
     beside = np.concatenate([steps[max(start - BESIDE, 0) : start], steps[stop + 1 : stop + 1 + BESIDE]])
     most = float(beside.max(initial=0.0))
     return LOCAL_JUMP * most if most > 0 else np.inf
+
+
+@dataclass(frozen=True, eq=False)
+class RepeatedRows:
+    """Rows that are equal to the row before although the arm moves.
+
+    Attributes:
+        rows: counted from 0.
+        share: of the rows in which the arm moves.
+        copies: the same rows, if they hold old values with new times; none if encoder steps explain them.
+    """
+
+    rows: NDArray[np.intp]
+    share: float
+    copies: NDArray[np.intp]
+
+
+def find_repeated_rows(log: Log, columns: Columns, moving: NDArray[np.bool_]) -> RepeatedRows:
+    """Finds rows that repeat the row before in every column.
+
+    A logger that samples faster than the controller answers writes old positions and torques with new times.
+
+    Args:
+        log: the log.
+        columns: of the log.
+        moving: rows in which the arm moves (N,).
+    """
+    none = np.zeros(0, dtype=np.intp)
+    if len(log) < FEWEST:
+        return RepeatedRows(none, 0.0, none)
+    same = np.ones(len(log) - 1, dtype=bool)
+    for _, _, values in columns.named():
+        same &= values[1:] == values[:-1]
+    moves = moving[1:]
+    repeated = same & moves
+    rows = np.flatnonzero(repeated) + 1
+    share = float(repeated.sum() / max(int(moves.sum()), 1))
+    if not len(rows):
+        return RepeatedRows(rows, share, none)
+    fast = moving_rows(log, columns, steps=FAST)[1:]
+    copied = float((same & fast).sum()) > COPIED * max(int(fast.sum()), 1)
+    return RepeatedRows(rows, share, rows if copied else none)
+
+
+def find_updates(columns: Columns) -> Rows:
+    """Finds the rows in which the torques or currents are updated, where others repeat them; none if all are.
+
+    Args:
+        columns: of a log.
+
+    Returns:
+        Rows (K,), counted from 0.
+    """
+    none = np.zeros(0, dtype=np.intp)
+    if columns.signal is None or not columns.varies.any():
+        return none
+    changes = np.any(columns.signal[:, 1:] != columns.signal[:, :-1], axis=0)
+    rows = np.flatnonzero(changes) + 1
+    if len(rows) < UPDATES:
+        return none
+    steps = np.diff(rows)
+    usual = int(np.median(steps))
+    regular = float(np.mean(np.abs(steps - usual) <= (1 if usual > 2 else 0)))
+    return np.union1d(0, rows) if usual > 1 and regular > REGULAR else none
+
+
+def between_updates(log: Log, rows: Rows) -> Log:
+    """Interpolates the torques and currents of a log linearly between the rows (K,) in which they are updated."""
+    if not len(rows):
+        return log
+
+    def linear(values: Array | None) -> Array | None:
+        if values is None:
+            return None
+        return np.column_stack([np.interp(log.t, log.t[rows], column[rows]) for column in values.T])
+
+    return replace(log, tau=linear(log.tau), current=linear(log.current))

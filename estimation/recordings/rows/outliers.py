@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 
-from estimation.gate.measurements.columns import Columns
-from estimation.gate.measurements.timing import FEWEST
+from estimation.recordings.rows.columns import Columns
+from estimation.recordings.rows.timing import FEWEST
 from robots.signals import Log
 
 Array = NDArray[np.float64]

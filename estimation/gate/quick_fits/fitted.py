@@ -7,14 +7,13 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from estimation.gate.quick_fits.cutoff_choice import CHOICE_ROWS
+from estimation.gate.quick_fits.cutoff_choice import CHOICE_ROWS, Smoothed
 from estimation.gate.quick_fits.delays import Delay, estimate_delays
 from estimation.gate.quick_fits.joint_fit import JointFit, Rows
 from estimation.gate.quick_fits.joint_physics import JointPhysics, joint_physics, mean_inertias
 from estimation.gate.quick_fits.reading import Reading, as_read
 from estimation.gate.quick_fits.whole_fit import LIKE_A_CONSTANT, fit_all
-from estimation.gate.stages.cleaned import Cleaned
-from estimation.gate.stages.smoothed import Smoothed
+from estimation.recordings.rows.row_flags import Cleaned
 
 Array = NDArray[np.float64]
 

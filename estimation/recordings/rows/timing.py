@@ -1,20 +1,26 @@
-"""Steps of the clock: the time jumps, and the motion does not."""
+"""Time steps of a log, the parts between its gaps, and steps of its clock: the time jumps, and the motion does not."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
 
-from estimation.gate.measurements.columns import Columns
-from estimation.gate.measurements.timing import FEWEST, GAP_STEPS, GAP_TIME
+from estimation.recordings.rows.columns import Columns
 
 Array = NDArray[np.float64]
 
+# Fewer rows than this give no derivatives.
+FEWEST = 20
+# A step is a gap above this many median steps and above this time [s]: the arm may have changed its motion meanwhile. A
+# shorter interruption, as of a network, is interpolated without harm.
+GAP_STEPS, GAP_TIME = 8.0, 0.1
+
 # A step of time is compared with the motion from this deviation from the sample period on [s], and from this share of
 # the period.
-LEAST, SHARE = 0.015, 0.25
+LEAST_STEP, STEP_SHARE = 0.015, 0.25
 # Rows on either side that a polynomial of this degree must describe.
 SIDE, DEGREE = 8, 4
 # The steps of so many rows before and after must have the usual mean, to this share: a late row is none of the clock.
@@ -25,6 +31,44 @@ WRONG = 12.0
 BETTER, RIGHT = 5.0, 20.0
 # Most steps that are examined, and places from which the usual deviation is estimated.
 MOST, PLACES = 1000, 60
+
+
+@dataclass(frozen=True, eq=False)
+class Timing:
+    """The clock of a log with N rows.
+
+    Attributes:
+        steps: time steps (N - 1,) [s].
+        period: median step [s], NaN without steps.
+        gaps: indices of the steps that are gaps.
+        clock_steps: indices of the steps in which the clock was set.
+        parts: (first, stop) rows of the parts between gaps, and between steps of the clock.
+    """
+
+    steps: Array
+    period: float
+    gaps: NDArray[np.intp]
+    clock_steps: NDArray[np.intp]
+    parts: tuple[tuple[int, int], ...]
+
+
+def measure_timing(t: Array, set_at: Array | None = None) -> Timing:
+    """Measures the time steps and finds the gaps.
+
+    Args:
+        t: time (N,) [s].
+        set_at: times of the rows before which the clock was set [s].
+    """
+    steps, none = np.diff(t), np.empty(0, dtype=np.intp)
+    if not len(steps):
+        return Timing(steps, np.nan, none, none, ((0, len(t)),))
+    period = float(np.median(steps))
+    gaps = np.flatnonzero((steps > GAP_STEPS * period) & (steps > GAP_TIME))
+    stepped = none if set_at is None else np.searchsorted(t, set_at) - 1
+    stepped = stepped[(stepped >= 0) & (stepped < len(steps))]
+    gaps = np.setdiff1d(gaps, stepped)
+    edges = np.concatenate([[0], np.union1d(gaps, stepped) + 1, [len(t)]])
+    return Timing(steps, period, gaps, stepped, tuple((int(first), int(stop)) for first, stop in pairwise(edges)))
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,7 +99,7 @@ def find_clock_steps(t: Array, columns: Columns) -> ClockSteps:
     if len(t) < max(4 * SIDE, FEWEST):
         return none
     period = float(np.median(steps))
-    candidates = np.flatnonzero(np.abs(steps - period) > max(LEAST, SHARE * period))
+    candidates = np.flatnonzero(np.abs(steps - period) > max(LEAST_STEP, STEP_SHARE * period))
     # The log is cut at longer steps in any case, and the motion during them is not known.
     candidates = candidates[steps[candidates] <= 2 * max(GAP_STEPS * period, GAP_TIME)]
     candidates = candidates[(candidates >= SIDE - 1) & (candidates < len(t) - SIDE)]

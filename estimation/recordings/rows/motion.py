@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from estimation.gate.measurements.columns import Columns
+from estimation.recordings.rows.columns import Columns
 from estimation.regressions.preparation import TREMBLE
 from robots.robot import Robot
 from robots.signals import Log
