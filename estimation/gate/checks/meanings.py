@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
-from estimation.gate.check import Check
-from estimation.gate.context import Context, Stage
+from estimation.gate.context import Context
 from estimation.gate.finding import Finding
 from estimation.gate.meanings.comparison import mean_log
 from estimation.gate.meanings.described import joint_evidence
@@ -24,44 +22,38 @@ from robots.common.plain import joints_in_words, percent, two_digits
 Array = NDArray[np.float64]
 
 
-class Meanings(Check):
+def meanings(context: Context) -> list[Finding]:
     """Fits the log under other readings of its columns, and reports the one that explains the torques best.
 
     Columns, signs, units, couplings and gravity are compared by the held-out error of all joints together, and the size
     of the torques by the robot's description. A log is refused only if it does not fit as it is, and fits well with the
     other reading in all parts of the log. The checks that follow see the log as it is read.
     """
-
-    name: ClassVar[str] = "meanings"
-    stage: ClassVar[Stage] = Stage.FITTED
-    order: ClassVar[int] = 15
-
-    def run(self, context: Context) -> list[Finding]:
-        """Reports one reading at most."""
-        prefix, logged = context.cleaned.columns.prefix, context.logged
-        described = prefix == "tau" and context.robot.has_masses and (logged.unexplained < LIKE_A_CONSTANT).any()
-        evidence = joint_evidence(logged) if described else []
-        found = find_reading(logged, evidence)
-        if (other := other_robot(logged, found)) is not None:
-            return [_other_robot(*other)]
-        context.reading = found.reading if found.changes else None
-        robot, columns = context.robot, joined(change for change in found.changes if change.kind != "size")
-        if any(change.whole for change in found.changes):
-            evidence = []
-        elif found.changes:
-            logged = logged.read_as(columns)
-            evidence = joint_evidence(logged) if evidence else []
-        best = likely_meaning(robot, evidence)
-        opposite, others = sign_findings(context.fitted, prefix, likely=best is None)
-        turned = np.isin(np.arange(robot.n) + 1, [finding.joint for finding in opposite])
-        whole = columns.then(scale_of(robot, best)).then(Reading(tau_factor=np.where(turned, -1.0, 1.0)))
-        action = remedy(whole, prefix)
-        return [
-            *reading_findings(robot, prefix, found, action),
-            *torque_findings(logged, evidence, best, whole),
-            *(replace(finding, action=action) for finding in opposite),
-            *others,
-        ]
+    prefix, logged = context.cleaned.columns.prefix, context.logged
+    described = prefix == "tau" and context.robot.has_masses and (logged.unexplained < LIKE_A_CONSTANT).any()
+    evidence = joint_evidence(logged) if described else []
+    found = find_reading(logged, evidence)
+    if (other := other_robot(logged, found)) is not None:
+        return [_other_robot(*other)]
+    context.reading = found.reading if found.changes else None
+    robot, columns = context.robot, joined(change for change in found.changes if change.kind != "size")
+    if any(change.whole for change in found.changes):
+        evidence = []
+    elif found.changes:
+        logged = logged.read_as(columns)
+        evidence = joint_evidence(logged) if evidence else []
+    best = likely_meaning(robot, evidence)
+    opposite, others = sign_findings(context.fitted, prefix, likely=best is None)
+    turned = {finding.joint for finding in opposite}
+    signs = np.array([-1.0 if joint + 1 in turned else 1.0 for joint in range(robot.n)])
+    whole = columns.then(scale_of(robot, best)).then(Reading(tau_factor=signs))
+    action = remedy(whole, prefix)
+    return [
+        *reading_findings(robot, prefix, found, action),
+        *torque_findings(logged, evidence, best, whole),
+        *(replace(finding, action=action) for finding in opposite),
+        *others,
+    ]
 
 
 def _other_robot(wrong: NDArray[np.intp], left: Array, other: Array) -> Finding:

@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
-from estimation.gate.check import Check
-from estimation.gate.context import Context, Stage
+from estimation.gate.context import Context
 from estimation.gate.finding import Finding
 from estimation.recordings.rows.columns import Columns
 from estimation.recordings.rows.motion import beyond_limits
@@ -27,29 +25,22 @@ BETTER = 0.1
 FULL = 101.0
 
 
-class PositionUnits(Check):
+def position_units(context: Context) -> list[Finding]:
     """Refuses positions in another unit. Reports joints beyond their limits if no other unit explains them."""
-
-    name: ClassVar[str] = "position_units"
-    stage: ClassVar[Stage] = Stage.CLEANED
-    order: ClassVar[int] = 5
-
-    def run(self, context: Context) -> list[Finding]:
-        """Compares positions with the limits, and the fits with all units that bring them inside."""
-        robot, columns = context.robot, context.recorded.columns
-        beyond = beyond_limits(robot, columns.extremes)
-        moving = columns.travel > 0
-        found, whole = int((beyond & moving).sum()), max(int(moving.sum()), 1)
-        if found >= AGREE * whole and (whole != 2 or found == whole):
-            units = [unit for unit in _units(robot, columns) if not unit.beyond(robot, columns).any()]
-            if not units and beyond.any() and all(_is_whole(q) for q in columns.q[moving]):
-                units = [COUNTS]
-            if units and (chosen := _chosen(context, units)) is not None:
-                return [_finding(robot, columns, beyond, chosen)]
-        return [
-            _single(robot, columns, int(j)) or _beyond_finding(robot, columns.extreme(int(j)), int(j))
-            for j in np.flatnonzero(beyond)
-        ]
+    robot, columns = context.robot, context.recorded.columns
+    beyond = beyond_limits(robot, columns.extremes)
+    moving = columns.travel > 0
+    found, whole = int((beyond & moving).sum()), max(int(moving.sum()), 1)
+    if found >= AGREE * whole and (whole != 2 or found == whole):
+        units = [unit for unit in _units(robot, columns) if not unit.beyond(robot, columns).any()]
+        if not units and beyond.any() and all(_is_whole(q) for q in columns.q[moving]):
+            units = [COUNTS]
+        if units and (chosen := _chosen(context, units)) is not None:
+            return [_finding(robot, columns, beyond, chosen)]
+    return [
+        _single(robot, columns, int(j)) or _beyond_finding(robot, columns.extreme(int(j)), int(j))
+        for j in np.flatnonzero(beyond)
+    ]
 
 
 @dataclass(frozen=True, eq=False)

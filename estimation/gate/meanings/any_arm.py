@@ -51,11 +51,11 @@ def any_arm(fitted: Fitted) -> WholeFit:
         for place, ridge in enumerate(RIDGES):
             found = across @ (parts / (np.maximum(values, 0.0) + ridge * size * len(others))[:, None])
             squares[place, :, fold] = np.sum((tau[held] - found) ** 2 * counted[held], axis=0)
-    rows = np.array([np.count_nonzero(counted[held], axis=0) for held in folds]).T
+    count = np.array([np.count_nonzero(counted[held], axis=0) for held in folds]).T
     best = np.take_along_axis(squares, squares.sum(axis=2).argmin(axis=0)[None, :, None], axis=0)[0]
     errors, by_fold = np.full(len(spread), np.nan), np.full((len(spread), FOLDS), np.nan)
-    errors[joints] = np.sqrt(best.sum(axis=1) / np.maximum(rows.sum(axis=1), 1))
-    by_fold[joints] = np.where(rows > 0, np.sqrt(best / np.maximum(rows, 1)), np.nan)
+    errors[joints] = np.sqrt(best.sum(axis=1) / np.maximum(count.sum(axis=1), 1))
+    by_fold[joints] = np.where(count > 0, np.sqrt(best / np.maximum(count, 1)), np.nan)
     return WholeFit(errors, by_fold)
 
 

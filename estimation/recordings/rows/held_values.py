@@ -32,7 +32,6 @@ FAST = 2.0
 # Share of such rows that repeat the row before, from which they are copies: the logger samples faster than the
 # controller answers. A single message that comes twice delays nothing.
 COPIED = 0.1
-Rows = NDArray[np.intp]
 
 # Share of the updates that come as many rows after the one before as most, give or take one. A torque that repeats by
 # its own resolution changes irregularly.

@@ -38,6 +38,7 @@ ORDER = {
     Stage.CLEANED: ["position_units", "impossible_values"],
     Stage.SMOOTHED: ["speeds", "velocity_columns", "too_few_smoothed_rows"],
     Stage.FITTED: [
+        "little_motion",
         "few_rows_per_parameter",
         "meanings",
         "unloaded_rest",
