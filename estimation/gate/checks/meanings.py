@@ -46,7 +46,9 @@ def meanings(context: Context) -> list[Finding]:
     opposite, others = sign_findings(context.fitted, prefix, likely=best is None)
     turned = {finding.joint for finding in opposite}
     signs = np.array([-1.0 if joint + 1 in turned else 1.0 for joint in range(robot.n)])
-    whole = columns.then(scale_of(robot, best)).then(Reading(tau_factor=signs))
+    # Torques of coupled axes have no factors of their own behind the coupling.
+    factors = scale_of(robot, best).then(Reading(tau_factor=signs))
+    whole = columns if columns.coupled_torques else columns.then(factors)
     action = remedy(whole, prefix)
     return [
         *reading_findings(robot, prefix, found, action),

@@ -69,16 +69,18 @@ def too_few_smoothed_rows(context: Context) -> list[Finding]:
 
 def little_motion(context: Context) -> list[Finding]:
     """Refuses a log in which the arm stands nearly always, and moves too little for a fit."""
-    moved = float(1 - flagged(context.recorded, "at rest").all(axis=1).mean()) * context.recorded.log.duration
-    explained = bool((context.logged.unexplained < LIKE_A_CONSTANT).any())
-    if explained or moved > RESTING * context.recorded.log.duration:
+    if (context.logged.unexplained < LIKE_A_CONSTANT).any():
         return []
+    moves, duration = ~flagged(context.recorded, "at rest").all(axis=1), context.recorded.log.duration
+    if moves.mean() > RESTING:
+        return []
+    moved = float(moves.mean()) * duration
     return [
         Finding(
             name="short",
             severity="refuse",
-            text=f"the arm moves in {moved:.2g} s of {context.recorded.log.duration:.4g} s, and stands in the others: "
-            "too little to fit and validate a model",
+            text=f"the arm moves in {moved:.2g} s of {duration:.4g} s, and stands in the others: too little to fit and "
+            "validate a model",
             action="record a longer motion; rows at rest tell nothing",
             value=moved,
             unit="s",

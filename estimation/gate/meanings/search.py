@@ -36,6 +36,8 @@ BETTER, OTHER_COLUMNS = 0.15, 0.8
 SURE = 5.0
 # What a joint beyond its limits adds to the sum of the errors (log).
 OUTSIDE = 2.0
+# Angle [rad] up to which another direction of gravity is a tilt of the base.
+TILTED = 0.2
 # Log of the odds against joint torques from which other readings are tried.
 UNLIKELY = 8.0
 
@@ -208,9 +210,10 @@ def _refined(fits: Comparison, reading: Reading, change: Change, tried: list[tup
         return change
     gravity = change.reading.gravity
     assert gravity is not None
-    lowest = min(fits.cost(replace(reading, gravity=gravity)), np.inf)
-    for _, other in sorted((one for one in tried if one[1].kind == "weightless"), key=lambda one: one[0])[:1]:
-        if fits.cost(reading.then(other.reading)) < lowest + SNAP:
+    weightless = [one for one in tried if one[1].kind == "weightless"]
+    if weightless:
+        other = min(weightless, key=lambda one: one[0])[1]
+        if fits.cost(reading.then(other.reading)) < fits.cost(replace(reading, gravity=gravity)) + SNAP:
             return other
     axes = [sign * STANDARD * axis for axis in np.eye(3) for sign in (1.0, -1.0)]
     free = [fits.refined_gravity(gravity, reading), gravity]
@@ -237,10 +240,6 @@ def _likewise(fits: Comparison, path: list[Change], after: WholeFit) -> str:
         if SAME < angle_between(change.reading.gravity, np.asarray(fits.robot.chain.gravity)) < TILTED:
             return "base_tilt"
     return ""
-
-
-# Angle [rad] up to which another direction of gravity is a tilt of the base.
-TILTED = 0.2
 
 
 def other_robot(logged: Fitted, found: Found) -> tuple[NDArray[np.intp], Array, Array] | None:
