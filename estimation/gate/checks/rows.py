@@ -81,7 +81,7 @@ def little_motion(context: Context) -> list[Finding]:
             severity="refuse",
             text=f"the arm moves in {moved:.2g} s of {duration:.4g} s, and stands in the others: too little to fit and "
             "validate a model",
-            action="record a longer motion; rows at rest tell nothing",
+            action="record a longer motion; rows at rest hold no information",
             value=moved,
             unit="s",
         )

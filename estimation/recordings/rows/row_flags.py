@@ -1,4 +1,4 @@
-"""Which rows of a log tell nothing: one table with one rule each, and the log without those that no fit uses."""
+"""Which rows of a log hold no information: one table with one rule each, and the log without those that no fit uses."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ Flags = NDArray[np.bool_]
 
 @dataclass(frozen=True)
 class RowFlag:
-    """One reason for which a row tells nothing.
+    """One reason for which a row holds no information.
 
     Attributes:
         meaning: what such a row holds.
