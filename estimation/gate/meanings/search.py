@@ -99,11 +99,13 @@ def find_reading(logged: Fitted, evidence: Sequence[JointEvidence]) -> Found:
     inside = _outside(fits, reading) < _outside(fits, Reading())
     if not path or not (inside or is_sure(before.by_fold, after.by_fold)):
         return as_logged
-    left = after.unexplained[reading.moved(fits.robot.n)]
-    if not path[0].whole and np.nanmax(left) > POORLY_EXPLAINED:
+    # Torques of another size are named by their description, and may be noise beside.
+    named = [change for change in path if change.kind != "size"]
+    left = after.unexplained[joined(named).moved(fits.robot.n)]
+    if named and not named[0].whole and np.nanmax(left) > POORLY_EXPLAINED:
         return as_logged
     likewise = _likewise(fits, path, after)
-    fits_well = mean_log(left) < np.log(WELL) and float(np.nanmax(left)) < DOUBTFUL
+    fits_well = bool(named) and mean_log(left) < np.log(WELL) and float(np.nanmax(left)) < DOUBTFUL
     misread = any(not change.whole for change in path) or _is_doubtful(before)
     certain = not likewise and misread and fits_well
     return Found(reading, tuple(path), before, after, certain, likewise)
