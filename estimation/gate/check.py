@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import ClassVar
 
 from estimation.gate.context import Context, Stage
@@ -34,3 +34,23 @@ class Check(ABC):
         Returns:
             The findings; none if the log has no such fault.
         """
+
+
+Question = Callable[[Context], Sequence[Finding]]
+"""A question to a log at some stage; its answers are findings."""
+
+
+def asked(question: Question, stage: Stage, order: int) -> type[Check]:
+    """Gives the check that asks one question, under the name of its function.
+
+    Args:
+        question: a function.
+        stage: from which it is asked.
+        order: place among the questions of its stage.
+    """
+
+    def run(self: Check, context: Context) -> Sequence[Finding]:
+        return question(context)
+
+    name = question.__name__
+    return type(name, (Check,), {"name": name, "stage": stage, "order": order, "run": run, "__doc__": question.__doc__})

@@ -6,12 +6,12 @@ from collections.abc import Iterable
 from enum import IntEnum
 from functools import cached_property
 
-from estimation.gate.candidates.candidate_fits import Meaning, as_meant
 from estimation.gate.finding import Finding
-from estimation.gate.stages.cleaned import Cleaned
-from estimation.gate.stages.fitted import Fitted
-from estimation.gate.stages.recorded import Recorded
-from estimation.gate.stages.smoothed import Smoothed
+from estimation.gate.quick_fits.cutoff_choice import Smoothed
+from estimation.gate.quick_fits.fitted import Fitted
+from estimation.gate.quick_fits.reading import Reading
+from estimation.recordings.rows.one_log import Recorded
+from estimation.recordings.rows.row_flags import Cleaned
 from robots.robot import Robot
 from robots.signals import Log
 
@@ -20,6 +20,7 @@ CAUSES = (
     "motor_side_position",
     "other_robot",
     "row_counter",
+    "short",
     "static_poses",
     "unit_of_position",
     "unit_of_time",
@@ -51,7 +52,7 @@ class Context:
         recorded: the log with all its rows.
         cleaned: the log without the rows that a fit leaves out.
         findings: of the checks so far, in their order.
-        meaning: of the log, with which it fits best; None before this is decided, and as logged.
+        reading: of the log, with which it fits best; None before this is decided, and as logged.
     """
 
     def __init__(self, robot: Robot, log: Log) -> None:
@@ -59,7 +60,7 @@ class Context:
         self.recorded = Recorded(robot, log)
         self.cleaned = Cleaned(self.recorded)
         self.findings: list[Finding] = []
-        self.meaning: Meaning | None = None
+        self.reading: Reading | None = None
 
     @cached_property
     def smoothed(self) -> Smoothed:
@@ -88,20 +89,17 @@ class Context:
 
     @property
     def fitted(self) -> Fitted:
-        """Quick fits to these excerpts, as they are meant: what another meaning explains is no fault of its own.
+        """Quick fits to these excerpts, as they are read: what another reading explains is no fault of its own.
 
         Raises:
             RuntimeError: the log does not reach this stage.
         """
-        return self.logged if self.meaning is None else self._meant
+        return self.logged if self.reading is None else self._read
 
     @cached_property
-    def _meant(self) -> Fitted:
-        assert self.meaning is not None
-        logged = self.logged
-        rows = as_meant(self.robot, logged.rows, self.meaning)
-        sharp = rows if logged.sharp is logged.rows else as_meant(self.robot, logged.sharp, self.meaning)
-        return Fitted(self.cleaned, self.smoothed, rows, sharp)
+    def _read(self) -> Fitted:
+        assert self.reading is not None
+        return self.logged.read_as(self.reading)
 
     @property
     def can_be_fitted(self) -> bool:

@@ -10,10 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from estimation.gate.finding import SEVERITIES, Finding, Severity
-from estimation.gate.measurements.held_torque import between_updates
-from estimation.gate.measurements.outliers import interpolated
-from estimation.gate.measurements.timing import FEWEST
 from estimation.logs.torque_source import NO_TORQUE
+from estimation.recordings.rows.held_values import between_updates
+from estimation.recordings.rows.outliers import interpolated
+from estimation.recordings.rows.timing import FEWEST
 from robots.common.errors import InputError, NotIdentifiableError
 from robots.common.records import Finding as Remark
 from robots.common.records import Result

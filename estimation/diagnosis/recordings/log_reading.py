@@ -15,8 +15,8 @@ from estimation.diagnosis.recordings.position_spectra import Spectra, Spectrum, 
 from estimation.diagnosis.recordings.recording import Recording, cut_recording, join_recordings
 from estimation.diagnosis.recordings.smoothed_motion import project_on_harmonics, remove_encoder_lines, smooth_motion
 from estimation.diagnosis.recordings.thinning import decimate_recording, keep_clipped_level, low_pass_rows
-from estimation.gate.measurements.resolution import lattice_step
 from estimation.preprocessing import Cycle
+from estimation.recordings.rows.columns import lattice_step
 from estimation.regressions.preparation import Prepared, prepare, still_joints
 from robots.common.errors import InputError
 from robots.common.forks import forked

@@ -2,15 +2,12 @@
 
 from __future__ import annotations
 
-from typing import ClassVar
-
 import numpy as np
 from numpy.typing import NDArray
 
-from estimation.gate.check import Check
-from estimation.gate.context import Context, Stage
+from estimation.gate.context import Context
 from estimation.gate.finding import Finding
-from estimation.gate.measurements.columns import Columns
+from estimation.recordings.rows.columns import Columns
 from robots.common.stretches import ends
 
 Array = NDArray[np.float64]
@@ -24,24 +21,17 @@ CLIPPED_SHARE = 5e-4
 WIDTH = 1e-6
 
 
-class Clipping(Check):
+def clipping(context: Context) -> list[Finding]:
     """Finds torques or currents that accumulate at their largest or smallest value.
 
     A smooth peak is at most some three times as long in its last step as in the one before. A limit holds the torque
     longer. Rows in which the joint stands do not count: a brake holds the torque as well. Torques of exactly zero come
     from a drive that is off, and are reported as such.
     """
-
-    name: ClassVar[str] = "clipping"
-    stage: ClassVar[Stage] = Stage.RECORDED
-    order: ClassVar[int] = 90
-
-    def run(self, context: Context) -> list[Finding]:
-        """Looks at both extreme values of each column."""
-        columns = context.recorded.columns
-        if columns.signal is None:
-            return []
-        return [finding for joint in range(len(columns.signal)) for finding in _clipped(columns, joint)]
+    columns = context.recorded.columns
+    if columns.signal is None:
+        return []
+    return [finding for joint in range(len(columns.signal)) for finding in _clipped(columns, joint)]
 
 
 def _clipped(columns: Columns, joint: int) -> list[Finding]:
@@ -101,84 +91,62 @@ def _longest_run(flags: NDArray[np.bool_]) -> tuple[int, int]:
     return int(starts[best]), int(stops[best] - starts[best])
 
 
-class ConstantTorques(Check):
+def constant_torques(context: Context) -> list[Finding]:
     """Finds torques or currents that are constant."""
-
-    name: ClassVar[str] = "constant_torques"
-    stage: ClassVar[Stage] = Stage.RECORDED
-    order: ClassVar[int] = 100
-
-    def run(self, context: Context) -> list[Finding]:
-        """Lists the constant columns; the log is refused if there are no others."""
-        columns = context.recorded.columns
-        if columns.signal is None:
-            return []
-        return [
-            Finding(
-                name="constant_torque",
-                severity="warning" if columns.varies.any() else "refuse",
-                text=f"has the constant value {columns.signal[joint, 0]:.4g}",
-                action="record the torque of the moving arm, and check the meaning of the column",
-                value=float(columns.signal[joint, 0]),
-                unit="A" if columns.prefix == "i" else "N m or N",
-                column=f"{columns.prefix}{joint + 1}",
-                joint=int(joint) + 1,
-            )
-            for joint in np.flatnonzero(~columns.varies)
-        ]
+    columns = context.recorded.columns
+    if columns.signal is None:
+        return []
+    return [
+        Finding(
+            name="constant_torque",
+            severity="warning" if columns.varies.any() else "refuse",
+            text=f"has the constant value {columns.signal[joint, 0]:.4g}",
+            action="record the torque of the moving arm, and check the meaning of the column",
+            value=float(columns.signal[joint, 0]),
+            unit="A" if columns.prefix == "i" else "N m or N",
+            column=f"{columns.prefix}{joint + 1}",
+            joint=int(joint) + 1,
+        )
+        for joint in np.flatnonzero(~columns.varies)
+    ]
 
 
-class HeldTorques(Check):
+def held_torques(context: Context) -> list[Finding]:
     """Reports torques that keep each value for some rows. They are interpolated between their updates."""
-
-    name: ClassVar[str] = "held_torques"
-    stage: ClassVar[Stage] = Stage.RECORDED
-    order: ClassVar[int] = 45
-
-    def run(self, context: Context) -> list[Finding]:
-        """Compares the rate of the updates with that of the rows."""
-        recorded = context.recorded
-        if not len(recorded.updates):
-            return []
-        usual = int(np.median(np.diff(recorded.updates)))
-        prefix, n = recorded.columns.prefix, context.robot.n
-        return [
-            Finding(
-                name="held_torque",
-                severity="warning",
-                text=f"{prefix}1 to {prefix}{n} change only in every {usual}th row "
-                f"({1 / (usual * recorded.timing.period):.3g} Hz), which looks like a delay",
-                action="they are interpolated between these rows; log them as often as the positions if the controller "
-                "can",
-                value=float(usual),
-                unit="rows",
-                row=int(recorded.updates[1]) + 1,
-            )
-        ]
+    recorded = context.recorded
+    if not len(recorded.updates):
+        return []
+    usual = int(np.median(np.diff(recorded.updates)))
+    prefix, n = recorded.columns.prefix, context.robot.n
+    return [
+        Finding(
+            name="held_torque",
+            severity="warning",
+            text=f"{prefix}1 to {prefix}{n} change only in every {usual}th row "
+            f"({1 / (usual * recorded.timing.period):.3g} Hz), which looks like a delay",
+            action="they are interpolated between these rows; log them as often as the positions if the controller can",
+            value=float(usual),
+            unit="rows",
+            row=int(recorded.updates[1]) + 1,
+        )
+    ]
 
 
-class ImpossibleValues(Check):
+def impossible_values(context: Context) -> list[Finding]:
     """Refuses a log with impossible values that are not isolated outliers."""
-
-    name: ClassVar[str] = "impossible_values"
-    stage: ClassVar[Stage] = Stage.CLEANED
-    order: ClassVar[int] = 10
-
-    def run(self, context: Context) -> list[Finding]:
-        """Reports the largest value of each such column."""
-        return [
-            Finding(
-                name="absurd_value",
-                severity="refuse",
-                text=f"reaches {found.value:.4g}",
-                action="repair or remove these rows",
-                value=found.value,
-                column=f"{found.prefix}{found.joint + 1}",
-                joint=found.joint + 1,
-                row=found.row + 1,
-            )
-            for found in context.cleaned.impossible
-        ]
+    return [
+        Finding(
+            name="absurd_value",
+            severity="refuse",
+            text=f"reaches {found.value:.4g}",
+            action="repair or remove these rows",
+            value=found.value,
+            column=f"{found.prefix}{found.joint + 1}",
+            joint=found.joint + 1,
+            row=found.row + 1,
+        )
+        for found in context.cleaned.impossible
+    ]
 
 
 # Step of a torque over its standard deviation, above which it adds to the usual noise.
@@ -187,18 +155,11 @@ COARSE_TORQUE = 0.1
 COARSE_POSITION = 500
 
 
-class Resolution(Check):
+def resolution(context: Context) -> list[Finding]:
     """Finds positions, torques or currents with steps that are coarse for what they measure."""
-
-    name: ClassVar[str] = "resolution"
-    stage: ClassVar[Stage] = Stage.RECORDED
-    order: ClassVar[int] = 60
-
-    def run(self, context: Context) -> list[Finding]:
-        """Compares the step of each column with its range or spread."""
-        columns = context.recorded.columns
-        joints = range(len(columns.q))
-        return [finding for j in joints for finding in (*_position(columns, j), *_signal(columns, j))]
+    columns = context.recorded.columns
+    joints = range(len(columns.q))
+    return [finding for j in joints for finding in (*_position(columns, j), *_signal(columns, j))]
 
 
 def _position(columns: Columns, joint: int) -> list[Finding]:
@@ -241,62 +202,48 @@ def _signal(columns: Columns, joint: int) -> list[Finding]:
 COMPARED_FIRST = 50
 
 
-class SameColumns(Check):
+def same_columns(context: Context) -> list[Finding]:
     """Finds a column that is equal to another in every row. Two joints are never so alike: one column was copied."""
-
-    name: ClassVar[str] = "same_columns"
-    stage: ClassVar[Stage] = Stage.RECORDED
-    order: ClassVar[int] = 110
-
-    def run(self, context: Context) -> list[Finding]:
-        """Compares each column that varies with those before it."""
-        known = context.recorded.columns.named()
-        varying = [(f"{prefix}{j + 1}", j, column) for prefix, j, column in known if column.min() < column.max()]
-        findings = []
-        for i, (name, joint, column) in enumerate(varying):
-            step = max(1, len(column) // COMPARED_FIRST)
-            equal = (
-                other
-                for other, _, values in varying[:i]
-                if np.array_equal(values[::step], column[::step]) and np.array_equal(values, column)
-            )
-            original = next(equal, None)
-            if original is not None:
-                findings.append(
-                    Finding(
-                        name="same_column",
-                        severity="warning",
-                        text=f"is identical to {original} in every row",
-                        action="one column was copied; the parameters of both joints are unreliable",
-                        value=float(len(column)),
-                        unit="rows",
-                        column=name,
-                        joint=joint + 1,
-                    )
+    known = context.recorded.columns.named()
+    varying = [(f"{prefix}{j + 1}", j, column) for prefix, j, column in known if column.min() < column.max()]
+    findings = []
+    for i, (name, joint, column) in enumerate(varying):
+        step = max(1, len(column) // COMPARED_FIRST)
+        equal = (
+            other
+            for other, _, values in varying[:i]
+            if np.array_equal(values[::step], column[::step]) and np.array_equal(values, column)
+        )
+        original = next(equal, None)
+        if original is not None:
+            findings.append(
+                Finding(
+                    name="same_column",
+                    severity="warning",
+                    text=f"is identical to {original} in every row",
+                    action="one column was copied; the parameters of both joints are unreliable",
+                    value=float(len(column)),
+                    unit="rows",
+                    column=name,
+                    joint=joint + 1,
                 )
-        return findings
-
-
-class StuckColumns(Check):
-    """Finds columns that hold one value while the arm moves, and then jump."""
-
-    name: ClassVar[str] = "stuck_columns"
-    stage: ClassVar[Stage] = Stage.RECORDED
-    order: ClassVar[int] = 50
-
-    def run(self, context: Context) -> list[Finding]:
-        """Reports the longest such run of each column."""
-        return [
-            Finding(
-                name="stuck",
-                severity="warning",
-                text=f"keeps one value for {hang.rows} rows while the arm moves, and then jumps",
-                action="the log is split there; repair the logger",
-                value=float(hang.rows),
-                unit="rows",
-                column=f"{hang.prefix}{hang.joint + 1}",
-                joint=hang.joint + 1,
-                row=hang.first + 1,
             )
-            for hang in context.recorded.hangs
-        ]
+    return findings
+
+
+def stuck_columns(context: Context) -> list[Finding]:
+    """Finds columns that hold one value while the arm moves, and then jump."""
+    return [
+        Finding(
+            name="stuck",
+            severity="warning",
+            text=f"keeps one value for {hang.rows} rows while the arm moves, and then jumps",
+            action="the log is split there; repair the logger",
+            value=float(hang.rows),
+            unit="rows",
+            column=f"{hang.prefix}{hang.joint + 1}",
+            joint=hang.joint + 1,
+            row=hang.first + 1,
+        )
+        for hang in context.recorded.hangs
+    ]

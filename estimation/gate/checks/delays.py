@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import ClassVar
 
 import numpy as np
 
-from estimation.gate.check import Check
-from estimation.gate.context import Context, Stage
+from estimation.gate.context import Context
 from estimation.gate.finding import Finding
 from estimation.gate.quick_fits.delays import Delay, usual_delay
 
@@ -23,16 +21,9 @@ AGREE_SAMPLES, AGREE_SHARE, AGREE_ERRORS = 0.5, 0.2, 3.0
 CONTRADICTS = 0.25
 
 
-class Delays(Check):
+def delays(context: Context) -> list[Finding]:
     """Finds torques that are logged later or earlier than their motion."""
-
-    name: ClassVar[str] = "delays"
-    stage: ClassVar[Stage] = Stage.FITTED
-    order: ClassVar[int] = 70
-
-    def run(self, context: Context) -> list[Finding]:
-        """Reports one delay if the joints agree, otherwise one of each joint."""
-        return findings_of(context.fitted.delays, context.cleaned.timing.period)
+    return findings_of(context.fitted.delays, context.cleaned.timing.period)
 
 
 def findings_of(delays: Sequence[Delay | None], period: float) -> list[Finding]:

@@ -2,10 +2,7 @@
 
 from __future__ import annotations
 
-from typing import ClassVar
-
-from estimation.gate.check import Check
-from estimation.gate.context import Context, Stage
+from estimation.gate.context import Context
 from estimation.gate.finding import Finding
 from estimation.gate.quick_fits.whole_fit import LIKE_A_CONSTANT, POORLY_EXPLAINED
 from robots.common.plain import joints_in_words, two_digits
@@ -18,29 +15,22 @@ BADLY_EXCITED, SIGNIFICANT = 0.7, 10.0
 NOTHING_FITS = "check units, signs and order of the joints, and that the log belongs to this robot"
 
 
-class Excitation(Check):
+def excitation(context: Context) -> list[Finding]:
     """Finds joints whose torque does not follow from the motion."""
-
-    name: ClassVar[str] = "excitation"
-    stage: ClassVar[Stage] = Stage.FITTED
-    order: ClassVar[int] = 50
-
-    def run(self, context: Context) -> list[Finding]:
-        """Compares held-out errors and the significance of inertia and friction with the limits."""
-        fitted, prefix = context.fitted, context.cleaned.columns.prefix
-        others = bool((fitted.unexplained < LIKE_A_CONSTANT).any())
-        findings = []
-        for joint, (found, error) in enumerate(zip(fitted.physics, fitted.unexplained, strict=True)):
-            if found is None or error < POORLY_EXPLAINED:
-                continue
-            # Inertia or friction that differ from zero are excited: the torque holds something else, too.
-            weak = not error <= BADLY_EXCITED and found.information < SIGNIFICANT
-            findings.append(
-                _bad(context.robot, float(error), found.information, prefix, joint, others)
-                if weak
-                else _poor(context.robot, float(error), prefix, joint, others)
-            )
-        return findings
+    fitted, prefix = context.fitted, context.cleaned.columns.prefix
+    others = bool((fitted.unexplained < LIKE_A_CONSTANT).any())
+    findings = []
+    for joint, (found, error) in enumerate(zip(fitted.physics, fitted.unexplained, strict=True)):
+        if found is None or error < POORLY_EXPLAINED:
+            continue
+        # Inertia or friction that differ from zero are excited: the torque holds something else, too.
+        weak = not error <= BADLY_EXCITED and found.information < SIGNIFICANT
+        findings.append(
+            _bad(context.robot, float(error), found.information, prefix, joint, others)
+            if weak
+            else _poor(context.robot, float(error), prefix, joint, others)
+        )
+    return findings
 
 
 def _bad(robot: Robot, error: float, information: float, prefix: str, joint: int, others: bool) -> Finding:
@@ -84,39 +74,32 @@ LEAST = 0.015
 EXPLAINED = 0.3
 
 
-class Undetermined(Check):
+def undetermined(context: Context) -> list[Finding]:
     """Names the joints whose torques are explained as well without velocities and accelerations.
 
     It is said if most joints are concerned: a light joint by itself may hide its inertia behind friction. The log may
     fit well: slow motions show gravity and friction. A model of them fails at usual speeds, because the
     inertias are below some three standard errors.
     """
-
-    name: ClassVar[str] = "undetermined"
-    stage: ClassVar[Stage] = Stage.FITTED
-    order: ClassVar[int] = 55
-
-    def run(self, context: Context) -> list[Finding]:
-        """Lists the joints, but not those that are poorly explained altogether."""
-        bad = {finding.joint for finding in context.found(("badly_excited",))}
-        gain = context.fitted.dynamic_gain
-        well = context.fitted.unexplained < EXPLAINED
-        weak = [j for j in range(context.robot.n) if j + 1 not in bad and well[j] and gain[j] < LEAST]
-        if 2 * len(weak) <= context.robot.n:
-            return []
-        return [
-            Finding(
-                name="undetermined",
-                severity="warning",
-                text=f"the log does not determine the inertia of {_joints(context.robot, weak)}: torques are explained "
-                "as well without accelerations",
-                action="the inertias are then below some 3 standard errors, and predictions of faster motions are "
-                "wrong; add a log of faster motions",
-                value=100 * float(gain[weak].min()),
-                unit="%",
-                joint=weak[0] + 1 if len(weak) == 1 else None,
-            )
-        ]
+    bad = {finding.joint for finding in context.found(("badly_excited",))}
+    gain = context.fitted.dynamic_gain
+    well = context.fitted.unexplained < EXPLAINED
+    weak = [j for j in range(context.robot.n) if j + 1 not in bad and well[j] and gain[j] < LEAST]
+    if 2 * len(weak) <= context.robot.n:
+        return []
+    return [
+        Finding(
+            name="undetermined",
+            severity="warning",
+            text=f"the log does not determine the inertia of {_joints(context.robot, weak)}: torques are explained "
+            "as well without accelerations",
+            action="the inertias are then below some 3 standard errors, and predictions of faster motions are "
+            "wrong; add a log of faster motions",
+            value=100 * float(gain[weak].min()),
+            unit="%",
+            joint=weak[0] + 1 if len(weak) == 1 else None,
+        )
+    ]
 
 
 def _joints(robot: Robot, joints: list[int]) -> str:

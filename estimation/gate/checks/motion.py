@@ -3,17 +3,15 @@
 from __future__ import annotations
 
 from itertools import pairwise
-from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import maximum_filter1d
 
-from estimation.gate.check import Check
-from estimation.gate.context import Context, Stage
+from estimation.gate.context import Context
 from estimation.gate.finding import Finding
-from estimation.gate.measurements.motion import HARDLY, travel_shares
-from estimation.gate.measurements.wraps import Wraps
+from estimation.recordings.rows.motion import HARDLY, travel_shares
+from estimation.recordings.rows.wraps import Wraps
 from robots.common.plain import percent, several
 from robots.common.stretches import spans
 from robots.robot import Robot
@@ -21,79 +19,64 @@ from robots.robot import Robot
 Array = NDArray[np.float64]
 
 
-class Travel(Check):
+def travel(context: Context) -> list[Finding]:
     """Finds joints with a small travel."""
-
-    name: ClassVar[str] = "travel"
-    stage: ClassVar[Stage] = Stage.RECORDED
-    order: ClassVar[int] = 120
-
-    def run(self, context: Context) -> list[Finding]:
-        """Compares the travel of each joint with its range; the log is refused if no joint moves."""
-        robot, columns = context.robot, context.recorded.columns
-        travel, share = columns.travel, travel_shares(robot, columns)
-        if not (travel > 0).any():
-            return [
-                Finding(
-                    name="no_motion",
-                    severity="refuse",
-                    text="no joint moves",
-                    action="record a log in which the arm moves",
-                    value=0.0,
-                    unit="rad or m",
-                    column="q1",
-                )
-            ]
+    robot, columns = context.robot, context.recorded.columns
+    travel, share = columns.travel, travel_shares(robot, columns.extremes)
+    if not (travel > 0).any():
         return [
             Finding(
-                name="hardly_moves",
-                severity="warning",
-                text=f"{robot.joint_names[joint]} moves by {travel[joint]:.3g}, {percent(share[joint])} of its range",
-                action="this log does not determine inertia and friction of this joint: move it further",
-                value=float(travel[joint]),
+                name="no_motion",
+                severity="refuse",
+                text="no joint moves",
+                action="record a log in which the arm moves",
+                value=0.0,
                 unit="rad or m",
-                column=f"q{joint + 1}",
-                joint=int(joint) + 1,
+                column="q1",
             )
-            for joint in np.flatnonzero(share < HARDLY)
         ]
+    return [
+        Finding(
+            name="hardly_moves",
+            severity="warning",
+            text=f"{robot.joint_names[joint]} moves by {travel[joint]:.3g}, {percent(share[joint])} of its range",
+            action="this log does not determine inertia and friction of this joint: move it further",
+            value=float(travel[joint]),
+            unit="rad or m",
+            column=f"q{joint + 1}",
+            joint=int(joint) + 1,
+        )
+        for joint in np.flatnonzero(share < HARDLY)
+    ]
 
 
 # Speed over its limit from which it is reported.
 TOO_FAST = 2.0
 
 
-class Speeds(Check):
+def speeds(context: Context) -> list[Finding]:
     """Finds the joint that exceeds its speed limit most: the time, or the unit of the position, may be wrong."""
-
-    name: ClassVar[str] = "speeds"
-    stage: ClassVar[Stage] = Stage.SMOOTHED
-    order: ClassVar[int] = 20
-
-    def run(self, context: Context) -> list[Finding]:
-        """Compares the largest smoothed speed of each joint with its limit."""
-        limit = np.asarray(context.robot.limits.velocity)
-        known = np.isfinite(limit) & (limit > 0)
-        if not known.any():
-            return []
-        peak = context.smoothed.peak_speeds
-        ratio = np.where(known, peak / np.where(known, limit, 1.0), 0.0)
-        worst = int(np.argmax(ratio))
-        if not ratio[worst] >= TOO_FAST:
-            return []
-        return [
-            Finding(
-                name="too_fast",
-                severity="warning",
-                text=f"reaches a speed of {peak[worst]:.3g}, {ratio[worst]:.3g} times the limit in the robot's "
-                "description",
-                action="check the units of t and q, and that the log belongs to this robot",
-                value=float(peak[worst]),
-                unit="rad/s or m/s",
-                column=f"q{worst + 1}",
-                joint=worst + 1,
-            )
-        ]
+    limit = np.asarray(context.robot.limits.velocity)
+    known = np.isfinite(limit) & (limit > 0)
+    if not known.any():
+        return []
+    peak = context.smoothed.peak_speeds
+    ratio = np.where(known, peak / np.where(known, limit, 1.0), 0.0)
+    worst = int(np.argmax(ratio))
+    if not ratio[worst] >= TOO_FAST:
+        return []
+    return [
+        Finding(
+            name="too_fast",
+            severity="warning",
+            text=f"reaches a speed of {peak[worst]:.3g}, {ratio[worst]:.3g} times the limit in the robot's description",
+            action="check the units of t and q, and that the log belongs to this robot",
+            value=float(peak[worst]),
+            unit="rad/s or m/s",
+            column=f"q{worst + 1}",
+            joint=worst + 1,
+        )
+    ]
 
 
 Rows = NDArray[np.intp]
@@ -112,28 +95,21 @@ SAMPLES = 20_000
 REFUSED_TRAVEL = 0.05
 
 
-class Jumps(Check):
+def jumps(context: Context) -> list[Finding]:
     """Finds jumps of positions that are neither outliers of single rows nor beside a gap in time."""
-
-    name: ClassVar[str] = "jumps"
-    stage: ClassVar[Stage] = Stage.RECORDED
-    order: ClassVar[int] = 130
-
-    def run(self, context: Context) -> list[Finding]:
-        """Reports the number of jumps and the largest of each joint."""
-        recorded = context.recorded
-        known = np.concatenate([recorded.spikes, recorded.spikes + 1, recorded.timing.gaps + 1])
-        # A lost message makes a longer step, and no jump.
-        periods = np.maximum(recorded.timing.steps / recorded.timing.period, 1.0)
-        findings = []
-        for joint, q in enumerate(recorded.columns.q):
-            # The position of a joint that stands changes by single encoder steps.
-            if recorded.standing[joint]:
-                continue
-            rows = np.setdiff1d(jump_rows(periods, q), known)
-            if len(rows):
-                findings.append(_jump(joint, q, rows, float(recorded.columns.travel[joint])))
-        return findings
+    recorded = context.recorded
+    known = np.concatenate([recorded.spikes, recorded.spikes + 1, recorded.timing.gaps + 1])
+    # A lost message makes a longer step, and no jump.
+    periods = np.maximum(recorded.timing.steps / recorded.timing.period, 1.0)
+    findings = []
+    for joint, q in enumerate(recorded.columns.q):
+        # The position of a joint that stands changes by single encoder steps.
+        if recorded.standing[joint]:
+            continue
+        rows = np.setdiff1d(jump_rows(periods, q), known)
+        if len(rows):
+            findings.append(_jump(joint, q, rows, float(recorded.columns.travel[joint])))
+    return findings
 
 
 def jump_rows(periods: Array, q: Array) -> Rows:
@@ -171,19 +147,12 @@ def _jump(joint: int, q: Array, rows: Rows, travel: float) -> Finding:
     )
 
 
-class WrappedAngles(Check):
+def wrapped_angles(context: Context) -> list[Finding]:
     """Reports angles that wrap. Those of continuous joints were unwrapped; others are refused.
 
     All other checks see the unwrapped angles.
     """
-
-    name: ClassVar[str] = "wrapped_angles"
-    stage: ClassVar[Stage] = Stage.RECORDED
-    order: ClassVar[int] = 65
-
-    def run(self, context: Context) -> list[Finding]:
-        """Reports the wraps of each joint."""
-        return [_wraps(context.robot, wraps) for wraps in context.recorded.wraps]
+    return [_wraps(context.robot, wraps) for wraps in context.recorded.wraps]
 
 
 def _wraps(robot: Robot, wraps: Wraps) -> Finding:
@@ -226,30 +195,23 @@ FAR = 0.08
 STILL, POSES, ROWS, ROUGH = 0.05, 5, 4, 1.0
 
 
-class StaticPoses(Check):
+def static_poses(context: Context) -> list[Finding]:
     """Finds logs in which the arm moves only where nothing is logged. They show gravity, and nothing else."""
-
-    name: ClassVar[str] = "static_poses"
-    stage: ClassVar[Stage] = Stage.RECORDED
-    order: ClassVar[int] = 15
-
-    def run(self, context: Context) -> list[Finding]:
-        """Compares the way in the poses with the way between them."""
-        log = context.recorded.log
-        poses = count_poses(log.q, log.t)
-        if not poses:
-            return []
-        return [
-            Finding(
-                name="static_poses",
-                severity="refuse",
-                text=f"no joint moves while it is logged: {poses} static poses. They determine gravity only, neither "
-                "inertias nor friction",
-                action="log the motions as well, at 50 Hz or more",
-                value=float(poses),
-                unit="poses",
-            )
-        ]
+    log = context.recorded.log
+    poses = count_poses(log.q, log.t)
+    if not poses:
+        return []
+    return [
+        Finding(
+            name="static_poses",
+            severity="refuse",
+            text=f"no joint moves while it is logged: {poses} static poses. They determine gravity only, neither "
+            "inertias nor friction",
+            action="log the motions as well, at 50 Hz or more",
+            value=float(poses),
+            unit="poses",
+        )
+    ]
 
 
 def count_poses(q: Array, t: Array) -> int:

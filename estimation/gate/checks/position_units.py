@@ -3,23 +3,18 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
-from estimation.gate.check import Check
-from estimation.gate.context import Context, Stage
+from estimation.gate.context import Context
 from estimation.gate.finding import Finding
-from estimation.gate.measurements.columns import Columns
+from estimation.recordings.rows.columns import Columns
+from estimation.recordings.rows.motion import beyond_limits
 from robots.robot import Robot
 
 Array = NDArray[np.float64]
 
-# A joint is beyond a limit by more than this share of its range: limits of a URDF are often not exact.
-BEYOND = 0.25
-# Turns from zero above which a revolute joint without limits is beyond its range.
-TURNS = 8.0
 # Share of the moving joints that must be beyond their limits before another unit is considered.
 AGREE = 0.5
 # So many ranges from zero, a position is certainly in another unit: no error of zero or limits is that large.
@@ -30,29 +25,22 @@ BETTER = 0.1
 FULL = 101.0
 
 
-class PositionUnits(Check):
+def position_units(context: Context) -> list[Finding]:
     """Refuses positions in another unit. Reports joints beyond their limits if no other unit explains them."""
-
-    name: ClassVar[str] = "position_units"
-    stage: ClassVar[Stage] = Stage.CLEANED
-    order: ClassVar[int] = 5
-
-    def run(self, context: Context) -> list[Finding]:
-        """Compares positions with the limits, and the fits with all units that bring them inside."""
-        robot, columns = context.robot, context.recorded.columns
-        beyond = _beyond(robot, columns.lowest, columns.highest)
-        moving = columns.travel > 0
-        found, whole = int((beyond & moving).sum()), max(int(moving.sum()), 1)
-        if found >= AGREE * whole and (whole != 2 or found == whole):
-            units = [unit for unit in _units(robot, columns) if not unit.beyond(robot, columns).any()]
-            if not units and beyond.any() and all(_is_whole(q) for q in columns.q[moving]):
-                units = [COUNTS]
-            if units and (chosen := _chosen(context, units)) is not None:
-                return [_finding(robot, columns, beyond, chosen)]
-        return [
-            _single(robot, columns, int(j)) or _beyond_finding(robot, columns.extreme(int(j)), int(j))
-            for j in np.flatnonzero(beyond)
-        ]
+    robot, columns = context.robot, context.recorded.columns
+    beyond = beyond_limits(robot, columns.extremes)
+    moving = columns.travel > 0
+    found, whole = int((beyond & moving).sum()), max(int(moving.sum()), 1)
+    if found >= AGREE * whole and (whole != 2 or found == whole):
+        units = [unit for unit in _units(robot, columns) if not unit.beyond(robot, columns).any()]
+        if not units and beyond.any() and all(_is_whole(q) for q in columns.q[moving]):
+            units = [COUNTS]
+        if units and (chosen := _chosen(context, units)) is not None:
+            return [_finding(robot, columns, beyond, chosen)]
+    return [
+        _single(robot, columns, int(j)) or _beyond_finding(robot, columns.extreme(int(j)), int(j))
+        for j in np.flatnonzero(beyond)
+    ]
 
 
 @dataclass(frozen=True, eq=False)
@@ -75,8 +63,7 @@ class _Unit:
 
     def beyond(self, robot: Robot, columns: Columns) -> NDArray[np.bool_]:
         """Finds the joints (n,) that are beyond their limits in this unit."""
-        low, high = (values * self.scale + self.offset for values in (columns.lowest, columns.highest))
-        return _beyond(robot, low, high)
+        return beyond_limits(robot, columns.extremes * self.scale + self.offset)
 
 
 COUNTS = _Unit(
@@ -162,7 +149,7 @@ def _single(robot: Robot, columns: Columns, joint: int) -> Finding | None:
     revolute = robot.chain.kinds[joint] == "revolute"
     factors = np.ones(robot.n)
     factors[joint] = np.pi / 180 if revolute else 1e-3
-    inside = not _beyond(robot, columns.lowest * factors, columns.highest * factors)[joint]
+    inside = not beyond_limits(robot, columns.extremes * factors)[joint]
     if abs(extreme) < CERTAIN * _range(robot, joint) or not inside:
         return None
     scale, unit = ", ".join(f"{factor:.5g}" for factor in factors), "degrees" if revolute else "millimetres"
@@ -176,20 +163,6 @@ def _single(robot: Robot, columns: Columns, joint: int) -> Finding | None:
         column=f"q{joint + 1}",
         joint=joint + 1,
     )
-
-
-def _beyond(robot: Robot, lowest: Array, highest: Array) -> NDArray[np.bool_]:
-    """Finds the joints (n,) whose lowest or highest positions (n,) are beyond their limits."""
-    bounds = zip(lowest.tolist(), highest.tolist(), strict=True)
-    return np.array([_is_beyond(robot, low, high, joint) for joint, (low, high) in enumerate(bounds)])
-
-
-def _is_beyond(robot: Robot, low: float, high: float, joint: int) -> bool:
-    lower, upper = float(robot.limits.lower[joint]), float(robot.limits.upper[joint])
-    if not np.isfinite(lower) or not np.isfinite(upper):
-        return max(-low, high) > TURNS * 2 * np.pi
-    slack = BEYOND * max(upper - lower, 1e-9)
-    return low < lower - slack or high > upper + slack
 
 
 def _range(robot: Robot, joint: int) -> float:

@@ -2,15 +2,11 @@
 
 from __future__ import annotations
 
-from typing import ClassVar
-
 import numpy as np
 
-from estimation.gate.check import Check
-from estimation.gate.context import Context, Stage
+from estimation.gate.context import Context
 from estimation.gate.finding import Finding
-from estimation.gate.measurements.clock_steps import ClockSteps
-from estimation.gate.measurements.timing import FEWEST, Timing
+from estimation.recordings.rows.timing import FEWEST, ClockSteps, Timing
 from robots.common.plain import several
 from robots.signals import Log
 
@@ -27,24 +23,17 @@ JITTER = 0.05
 LOST = 0.5
 
 
-class Sampling(Check):
+def sampling(context: Context) -> list[Finding]:
     """Finds a sample period in another unit or too long, gaps, and uneven time steps."""
-
-    name: ClassVar[str] = "sampling"
-    stage: ClassVar[Stage] = Stage.RECORDED
-    order: ClassVar[int] = 20
-
-    def run(self, context: Context) -> list[Finding]:
-        """Looks at the time steps."""
-        timing = context.recorded.timing
-        if not len(timing.steps):
-            return []
-        return [
-            *_rate(timing, context.robot.period, _period_by_velocity(context.recorded.log)),
-            *_clock_steps(context.recorded.clock_steps),
-            *_gaps(timing, len(context.recorded.log)),
-            *_jitter(timing),
-        ]
+    timing = context.recorded.timing
+    if not len(timing.steps):
+        return []
+    return [
+        *_rate(timing, context.robot.period, _period_by_velocity(context.recorded.log)),
+        *_clock_steps(context.recorded.clock_steps),
+        *_gaps(timing, len(context.recorded.log)),
+        *_jitter(timing),
+    ]
 
 
 # Units of time as a mapping states them.

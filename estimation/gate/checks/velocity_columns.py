@@ -2,13 +2,10 @@
 
 from __future__ import annotations
 
-from typing import ClassVar
-
 import numpy as np
 from numpy.typing import NDArray
 
-from estimation.gate.check import Check
-from estimation.gate.context import Context, Stage
+from estimation.gate.context import Context
 from estimation.gate.finding import Finding
 from robots.robot import Robot
 
@@ -25,41 +22,34 @@ STILL = 1e-6
 DEGREES = 180.0 / np.pi
 
 
-class VelocityColumns(Check):
+def velocity_columns(context: Context) -> list[Finding]:
     """Compares each velocity column with the derivative of its position: unit, sign, size and shape."""
-
-    name: ClassVar[str] = "velocity_columns"
-    stage: ClassVar[Stage] = Stage.SMOOTHED
-    order: ClassVar[int] = 30
-
-    def run(self, context: Context) -> list[Finding]:
-        """Looks for a common factor of all joints, then at each joint."""
-        excerpts = context.smoothed.excerpts
-        if not excerpts or excerpts[0].column is None:
-            return []
-        numeric = np.concatenate([part.dq for part in excerpts])
-        column = np.concatenate([part.column for part in excerpts if part.column is not None])
-        energy, product, own = (np.sum(x, axis=0) for x in (numeric**2, numeric * column, column**2))
-        moves = np.sqrt(energy / len(numeric)) > STILL
-        correlation = np.where(moves & (own > 0), product / np.sqrt(np.maximum(energy * own, 1e-300)), np.nan)
-        size = np.where(moves, product / np.maximum(energy, 1e-300), np.nan)
-        common = _common_factor(context.robot, correlation, size, moves)
-        if common is not None:
-            return [common]
-        faults = {int(j): _fault(float(correlation[j]), float(size[j])) for j in np.flatnonzero(moves)}
-        return [
-            Finding(
-                name="velocity_column",
-                severity="warning",
-                text=text,
-                action="velocities are computed from the positions; check which of the two columns is right",
-                value=float(size[joint]),
-                column=f"dq{joint + 1}",
-                joint=joint + 1,
-            )
-            for joint, text in faults.items()
-            if text is not None
-        ]
+    excerpts = context.smoothed.excerpts
+    if not excerpts or excerpts[0].column is None:
+        return []
+    numeric = np.concatenate([part.dq for part in excerpts])
+    column = np.concatenate([part.column for part in excerpts if part.column is not None])
+    energy, product, own = (np.sum(x, axis=0) for x in (numeric**2, numeric * column, column**2))
+    moves = np.sqrt(energy / len(numeric)) > STILL
+    correlation = np.where(moves & (own > 0), product / np.sqrt(np.maximum(energy * own, 1e-300)), np.nan)
+    size = np.where(moves, product / np.maximum(energy, 1e-300), np.nan)
+    common = _common_factor(context.robot, correlation, size, moves)
+    if common is not None:
+        return [common]
+    faults = {int(j): _fault(float(correlation[j]), float(size[j])) for j in np.flatnonzero(moves)}
+    return [
+        Finding(
+            name="velocity_column",
+            severity="warning",
+            text=text,
+            action="velocities are computed from the positions; check which of the two columns is right",
+            value=float(size[joint]),
+            column=f"dq{joint + 1}",
+            joint=joint + 1,
+        )
+        for joint, text in faults.items()
+        if text is not None
+    ]
 
 
 def _fault(correlation: float, size: float) -> str | None:

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from estimation.gate.quick_fits.gravity_rows import gravity_rows
+from estimation.gate.quick_fits.rigid_body import gravity_rows
 from robots.robot import Robot
 
 Array = NDArray[np.float64]
@@ -34,6 +34,20 @@ class JointColumns:
     Y: Array
     scale: Array
     used: NDArray[np.intp]
+
+    def with_shared(self, columns: Array, first: int) -> JointColumns:
+        """Appends columns (M, k) of parameters that joints share, after those of the rigid body.
+
+        Args:
+            columns: not scaled.
+            first: number of the first of their parameters.
+        """
+        scale = np.maximum(np.sqrt(np.mean(columns**2, axis=0)), np.finfo(float).tiny)
+        return JointColumns(
+            np.hstack([self.Y[:, :-OWN], columns / scale, self.Y[:, -OWN:]]),
+            np.concatenate([self.scale[:-OWN], scale, self.scale[-OWN:]]),
+            np.concatenate([self.used, first + np.arange(len(scale))]),
+        )
 
 
 def under_gravity(

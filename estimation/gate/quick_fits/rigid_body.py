@@ -1,4 +1,4 @@
-"""The regressor of the rigid body, joint by joint, for the few thousand rows of a quick fit."""
+"""The regressor of the rigid body and its gravity, joint by joint, for the few thousand rows of a quick fit."""
 
 from __future__ import annotations
 
@@ -14,6 +14,9 @@ from robots.robot import Robot
 from robots.terms import RigidBody
 
 Array = NDArray[np.float64]
+
+# Parameters of a link; gravity acts on the first four, mass and first moments.
+LINK, HEAVY = 10, 4
 
 
 @lru_cache(maxsize=8)
@@ -42,3 +45,34 @@ def _evaluator(robot: Robot) -> tuple[BatchFunction, tuple[NDArray[np.intp], ...
     Y = symbolic(*inputs)
     parts = [casadi.densify(Y[joint, columns.tolist()]) for joint, columns in enumerate(used)]
     return batch_function(casadi.Function("joint_rows", inputs, parts)), used
+
+
+def gravity_rows(robot: Robot, q: Array) -> Array:
+    """Evaluates the torque of gravity per component of gravity and per parameter.
+
+    A link of mass m and first moment c (in its frame, at p with rotation R) has the potential energy
+    ``-g . (m p + R c)``. The torque of a joint is its derivative by the joint's position.
+
+    Args:
+        robot: with n joints.
+        q: positions (M, n) [rad or m].
+
+    Returns:
+        (n, M, 3, 10 n): per unit of gravity in x, y, z of the base frame [m/s2]; zero for links before the joint.
+    """
+    rows, n = q.shape
+    frame = np.tile(np.eye(4), (rows, 1, 1))
+    moved, origins, axes = np.zeros((n, rows, 3, HEAVY)), np.zeros((n, rows, 3)), []
+    for j, joint in enumerate(robot.chain.joints):
+        frame = frame @ joint.transform(q[:, j])
+        origins[j], moved[j, :, :, 1:] = frame[:, :3, 3], frame[:, :3, :3]
+        axes.append(frame[:, :3, :3] @ np.asarray(joint.axis))
+    result = np.zeros((n, rows, 3, n, LINK))
+    for j, joint in enumerate(robot.chain.joints):
+        if joint.kind == "revolute":
+            moved[j:, :, :, 0] = origins[j:] - origins[j]
+            turned = np.cross(axes[j][None, :, :, None], moved[j:], axis=2)
+            result[j, :, :, j:, :HEAVY] = -turned.transpose(1, 2, 0, 3)
+        else:
+            result[j, :, :, j:, 0] = -axes[j][:, :, None]
+    return result.reshape(n, rows, 3, LINK * n)

@@ -38,13 +38,12 @@ ORDER = {
     Stage.CLEANED: ["position_units", "impossible_values"],
     Stage.SMOOTHED: ["speeds", "velocity_columns", "too_few_smoothed_rows"],
     Stage.FITTED: [
+        "little_motion",
         "few_rows_per_parameter",
-        "likely_causes",
+        "meanings",
         "unloaded_rest",
-        "torque_signs",
         "excitation",
         "undetermined",
-        "torque_meanings",
         "delays",
     ],
 }
@@ -63,7 +62,7 @@ def test_the_page_on_refused_logs_explains_each_finding():
     named = re.compile(r'[ (](?:name=|"name": )"([a-z_]+)"(?: if .+ else "([a-z_]+)")?,')
     sources = [
         path.read_text(encoding="utf-8")
-        for pattern in ("gate/checks/*.py", "gate/candidates/*.py", "gate/log_sets.py", "logs/*.py")
+        for pattern in ("gate/checks/*.py", "gate/meanings/*.py", "gate/log_sets.py", "logs/*.py")
         for path in (root / "estimation").glob(pattern)
     ]
     names = {name for source in sources for pair in named.findall(source) for name in pair if name}

@@ -7,7 +7,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from estimation.gate.checks.excitation import Excitation
+from estimation.gate.checks.excitation import excitation
 from tests.estimation.gate.findings_of import found, joints
 
 
@@ -52,7 +52,7 @@ def test_an_excited_joint_is_not_called_badly_excited(er3a, information, name, o
     errors = np.array([1.03] + 5 * [0.1 if others else 1.2])
     fitted = SimpleNamespace(physics=6 * [SimpleNamespace(information=information)], unexplained=errors)
     cleaned = SimpleNamespace(columns=SimpleNamespace(prefix="tau"))
-    findings = Excitation().run(SimpleNamespace(robot=er3a, fitted=fitted, cleaned=cleaned))
+    findings = excitation(SimpleNamespace(robot=er3a, fitted=fitted, cleaned=cleaned))
     assert {finding.name for finding in findings} == {name}
     assert [finding.joint for finding in findings] == ([1] if others else [1, 2, 3, 4, 5, 6])
     assert {finding.severity for finding in findings} == {"warning" if others else "refuse"}

@@ -201,3 +201,18 @@ def test_a_column_copied_over_another_is_reported(good, spoilt):
     tau[1234, 4] += 1e-6
     assert not found(spoilt(tau=tau), "same_column")
     assert not found(spoilt(tau=log.tau), "same_column")
+
+
+@pytest.mark.slow
+def test_a_log_that_nearly_always_rests_is_refused_once(er3a, good):
+    """A second of motion in a minute determines nothing: that is said, and not that each joint is badly excited."""
+    log, rows = good(), 15_000
+    part = log.rows(slice(0, 250))
+    q = np.concatenate([part.q, np.repeat(part.q[-1:], rows, axis=0)])
+    noise = 0.02 * log.tau.std(axis=0) * np.random.default_rng(0).normal(size=(rows, 6))
+    tau = np.concatenate([part.tau, part.tau[-1] + noise])
+    report = check_log(er3a, replace(log, t=0.004 * np.arange(len(q)), q=q, tau=tau))
+    (finding,) = report.of("refuse")
+    assert finding.name == "short"
+    assert finding.value == pytest.approx(1.0, abs=0.1)
+    assert report.without_motion

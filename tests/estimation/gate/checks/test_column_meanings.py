@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from estimation.gate import check_log
-from estimation.gate.measurements.held_torque import between_updates, find_updates
+from estimation.recordings.rows.held_values import between_updates, find_updates
 from robots.geometry.chain import Joint
 from robots.plants import Sensors, nominal_plant, simulate
 from tests.estimation.gate.findings_of import found
@@ -78,7 +78,7 @@ def test_a_torque_that_is_held_is_named_and_interpolated(er3a, good):
 
 def test_a_coarse_torque_is_not_held(good):
     """A torque in coarse steps repeats as well, but not in every k-th row."""
-    from estimation.gate.measurements.columns import Columns
+    from estimation.recordings.rows.columns import Columns
 
     log = good()
     coarse = replace(log, tau=np.round(log.tau))

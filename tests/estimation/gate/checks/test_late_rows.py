@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from estimation.gate import Context
-from estimation.gate.checks.rows import LateRows
+from estimation.gate.checks.rows import late_rows
 
 STALLS = ((500, 7), (900, 11), (2100, 3), (3000, 10))
 RUSHED = 2e-4  # s between the times of rows that waited in a queue
@@ -20,7 +20,7 @@ def checked(er3a):
 
     def check(log):
         context = Context(er3a, log)
-        return context.recorded.times, LateRows().run(context)
+        return context.recorded.times, late_rows(context)
 
     return check
 

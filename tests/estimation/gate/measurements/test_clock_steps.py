@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from estimation.gate.measurements.clock_steps import find_clock_steps
-from estimation.gate.measurements.columns import Columns
+from estimation.recordings.rows.columns import Columns
+from estimation.recordings.rows.timing import find_clock_steps
 from robots.signals import Log
 
 ROWS = 3000

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from estimation.gate.measurements.outliers import outlier_rows
+from estimation.recordings.rows.outliers import outlier_rows
 
 
 def test_a_jump_that_swings_back_a_little_is_no_outlier() -> None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from estimation.gate.measurements.resolution import lattice_step
+from estimation.recordings.rows.columns import lattice_step
 
 
 def test_a_value_off_the_grid_does_not_hide_the_step() -> None:

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from estimation.gate.measurements.wraps import find_wraps
+from estimation.recordings.rows.wraps import find_wraps
 
 
 def turning(speed: float, rate: float, rows: int = 1000, noise: float = 0.0) -> tuple[np.ndarray, np.ndarray]:

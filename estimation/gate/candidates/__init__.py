@@ -1,1 +1,0 @@
-"""A log under other meanings: other columns, units or gravity, and multiples of the described torques."""

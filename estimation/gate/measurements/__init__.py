@@ -1,1 +1,0 @@
-"""What the checks of a log measure on it: numbers without a judgement."""

@@ -1,0 +1,2 @@
+from estimation.recordings.recording import Recording as Recording
+from estimation.recordings.recording import make_ready as make_ready
