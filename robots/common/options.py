@@ -26,6 +26,8 @@ class Option:
         several: with `reads`: whether the option may be given again.
         names_file: whether the text may name a file; its place is then relative to a configuration file that has it.
         switch: whether a flag that is off by default has a spelling that switches it off.
+        degrees: whether an angle in radians is typed in degrees.
+        without: of a group: fields that are no options here.
         defaults: of a group: fields with another default here, and these.
         only: the uses of the verb to which the option belongs, see `oed.cli.verbs.Verb.use`; of all if it is empty.
     """
@@ -42,6 +44,8 @@ class Option:
     several: bool = False
     names_file: bool = False
     switch: bool = False
+    degrees: bool = False
+    without: tuple[str, ...] = ()
     defaults: tuple[tuple[str, Any], ...] = ()
     only: tuple[str, ...] = ()
 

@@ -5,18 +5,13 @@ from __future__ import annotations
 from dataclasses import asdict, dataclass, field
 from typing import TYPE_CHECKING, Any
 
+from oed.experiments.options import usual_surroundings
 from robots.common.errors import InputError
 from robots.common.options import Seed
 
 if TYPE_CHECKING:
     from robots.collision import CollisionModel, Surroundings
     from robots.robot import Robot
-
-
-def _usual_surroundings() -> Surroundings:
-    from robots.collision import Surroundings
-
-    return Surroundings()
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -45,7 +40,7 @@ class LoopOptions:
     velocity_fraction: float | None = None
     effort: str = "standard"
     collision: bool = True
-    surroundings: Surroundings = field(default_factory=_usual_surroundings)
+    surroundings: Surroundings = field(default_factory=usual_surroundings)
     seed: Seed = 0
 
     def __post_init__(self) -> None:

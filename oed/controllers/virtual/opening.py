@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from oed.controllers.virtual.fixed_packets import FixedPackets
-from oed.controllers.virtual.options import ControllerOptions
 from oed.controllers.virtual.ports import Port, TcpPort, UdpPort
+from oed.controllers.virtual_options import ControllerOptions
 from oed.exports.simple_message import Bare, Comm, Frame, Kind, Reply, Splitter
 
 RECORDERS = 16
