@@ -82,6 +82,7 @@ class Finding(Record):
         "settled",
         "sentence",
         "advice",
+        "text?",
     )
 
     kind: Kind

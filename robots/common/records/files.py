@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Iterator
+from contextlib import contextmanager
 from os import PathLike
 from pathlib import Path
 from typing import Any
 
-from robots.common.errors import InputError
+from robots.common.errors import InputError, OedError
 from robots.common.files import existing_file, write_atomic
 
 
@@ -54,3 +56,29 @@ def read_json(
     if version is not None and (not isinstance(found, int) or found > version):
         raise InputError(f"format version {found!r}", file=path, allowed=f"up to {version}", remedy=remedy)
     return data
+
+
+@contextmanager
+def damage_refused(file: str | PathLike[str], *, remedy: str) -> Iterator[None]:
+    """Says what is wrong with a file in place of the errors that come of using its entries.
+
+    Args:
+        file: from which the entries are.
+        remedy: what to do about it.
+
+    Raises:
+        InputError: an entry that is missing, or of another kind.
+    """
+    try:
+        yield
+    except OedError as error:
+        if error.file is not None:
+            raise
+        known = {"column": error.column, "joint": error.joint, "allowed": error.allowed}
+        raise InputError(error.problem, file=file, **known, remedy=error.remedy or remedy) from error  # type: ignore[arg-type]
+    except KeyError as error:
+        raise InputError("is missing", file=file, column=str(error.args[0]), remedy=remedy) from error
+    except (AttributeError, IndexError, TypeError, ValueError) as error:
+        raise InputError(
+            "is damaged: an entry is of another kind than it should be", file=file, remedy=remedy
+        ) from error

@@ -63,7 +63,7 @@ SETTLED = "new Promise((resolve) => setTimeout(() => requestAnimationFrame(() =>
 
 
 def check_page(browser: Browser, page: Page, path: Path) -> None:
-    """Checks one page: size, no finding twice, no errors, everything drawn, narrow and wide, dark and light, by keyboard, without scripts.
+    """Checks one page: size, findings once, all drawn, narrow and wide, dark and light, by keyboard, without scripts.
 
     Args:
         browser: without a network.
