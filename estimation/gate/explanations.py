@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from estimation.gate.explanation import Explanation
-from robots.common.errors import InputError
+from robots.common.errors import ERRORS, Explanation, InputError
 
 EXPLANATIONS: tuple[Explanation, ...] = (
     Explanation(
@@ -417,14 +416,14 @@ def explain(code: str) -> Explanation:
     """Finds an explanation.
 
     Args:
-        code: a code such as OED-L014, or the name of a finding.
+        code: a code such as OED-L014, or the name of a finding or an error.
 
     Raises:
         InputError: an unknown code.
     """
     wanted = code.strip()
-    for item in EXPLANATIONS:
+    for item in (*EXPLANATIONS, *ERRORS):
         if wanted.upper() in (item.code, item.code.removeprefix("OED-")) or wanted == item.name:
             return item
-    known = f"{EXPLANATIONS[0].code} to {EXPLANATIONS[-1].code}, or the name of a finding"
-    raise InputError(f"no finding has the code {wanted!r}", allowed=known, remedy="`oed explain` lists all codes")
+    known = f"{EXPLANATIONS[0].code} to {EXPLANATIONS[-1].code}, codes of errors, or a name"
+    raise InputError(f"no message has the code {wanted!r}", allowed=known, remedy="`oed explain` lists all codes")

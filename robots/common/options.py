@@ -63,7 +63,7 @@ def numbers(option: str, text: str) -> tuple[float, ...]:
     try:
         return tuple(float(part) for part in text.split(","))
     except ValueError:
-        raise InputError(f"{option} {text}", allowed="numbers, separated by commas") from None
+        raise InputError(f"{option} {text}", allowed="numbers, separated by commas", kind="not_numbers") from None
 
 
 def point(option: str, text: str) -> tuple[float, ...]:
@@ -78,7 +78,7 @@ def point(option: str, text: str) -> tuple[float, ...]:
     """
     values = numbers(option, text)
     if len(values) != 3:
-        raise InputError(f"{option} {text}", allowed="three numbers x, y, z")
+        raise InputError(f"{option} {text}", allowed="three numbers x, y, z", kind="not_numbers")
     return values
 
 
@@ -95,7 +95,7 @@ def box(option: str, text: str) -> tuple[float, ...]:
     values = numbers(option, text)
     if len(values) != 6:
         allowed = "six numbers xmin,xmax,ymin,ymax,zmin,zmax, such as 0.1,0.6,-0.5,0.5,0.05,inf"
-        raise InputError(f"{option} {text}", allowed=allowed)
+        raise InputError(f"{option} {text}", allowed=allowed, kind="not_numbers")
     return values
 
 

@@ -36,7 +36,7 @@ def chosen(verb: type[Verb], context: Any) -> tuple[Verb, set[str]]:
         if {first, second} <= typed | filed:
             if (first in typed) == (second in typed):
                 both = " and ".join(f"--{options[name].name}" for name in (first, second))
-                raise InputError(f"{both} together", allowed="one of them")
+                raise InputError(f"{both} together", allowed="one of them", kind="options_together")
             _leave_out({second if first in typed else first}, options, values, filed)
     values["given"] = frozenset(typed | filed)
     made = _made(verb, None, values)
@@ -79,7 +79,9 @@ def _require_complete(cls: type, made: Any, names: Mapping[str, str], typed: Col
             if given:
                 needed = ", ".join(names[name] for name in required_fields(group))
                 verb = "needs" if len(given) == 1 else "need"
-                raise InputError(f"{' and '.join(given)} {verb} {needed}", remedy=f"add {needed}")
+                raise InputError(
+                    f"{' and '.join(given)} {verb} {needed}", remedy=f"add {needed}", kind="option_not_used"
+                )
 
 
 def _made(cls: type, instance: Any, values: Mapping[str, Any]) -> Any:

@@ -44,17 +44,19 @@ def read_json(
     kind = format.removeprefix("robot-oed ")
     wanted = f"is not {'an' if kind[0] in 'aeiou' else 'a'} {kind} file" if kind else "cannot be read as a JSON object"
     if not Path(path).exists():
-        raise InputError("no such file", file=path, remedy=remedy)
+        raise InputError("no such file", file=path, remedy=remedy, kind="no_such_file")
     try:
         data = json.loads(existing_file(path).read_text(encoding="utf-8"))
     except ValueError as error:
-        raise InputError(f"{wanted} ({error})", file=path, remedy=remedy) from error
+        raise InputError(f"{wanted} ({error})", file=path, remedy=remedy, kind="other_file") from error
     if not isinstance(data, dict) or (format and data.get("format") != format):
         allowed = f'"format": "{format}"' if format else None
-        raise InputError(wanted, file=path, allowed=allowed, remedy=remedy)
+        raise InputError(wanted, file=path, allowed=allowed, remedy=remedy, kind="other_file")
     found = data.get("format_version")
     if version is not None and (not isinstance(found, int) or found > version):
-        raise InputError(f"format version {found!r}", file=path, allowed=f"up to {version}", remedy=remedy)
+        raise InputError(
+            f"format version {found!r}", file=path, allowed=f"up to {version}", remedy=remedy, kind="newer_version"
+        )
     return data
 
 
@@ -74,11 +76,23 @@ def damage_refused(file: str | PathLike[str], *, remedy: str) -> Iterator[None]:
     except OedError as error:
         if error.file is not None:
             raise
-        known = {"column": error.column, "joint": error.joint, "allowed": error.allowed}
-        raise InputError(error.problem, file=file, **known, remedy=error.remedy or remedy) from error  # type: ignore[arg-type]
+        raise InputError(
+            error.problem,
+            file=file,
+            column=error.column,
+            joint=error.joint,
+            allowed=error.allowed,
+            remedy=error.remedy or remedy,
+            kind=error.kind or "damaged_result",
+        ) from error
     except KeyError as error:
-        raise InputError("is missing", file=file, column=str(error.args[0]), remedy=remedy) from error
+        raise InputError(
+            "is missing", file=file, column=str(error.args[0]), remedy=remedy, kind="damaged_result"
+        ) from error
     except (AttributeError, IndexError, TypeError, ValueError) as error:
         raise InputError(
-            "is damaged: an entry is of another kind than it should be", file=file, remedy=remedy
+            "is damaged: an entry is of another kind",
+            file=file,
+            remedy=remedy,
+            kind="damaged_result",
         ) from error

@@ -62,7 +62,12 @@ class Reader:
     def fail(self, path: str, problem: str, allowed: str = "") -> InputError:
         """Makes the error of an entry."""
         return InputError(
-            problem, file=self.file, column=path or None, allowed=allowed or None, remedy=self.remedy or None
+            problem,
+            file=self.file,
+            column=path or None,
+            allowed=allowed or None,
+            remedy=self.remedy or None,
+            kind="damaged_result",
         )
 
     def record(self, kind: Any, data: object, path: str, given: Mapping[str, Any]) -> object:
@@ -84,6 +89,7 @@ class Reader:
                 f"{kind.__name__}: its JSON does not hold all of it ({', '.join(lacking)})",
                 file=self.file,
                 remedy="read its folder by the load function, or keep the object",
+                kind="damaged_result",
             )
         return kind(**found)
 

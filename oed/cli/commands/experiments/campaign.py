@@ -73,7 +73,9 @@ class Campaign(Verb):
     def refusal(self, names: Collection[str]) -> InputError:
         """Says that a link needs a controller."""
         verb = "does" if len(names) == 1 else "do"
-        return InputError(f"{', '.join(names)} {verb} not apply without --run", remedy="add --run HOST")
+        return InputError(
+            f"{', '.join(names)} {verb} not apply without --run", remedy="add --run HOST", kind="option_not_used"
+        )
 
     def kept(self) -> str:
         """Says that the robot stops, if it is played on."""
