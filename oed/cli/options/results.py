@@ -51,6 +51,19 @@ class Folder(Overwriting):
 
         return ResultFolder(self.out, self.force, names=names)
 
+    def save(self, folder: ResultFolder, result: Any, **beside: Any) -> None:
+        """Writes the files of a result and its report.
+
+        Args:
+            folder: as `opened` gave it.
+            result: with a file and a page.
+            beside: what its page shows beside it.
+        """
+        from oed.reports import save_report
+
+        result.save(folder.path("report.html").parent)
+        save_report(result, folder, png=self.png, **beside)
+
     def printed(self, result: Any, *lines: str, without: Collection[str] = (), **more: Any) -> Printed:
         """Gives what a command prints of a result: its summary, further lines and the folder; its data.
 

@@ -53,7 +53,7 @@ class Loop(Verb):
         """Makes the experiments."""
         from oed.campaigns.loops import run_loop
         from oed.controllers.interrupts import terminate_as_interrupt
-        from oed.reports import save_diagnosis_report, save_loop_report
+        from oed.reports import save_report
         from robots.common.files import ResultFolder
 
         robot, output = self.robot.load(), self.output
@@ -69,9 +69,9 @@ class Loop(Verb):
                 workers=self.work.workers,
                 executor=executor,
                 force=output.force,
-                report=save_diagnosis_report,
+                report=save_report,
                 progress=progress,
             )
         with ResultFolder(output.out, True, names=["report.html"]) as folder:
-            save_loop_report(result, folder, png=output.png)
+            save_report(result, folder, png=output.png)
         return replace(output.printed(result), code=0 if result.success else 1)

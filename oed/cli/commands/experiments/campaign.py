@@ -119,7 +119,6 @@ class Campaign(Verb):
 
     def _planned(self, robot: Robot, progress: Progress) -> Planned:
         from oed import campaign
-        from oed.reports import save_campaign_report
 
         stages = (f"{name}.csv" for name in self.programme.stage_names)
         with (
@@ -141,8 +140,7 @@ class Campaign(Verb):
                 executor=executor,
                 progress=progress,
             )
-            result.save(folder.path("campaign.json").parent)
-            save_campaign_report(result, folder, png=self.output.png)
+            self.output.save(folder, result)
         return result
 
     def _resumed(self, robot: Robot) -> Planned:

@@ -5,7 +5,7 @@ Writes trajectory.csv, design.json and report.html; for a calibration also poses
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection
+from collections.abc import Collection
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar
@@ -115,28 +115,15 @@ class Design(Verb):
 
     def run(self, progress: Progress) -> Printed:
         """Designs the experiment."""
-        from oed.reports import save_design_report, save_drive_design_report
-        from oed.reports.pages.calibrations.pose_design_report import save_pose_design_report
-        from oed.reports.pages.discrimination_report import save_discrimination_report
-
         usual = ("trajectory.csv", "design.json", "report.html")
-        design: Callable[..., Any] = self._trajectory
-        save_report: Callable[..., None] = save_design_report
-        names: tuple[str, ...] = usual
-        long: tuple[str, ...] = ("segments", "fourier", "excitation")
-        if self.use == "actuators":
-            design, save_report = self._commands, save_drive_design_report
-            names, long = ("commands.csv", "design.json", "report.html"), ()
-        elif self.use == "calibration":
-            design, save_report = self._poses, save_pose_design_report
-            names, long = ("poses.csv", *usual), ("segments", "eigenvalues", "random_eigenvalues")
-        elif self.use == "discriminate":
-            design, save_report = self._rivals, save_discrimination_report
-            long = ("segments", "quality")
+        design, names, long = {
+            "actuators": (self._commands, ("commands.csv", *usual[1:]), ()),
+            "calibration": (self._poses, ("poses.csv", *usual), ("segments", "eigenvalues", "random_eigenvalues")),
+            "discriminate": (self._rivals, usual, ("segments", "quality")),
+        }.get(self.use, (self._trajectory, usual, ("segments", "fourier", "excitation")))
         with self.work.executor() as executor, self.output.opened(*names) as folder:
             result = design(executor, progress)
-            result.save(folder.path("design.json").parent)
-            save_report(result, folder, png=self.output.png)
+            self.output.save(folder, result)
         printed = self.output.printed(result, without=long)
         if getattr(result, "interrupted", False):
             note = "oed: interrupted; the best design found so far was written"
