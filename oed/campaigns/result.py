@@ -296,7 +296,7 @@ class Campaign(Planned, format="robot-oed campaign", tool=True):
             }
             write_trajectory(folder / stage.file, stage.motion, metadata, kinds=self.robot.chain.kinds, force=force)
             digests[stage.name] = sha256(folder / stage.file)
-        write_json(folder / self.FILE, self.to_dict(digests=digests), force=force)
+        write_json(folder / self.FILE, self.stated(digests=digests), force=force)
 
     @classmethod
     def load(cls, folder: str | PathLike[str], robot: Robot | None = None) -> Campaign:

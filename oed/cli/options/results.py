@@ -73,7 +73,9 @@ class Folder(Overwriting):
             without: keys of the data that are too long to print.
             more: further data.
         """
-        data: Mapping[str, Any] = result.to_dict()
+        from robots.common.records import Result
+
+        data: Mapping[str, Any] = result.stated() if isinstance(result, Result) else result.to_dict()
         data = {key: value for key, value in data.items() if key not in without} | more
         return Printed(summary="\n".join([result.summary(), *lines, f"written to {self.out.resolve()}"]), data=data)
 
