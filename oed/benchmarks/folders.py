@@ -74,6 +74,9 @@ class Benchmark(Record):
     def case(self, name: str) -> BlindCase:
         """Reads what is known of a case.
 
+        Args:
+            name: of the case.
+
         Raises:
             InputError: a case file that is missing or damaged.
         """

@@ -131,6 +131,9 @@ class Endpoint(Wire):
         handshake_interval: between two handshakes [s].
         one_address: by UDP, whether links come from one port of this computer each time, as a server needs that answers
             the first handshake only. Default: as the driver needs it.
+
+    Raises:
+        InputError: no host, another transport or form, a port or byte out of range, or a time that is not positive.
     """
 
     host: str
@@ -154,11 +157,6 @@ class Endpoint(Wire):
         return cls(driver=driver, host=host, **changes)
 
     def __post_init__(self) -> None:
-        """Checks the settings.
-
-        Raises:
-            InputError: no host, another transport or form, a port or byte out of range, or a time that is not positive.
-        """
         if not self.host.strip():
             raise InputError("the host is empty", allowed="the name or the IP address of the controller")
         self.check(least_port=1)
@@ -216,12 +214,15 @@ class StreamOptions(DriverSettings):
             m.
         ping: ping the motion port. Some drivers, as Fanuc's, read pings as points and move.
         timed: whether the controller plays in time. Otherwise only the path is watched. Default: the driver's.
-        speed: how many times faster than real time the controller to test against plays.
+        speed: how many times faster than real time the controller to test against plays [1].
         external_axes: the controller has axes behind those of the robot: they stay where they are.
         reply_time: UDP: send a point again after so long without a reply [s].
         robot_id: number of the robot at its controller.
         ignore_status: start in spite of a reported error, e-stop or manual mode.
         download_rate: points a second of a download by UDP.
+
+    Raises:
+        InputError: an unknown type of points, a number out of range, or what a driver misreads.
     """
 
     points: PointType = BY_DRIVER
@@ -240,11 +241,6 @@ class StreamOptions(DriverSettings):
     download_rate: Annotated[float, Option(hidden=True)] = 2000.0
 
     def __post_init__(self) -> None:
-        """Checks the settings.
-
-        Raises:
-            InputError: an unknown type of points, a number out of range, or what a driver misreads.
-        """
         import numpy as np
 
         self.settle(points="full", download=False, timed=True)

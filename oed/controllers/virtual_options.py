@@ -37,6 +37,9 @@ class Faults:
             that of the path.
         path_after: begin with it so long after the start of a trajectory [s].
         seed: seed of the random numbers.
+
+    Raises:
+        InputError: a share outside 0 to 1, a negative time or number, or an unknown fault of the path.
     """
 
     lose: float = 0.0
@@ -54,11 +57,6 @@ class Faults:
     seed: Seed = 0
 
     def __post_init__(self) -> None:
-        """Checks the ranges.
-
-        Raises:
-            InputError: a share outside 0 to 1, a negative time or number, or an unknown fault of the path.
-        """
         if self.path not in get_args(PathKind):
             raise InputError(f"a path fault {self.path!r}", allowed=", ".join(get_args(PathKind)))
         if not self.path_after >= 0:
@@ -94,11 +92,14 @@ class ControllerOptions(Wire):
         replies: ``bare``: without a body; echo: with the point they reply to; see `Driver`. Default: the driver's, else
             bare.
         state: reported state: ready, error, e-stop, manual or drives-off.
-        speed: how many times faster than real time.
+        speed: how many times faster than real time [1].
         wait_for_points: time stands still while the buffer is empty; otherwise an error.
         external: where axes stand that the controller has behind those of the robot [rad or m].
         start_tolerance: farthest first point from the pose [rad or m].
         faults: what goes wrong.
+
+    Raises:
+        InputError: an unknown choice, or a number out of range.
     """
 
     host: Annotated[str, Option(hidden=True)] = "127.0.0.1"
@@ -116,11 +117,6 @@ class ControllerOptions(Wire):
     faults: Faults = Faults()
 
     def __post_init__(self) -> None:
-        """Checks the settings.
-
-        Raises:
-            InputError: an unknown choice, or a number out of range.
-        """
         self.check(least_port=0)
         every = 1 if self.driver is None else max(round(self.driver.feedback_period / FEEDBACK_PERIOD), 1)
         self.settle(capacity=100, feedback="torque", replies="bare", feedback_every=every)

@@ -24,6 +24,10 @@ class DriveDesignOptions:
         margin: share of the limits that is left.
         candidates: number of segments that are simulated.
         seed: of their draw.
+
+    Raises:
+        InputError: a number that is not positive, a motion shorter than a segment, or a frequency too high for the
+            period.
     """
 
     duration: float = 20.0

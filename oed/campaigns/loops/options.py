@@ -31,6 +31,9 @@ class LoopOptions:
             all files say that the motion was not checked.
         surroundings: the floor, and boxes that the arm must not enter.
         seed: seed of the random numbers.
+
+    Raises:
+        InputError: a number out of range.
     """
 
     experiments: int = 4
@@ -44,11 +47,6 @@ class LoopOptions:
     seed: Seed = 0
 
     def __post_init__(self) -> None:
-        """Checks the numbers.
-
-        Raises:
-            InputError: a number out of range.
-        """
         if self.experiments != int(self.experiments) or self.experiments < 1:
             raise InputError(f"{self.experiments} experiments", allowed="a whole number, at least 1")
         if not 0.0 <= self.least_probability <= 1.0:

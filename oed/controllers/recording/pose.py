@@ -47,6 +47,9 @@ def read_pose(robot: Robot, endpoint: Endpoint, patience: float = 2.0, *, needs_
         patience: longest silence [s].
         needs_torque: refuse a controller whose feedback carries neither torque nor current.
 
+    Returns:
+        The pose (n,) [rad or m].
+
     Raises:
         ControllerError: no torque where it is needed.
         LinkError: the controller cannot be reached, or is silent.
