@@ -16,7 +16,7 @@ from estimation.models.extension import Extension, extension_torque, read_extens
 from estimation.models.robot_in_file import build_robot, describe_robot, require_described
 from estimation.uncertainty.quantiles import normal_quantile
 from robots.common.errors import InputError
-from robots.common.records import Record, damage_refused, read_json, write_json
+from robots.common.records import Record, damage_refused, read, read_json, write_json
 from robots.regressor import TorqueModel
 from robots.robot import Robot
 from robots.signals import Motion
@@ -269,10 +269,12 @@ def model_from_dict(data: Mapping[str, Any]) -> Model:
     Raises:
         InputError: parameters that do not belong to the terms, are not finite, or have a negative variance.
     """
-    terms = tuple(build_term(term) for term in data["terms"])
-    torque_model = TorqueModel(build_robot(data["robot"]), terms)
+    with damage_refused(None, entry="robot"):
+        robot = build_robot(data["robot"])
+    with damage_refused(None, entry="terms"):
+        torque_model = TorqueModel(robot, tuple(build_term(term) for term in data["terms"]))
     index = {name: i for i, name in enumerate(torque_model.names)}
-    parameters = data["parameters"]
+    parameters = [vars(item) for item in read(list[_Stated], data.get("parameters"), "parameters")]
     unknown = [item["name"] for item in parameters if item["name"] not in index]
     if unknown:
         raise InputError(f"parameter {unknown[0]} does not belong to the model's terms")
@@ -292,7 +294,7 @@ def model_from_dict(data: Mapping[str, Any]) -> Model:
         raise InputError(f"the variance of {wrong} is negative", remedy="identify the robot again")
     if data.get("extensions"):
         require_described(data["robot"])
-    cutoff = data["provenance"].get("cutoff_hz", 1.0)
+    cutoff = read(dict[str, Any], data.get("provenance"), "provenance").get("cutoff_hz", 1.0)
     if isinstance(cutoff, bool) or not (isinstance(cutoff, int | float) and 0 < cutoff < np.inf):
         raise InputError(f"provenance: cutoff_hz is {cutoff!r}", allowed="a positive number [Hz]")
     return Model(
@@ -310,9 +312,20 @@ def model_from_dict(data: Mapping[str, Any]) -> Model:
     )
 
 
+@dataclass(frozen=True, kw_only=True)
+class _Stated:
+    """A parameter as a file has it."""
+
+    name: str
+    value: float
+    determined: bool
+    stands_for: str
+
+
 def _shaped(entry: str, found: ArrayLike, shape: tuple[int, ...]) -> Array:
     """An array of the shape that the parameters ask for."""
-    array = np.array(found, dtype=float)
+    with damage_refused(None, entry=entry):
+        array = np.array(found, dtype=float)
     if array.shape != shape:
         raise InputError(f"found the shape {array.shape}", column=entry, allowed=f"{shape}, as there are parameters")
     return array

@@ -61,12 +61,13 @@ def read_json(
 
 
 @contextmanager
-def damage_refused(file: str | PathLike[str], *, remedy: str) -> Iterator[None]:
+def damage_refused(file: str | PathLike[str] | None, *, remedy: str = "", entry: str = "") -> Iterator[None]:
     """Says what is wrong with a file in place of the errors that come of using its entries.
 
     Args:
-        file: from which the entries are.
+        file: from which the entries are; None where a caller names it.
         remedy: what to do about it.
+        entry: the one that is used.
 
     Raises:
         InputError: an entry that is missing, or of another kind.
@@ -79,20 +80,19 @@ def damage_refused(file: str | PathLike[str], *, remedy: str) -> Iterator[None]:
         raise InputError(
             error.problem,
             file=file,
-            column=error.column,
+            column=error.column or entry or None,
             joint=error.joint,
             allowed=error.allowed,
-            remedy=error.remedy or remedy,
+            remedy=error.remedy or remedy or None,
             kind=error.kind or "damaged_result",
         ) from error
     except KeyError as error:
-        raise InputError(
-            "is missing", file=file, column=str(error.args[0]), remedy=remedy, kind="damaged_result"
-        ) from error
+        missing = str(error.args[0])
+        column = f"{entry}.{missing}" if entry and entry != missing else missing
+        raise _damaged("is missing", file, column, remedy) from error
     except (AttributeError, IndexError, TypeError, ValueError) as error:
-        raise InputError(
-            "is damaged: an entry is of another kind",
-            file=file,
-            remedy=remedy,
-            kind="damaged_result",
-        ) from error
+        raise _damaged("is damaged: it is of another kind", file, entry, remedy) from error
+
+
+def _damaged(problem: str, file: str | PathLike[str] | None, column: str, remedy: str) -> InputError:
+    return InputError(problem, file=file, column=column or None, remedy=remedy or None, kind="damaged_result")
