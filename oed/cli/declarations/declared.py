@@ -159,7 +159,7 @@ def _declared(cls: type, instance: Any, outer: Option) -> Iterator[Declared]:
         if read is None:
             continue
         kind, several = read
-        if default is MISSING and callable(field.default_factory):
+        if default is MISSING and callable(field.default_factory) and not how.typed:
             default = field.default_factory()
         if how.degrees and default is not MISSING:
             default = round(math.degrees(default), 9)
@@ -168,7 +168,7 @@ def _declared(cls: type, instance: Any, outer: Option) -> Iterator[Declared]:
             field=field.name,
             kind=kind,
             several=several,
-            default=default if default is MISSING or not how.reads else how.typed or _text(default, several),
+            default=how.typed or (default if default is MISSING or not how.reads else _text(default, several)),
             help=texts.get(field.name, ""),
             section="Arguments" if how.argument else section,
             how=how,
