@@ -17,7 +17,7 @@ import warnings
 from collections import Counter
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any
+from typing import Any, get_args
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
 
@@ -39,7 +39,7 @@ from oed.controllers.clients.watching import USUAL_ANGLE_TOLERANCE
 from oed.controllers.drivers import DRIVERS
 from oed.controllers.links import open_link
 from oed.controllers.recording.recorder import Recorder
-from oed.controllers.virtual.faults.paths import KINDS
+from oed.controllers.virtual_options import PathKind
 from oed.exports.forms.sampling import at_period
 from oed.exports.simple_message import (
     DEFAULT,
@@ -109,7 +109,7 @@ def watch_paths(robot: Robot, runs: int) -> None:
     motion = swing(robot, 750)
     options = StreamOptions(window=32, patience=5.0)
     for feedback in ("full", "position"):
-        for path in KINDS:
+        for path in get_args(PathKind):
             ends: Counter[str] = Counter()
             delays = []
             for seed in range(runs if path == "none" else max(runs // 10, 1)):

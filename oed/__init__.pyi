@@ -26,6 +26,7 @@ from oed.experiments.pose_designs import design_poses as design_poses
 from oed.exports import export_trajectory as export_trajectory
 from oed.exports import read_trajectory as read_trajectory
 from oed.exports import write_trajectory as write_trajectory
+from oed.loading import load as load
 from oed.trajectories import BSpline as BSpline
 from oed.trajectories import Family as Family
 from oed.trajectories import Fourier as Fourier

@@ -154,4 +154,5 @@ def _robot_file(spec: str | Path) -> Path:
         f"unknown robot {text!r}",
         allowed=f"{', '.join(catalogue())}, or the path of a .urdf, .xacro, .xml (MJCF) or .yaml file",
         remedy=f"did you mean {close[0]!r}?" if close else None,
+        kind="unknown_robot",
     )

@@ -179,6 +179,10 @@ class Actuators(Result, format="robot-oed actuators"):
     def value(self, parameter: str, joint: str) -> DriveValue:
         """Gives an identified parameter of a joint.
 
+        Args:
+            parameter: its name.
+            joint: name of the joint.
+
         Raises:
             InputError: it was not identified.
         """

@@ -15,8 +15,7 @@ from estimation.calibrations.repeatability import Repeatability
 from estimation.calibrations.selection import KindTrial
 from estimation.calibrations.undetermined import Undetermined
 from estimation.models.robot_in_file import build_robot, describe_robot
-from robots.common.errors import InputError
-from robots.common.records import Finding, Record, Result, axes_for, findings_of, read_json
+from robots.common.records import Finding, Record, Result, axes_for, damage_refused, findings_of, read_json
 from robots.geometry_errors.terms import error_term
 from robots.geometry_errors.terms.base import shown_unit
 from robots.robot import Robot
@@ -336,10 +335,8 @@ def load_calibration(path: str | Path) -> Calibration:
     file, remedy = Path(path), f"give a {Calibration.FILE} of oed calibrate"
     file = file / Calibration.FILE if file.is_dir() else file
     data = read_json(file, Calibration.FORMAT, Calibration.FORMAT_VERSION, remedy=remedy)
-    try:
+    with damage_refused(file, remedy=remedy):
         robot, corrected = build_robot(data["robot"]), build_robot(data["corrected"])
-    except (KeyError, TypeError, ValueError, AttributeError) as error:
-        raise InputError(f"is damaged ({type(error).__name__}: {error})", file=file, remedy=remedy) from error
     return Calibration.from_dict(data, file=file, remedy=remedy, robot=robot, corrected=corrected)
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -15,7 +14,6 @@ from numpy.typing import NDArray
 from scipy.linalg import block_diag
 
 from estimation.models.model import Model, load_model
-from robots.common.errors import InputError
 from robots.common.plain import number
 from robots.common.records import Record
 from robots.common.tables.times import YEAR_2000
@@ -140,7 +138,6 @@ def read_model_runs(paths: Sequence[str | Path]) -> list[Run]:
     models = []
     for path in paths:
         file = Path(path) / "model.json" if Path(path).is_dir() else Path(path)
-        _require_covariance(file)
         models.append((load_model(file), file))
     labels = distinct_labels([file for _, file in models])
     return [run_of(model, label, file) for (model, file), label in zip(models, labels, strict=True)]
@@ -192,19 +189,6 @@ def relabelled(runs: Sequence[Run]) -> list[Run]:
     """Gives runs whose labels are unique."""
     labels = unique_labels([run.label for run in runs])
     return [run if run.label == label else replace(run, label=label) for run, label in zip(runs, labels, strict=True)]
-
-
-def _require_covariance(file: Path) -> None:
-    try:
-        data = json.loads(file.read_text(encoding="utf-8"))
-    except (OSError, ValueError):
-        return  # `load_model` says what is wrong with it
-    if isinstance(data, dict) and "parameters" in data and data.get("covariance") is None:
-        raise InputError(
-            "the model has no covariance, so its differences from others cannot be tested",
-            file=file,
-            remedy="identify the robot again with oed identify",
-        )
 
 
 def date_in(names: Sequence[str]) -> float | None:

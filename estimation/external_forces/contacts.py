@@ -45,6 +45,7 @@ class Contact(Record):
         "peak_time",
         "force",
         "force_standard_deviation=force_deviation",
+        "force_covariance=covariance",
         "magnitude",
         "magnitude_standard_deviation=magnitude_deviation",
         "magnitude_interval95=magnitude_interval",

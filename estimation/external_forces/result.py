@@ -4,23 +4,32 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from estimation.external_forces.contacts import Contact
 from estimation.external_forces.thresholds.calibrations import Calibration
+from robots.common.errors import InputError
 from robots.common.plain import percent
-from robots.common.records import Finding, Result, findings_of
-from robots.common.tables.table_files import write_table
+from robots.common.records import Finding, Result, axes_for, findings_of, read, read_json
+from robots.common.tables.table_files import read_table, write_table
 
 if TYPE_CHECKING:
     import pandas as pd
+    from matplotlib.axes import Axes
 
 Array = NDArray[np.float64]
 
 AXES = ("x", "y", "z")
+TABLE = "forces.csv"
+REMEDY = "give the folder written by `oed force`"
+
+_FORCE = [f"f{axis}" for axis in AXES]
+_WRENCH = [f"w{what}{axis}" for what in "fm" for axis in AXES]
+_OF_JOINTS = (("torque", "tau_ext", ""), ("deviation", "tau_ext", "_sd"), ("direct", "direct", ""))
+"""Columns of the table that each joint has: the field, and how its name begins and ends."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -49,6 +58,7 @@ class ForceEstimate(Result, format="robot-oed forces", version=2):
     FILE = "forces.json"
     ENTRIES = (
         "robot",
+        "joint_names",
         "samples=t.size",
         "duration",
         "contacts",
@@ -160,6 +170,62 @@ class ForceEstimate(Result, format="robot-oed forces", version=2):
 
         return pd.DataFrame(self._columns())
 
+    def plot(self, ax: Axes | None = None) -> Axes:
+        """Draws the force at the tool over time, and marks the contacts.
+
+        Args:
+            ax: where to draw; a new figure by default.
+        """
+        axes = axes_for(ax, (7, 4))
+        for name, values in zip(AXES, self.force.T, strict=True):
+            axes.plot(self.t, values, linewidth=0.8, label=name)
+        for number, contact in enumerate(self.contacts):
+            axes.axvspan(contact.start, contact.end, alpha=0.2, color="red", label="contact" if number == 0 else None)
+        axes.set_xlabel("time [s]")
+        axes.set_ylabel("force at the tool [N]")
+        axes.legend()
+        return axes
+
+    @classmethod
+    def load(cls, folder: str | Path) -> ForceEstimate:
+        """Reads the files of `save`.
+
+        Args:
+            folder: with `forces.json` and `forces.csv`.
+
+        Raises:
+            InputError: a missing or damaged file, or one of an earlier version.
+        """
+        file, table = Path(folder) / cls.FILE, Path(folder) / TABLE
+        data = read_json(file, cls.FORMAT, cls.FORMAT_VERSION, remedy=REMEDY)
+        columns = {name: np.asarray(values, dtype=float) for name, values in read_table(table).columns.items()}
+        names = read(tuple[str, ...], data.get("joint_names"), "joint_names", file=file, remedy=REMEDY)
+        joints = range(1, 1 + len(names))
+
+        def stacked(names: list[str]) -> Array:
+            lacking = [name for name in names if name not in columns]
+            if lacking:
+                raise InputError("is missing", file=table, column=lacking[0], remedy=REMEDY)
+            return np.column_stack([columns[name] for name in names])
+
+        of_joints: dict[str, Any] = {
+            field: stacked([f"{name}{j}{end}" for j in joints]) for field, name, end in _OF_JOINTS
+        }
+        return cls.from_dict(
+            data,
+            file=file,
+            remedy=REMEDY,
+            t=columns["t"],
+            statistic=columns["statistic"],
+            extrapolates=columns["extrapolates"] > 0.0,
+            flagged=columns["contact"] > 0.0,
+            force=stacked(_FORCE),
+            force_deviation=stacked([f"{name}_sd" for name in _FORCE]),
+            wrench=stacked(_WRENCH),
+            wrench_deviation=stacked([f"{name}_sd" for name in _WRENCH]),
+            **of_joints,
+        )
+
     def _save_beside(self, folder: Path, *, force: bool) -> None:
         """Writes ``forces.csv``.
 
@@ -168,21 +234,16 @@ class ForceEstimate(Result, format="robot-oed forces", version=2):
         there is no moment, force and moment wfx.., wmx.., each with _sd, and the external joint torques tau_ext1..
         """
         units = {"t": "s", **{f"f{k}{end}": "N" for k in AXES for end in ("", "_sd")}}
-        write_table(folder / "forces.csv", self._columns(), {"content": "external forces"}, units=units, force=force)
+        write_table(folder / TABLE, self._columns(), {"content": "external forces"}, units=units, force=force)
 
     def _columns(self) -> dict[str, Array]:
         columns = {"t": self.t, "contact": self.flagged.astype(float), "statistic": self.statistic}
         columns["extrapolates"] = self.extrapolates.astype(float)
-        wrench = [f"w{what}{axis}" for what in "fm" for axis in AXES]
-        loads = (
-            ([f"f{axis}" for axis in AXES], self.force, self.force_deviation),
-            (wrench, self.wrench, self.wrench_deviation),
-        )
+        loads = ((_FORCE, self.force, self.force_deviation), (_WRENCH, self.wrench, self.wrench_deviation))
         for names, values, deviations in loads:
             for k, name in enumerate(names):
                 columns[name], columns[f"{name}_sd"] = values[:, k], deviations[:, k]
         for j in range(self.torque.shape[1]):
-            columns[f"tau_ext{j + 1}"] = self.torque[:, j]
-            columns[f"tau_ext{j + 1}_sd"] = self.deviation[:, j]
-            columns[f"direct{j + 1}"] = self.direct[:, j]
+            for field, name, end in _OF_JOINTS:
+                columns[f"{name}{j + 1}{end}"] = getattr(self, field)[:, j]
         return columns

@@ -2,42 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
-from robots.common.errors import InputError
-from robots.common.records import Record
-
-
-@dataclass(frozen=True, kw_only=True)
-class Explanation(Record):
-    """One kind of finding.
-
-    Attributes:
-        number: of its code; it never changes, and none is used twice.
-        name: as `Finding.name` has it.
-        meaning: what it says of the log.
-        example: a log that causes it.
-        remedy: what to do.
-    """
-
-    ENTRIES = ("code", "name", "meaning", "example", "remedy")
-
-    number: int
-    name: str
-    meaning: str
-    example: str
-    remedy: str
-
-    @property
-    def code(self) -> str:
-        """Its code, such as OED-L014."""
-        return f"OED-L{self.number:03d}"
-
-    def text(self) -> str:
-        """Writes the explanation as a paragraph for each part."""
-        parts = (f"{self.code} {self.name}", self.meaning, f"A log that causes it: {self.example}", self.remedy)
-        return "\n".join(parts)
-
+from robots.common.errors import ERRORS, Explanation, InputError
 
 # By the number of the code and the name: what a finding says of the log, a log that causes it, and what to do.
 _TABLE: dict[tuple[int, str], tuple[str, str, str]] = {
@@ -343,14 +308,14 @@ def explain(code: str) -> Explanation:
     """Finds an explanation.
 
     Args:
-        code: a code such as OED-L014, or the name of a finding.
+        code: a code such as OED-L014, or the name of a finding or an error.
 
     Raises:
         InputError: an unknown code.
     """
     wanted = code.strip()
-    for item in EXPLANATIONS:
+    for item in (*EXPLANATIONS, *ERRORS):
         if wanted.upper() in (item.code, item.code.removeprefix("OED-")) or wanted == item.name:
             return item
-    known = f"{EXPLANATIONS[0].code} to {EXPLANATIONS[-1].code}, or the name of a finding"
-    raise InputError(f"no finding has the code {wanted!r}", allowed=known, remedy="`oed explain` lists all codes")
+    known = f"{EXPLANATIONS[0].code} to {EXPLANATIONS[-1].code}, codes of errors, or a name"
+    raise InputError(f"no message has the code {wanted!r}", allowed=known, remedy="`oed explain` lists all codes")

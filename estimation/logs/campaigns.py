@@ -45,7 +45,7 @@ def log_files(folder: str | PathLike[str]) -> list[Path]:
         raise InputError(f"cannot be read ({error.strerror or error})", file=place) from error
     found = [entry for entry in entries if not entry.name.startswith(".") and is_log_name(entry)]
     if not found:
-        raise InputError("no logs in the folder", file=place, allowed=", ".join(SUFFIXES))
+        raise InputError("no logs in the folder", file=place, allowed=", ".join(SUFFIXES), kind="no_logs")
     return found
 
 

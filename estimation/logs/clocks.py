@@ -174,6 +174,7 @@ def _refuse_copies(logs: Sequence[Log], held_out: Sequence[Log]) -> None:
                     remedy="hold out a log of another motion"
                     if unseen
                     else "give it once; otherwise it would count twice",
+                    kind="given_twice",
                 )
 
 

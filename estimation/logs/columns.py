@@ -186,7 +186,11 @@ def unit_factor(
         fitting = [known for known in quantity.units if suits(quantity, known, kind)]
         joint = "" if factor is None else f" of a {'linear axis' if kind == 'prismatic' else 'revolute joint'}"
         raise InputError(
-            f"unit {unit!r}{joint}", file=file, column=column, allowed=", ".join(fitting).strip(", ") or "no unit"
+            f"unit {unit!r}{joint}",
+            file=file,
+            column=column,
+            allowed=", ".join(fitting).strip(", ") or "no unit",
+            kind="unknown_unit",
         )
     return factor
 

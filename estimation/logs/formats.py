@@ -80,7 +80,11 @@ def form_of(path: Path) -> str:
     if suffix in (".log", ".asc", "") and head and b"\0" not in head:
         return ".csv"
     raise InputError(
-        f"a file of type {path.suffix or '(none)'!r}", file=path, allowed=", ".join(SUFFIXES), remedy="rename it"
+        f"a file of type {path.suffix or '(none)'!r}",
+        file=path,
+        allowed=", ".join(SUFFIXES),
+        remedy="rename it",
+        kind="unknown_file_type",
     )
 
 
@@ -130,7 +134,7 @@ def read_foreign(
     form = form_of(place)
     if form in BAGS:
         if place.stat().st_size == 0:
-            raise InputError("the file is empty", file=place)
+            raise InputError("the file is empty", file=place, kind="empty_file")
         return read_bag(place, topic=topic, joints=joints)
     readers: dict[str, Callable[[Path, Callable[[str], bool]], Table]] = {
         ".mat": read_matlab,

@@ -57,6 +57,7 @@ def complete_rows(table: Table) -> tuple[Table, NDArray[np.intp], Notes]:
                 column=name,
                 allowed="numbers in some rows",
                 remedy="record the values of all joints",
+                kind="no_numbers",
             )
     rarest = int(np.argmin(has.sum(axis=0)))
     patterns = np.unique(has[timed], axis=0)

@@ -159,7 +159,10 @@ def read_logs(
         real = os.path.realpath(path)
         if real in seen:
             raise InputError(
-                "the log is given twice", file=path, remedy="give each log once; otherwise it would count twice"
+                "the log is given twice",
+                file=path,
+                remedy="give each log once; otherwise it would count twice",
+                kind="given_twice",
             )
         seen.add(real)
         log = read_log(path, n, torque=torque, mapping=mapping, joints=joints, kinds=kinds)
@@ -214,6 +217,7 @@ def _checked_names(table: Table, remedy: str) -> dict[str, Quantity]:
             row=_header_row(table),
             allowed="t (seconds), q1.. and tau1.. or i1..",
             remedy=remedy,
+            kind="missing_column",
         )
     return quantities
 
@@ -266,6 +270,7 @@ def _count_joints(table: Table, quantities: Mapping[str, Quantity], n: int | Non
                     + (f"; or remove all columns {quantity.prefix}1.." if found and quantity.prefix != "q" else "")
                     if joints
                     else remedy,
+                    kind="missing_column",
                 )
         extra = sorted(found - set(range(1, joints + 1)))
         if extra:
@@ -284,6 +289,7 @@ def _count_joints(table: Table, quantities: Mapping[str, Quantity], n: int | Non
             row=_header_row(table),
             allowed=f"{n} joints",
             remedy="choose the robot of this log",
+            kind="other_joints",
         )
     return joints
 

@@ -16,7 +16,7 @@ from estimation.models.extension import Extension, extension_torque, read_extens
 from estimation.models.robot_in_file import build_robot, describe_robot, require_described
 from estimation.uncertainty.quantiles import normal_quantile
 from robots.common.errors import InputError
-from robots.common.records import Record, read_json, write_json
+from robots.common.records import Record, damage_refused, read, read_json, write_json
 from robots.regressor import TorqueModel
 from robots.robot import Robot
 from robots.signals import Motion
@@ -264,12 +264,8 @@ def load_model(path: str | Path) -> Model:
     file = file / "model.json" if file.is_dir() else file
     remedy = "give the model.json of oed identify or oed diagnose, or the folder that holds one"
     data = read_json(file, Model.FORMAT, Model.FORMAT_VERSION, remedy=remedy)
-    try:
+    with damage_refused(file, remedy="identify the robot again with oed identify"):
         return model_from_dict(data)
-    except InputError as error:
-        raise InputError(error.problem, file=file, allowed=error.allowed, remedy=error.remedy) from error
-    except (AttributeError, KeyError, TypeError, ValueError) as error:
-        raise InputError(f"is damaged ({type(error).__name__}: {error})", file=file) from error
 
 
 def model_from_dict(data: Mapping[str, Any]) -> Model:
@@ -278,18 +274,22 @@ def model_from_dict(data: Mapping[str, Any]) -> Model:
     Raises:
         InputError: parameters that do not belong to the terms, are not finite, or have a negative variance.
     """
-    terms = tuple(build_term(term) for term in data["terms"])
-    torque_model = TorqueModel(build_robot(data["robot"]), terms)
+    with damage_refused(None, entry="robot"):
+        robot = build_robot(data["robot"])
+    with damage_refused(None, entry="terms"):
+        torque_model = TorqueModel(robot, tuple(build_term(term) for term in data["terms"]))
     index = {name: i for i, name in enumerate(torque_model.names)}
-    parameters = data["parameters"]
+    parameters = [vars(item) for item in read(list[_Stated], data.get("parameters"), "parameters")]
     unknown = [item["name"] for item in parameters if item["name"] not in index]
     if unknown:
         raise InputError(f"parameter {unknown[0]} does not belong to the model's terms")
     torque_model.symbolic()  # a term that does not suit the robot says so now, not at the first prediction
     columns = tuple(index[item["name"]] for item in parameters)
     values = np.array([item["value"] for item in parameters], dtype=float)
-    covariance = np.array(data["covariance"], dtype=float).reshape(len(parameters), len(parameters))
-    felt = np.array(data.get("felt_by_extensions", values), dtype=float).reshape(len(parameters))
+    if data.get("covariance") is None:
+        raise InputError("the model has no covariance, so nothing tells what its parameters are worth")
+    covariance = _shaped("covariance", data["covariance"], (len(parameters), len(parameters)))
+    felt = _shaped("felt_by_extensions", data.get("felt_by_extensions", values), (len(parameters),))
     if not columns or len(set(columns)) < len(columns):
         raise InputError("parameters are missing or repeated", allowed="one or more, each once")
     if not all(np.isfinite(numbers).all() for numbers in (values, covariance, felt)):
@@ -299,7 +299,7 @@ def model_from_dict(data: Mapping[str, Any]) -> Model:
         raise InputError(f"the variance of {wrong} is negative", remedy="identify the robot again")
     if data.get("extensions"):
         require_described(data["robot"])
-    cutoff = data["provenance"].get("cutoff_hz", 1.0)
+    cutoff = read(dict[str, Any], data.get("provenance"), "provenance").get("cutoff_hz", 1.0)
     if isinstance(cutoff, bool) or not (isinstance(cutoff, int | float) and 0 < cutoff < np.inf):
         raise InputError(f"provenance: cutoff_hz is {cutoff!r}", allowed="a positive number [Hz]")
     return Model(
@@ -315,6 +315,25 @@ def model_from_dict(data: Mapping[str, Any]) -> Model:
         since=None if data.get("phases_since") is None else float(data["phases_since"]),
         bearing=read_gear_load(data["borne_by_gears"], torque_model.robot) if "borne_by_gears" in data else None,
     )
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Stated:
+    """A parameter as a file has it."""
+
+    name: str
+    value: float
+    determined: bool
+    stands_for: str
+
+
+def _shaped(entry: str, found: ArrayLike, shape: tuple[int, ...]) -> Array:
+    """An array of the shape that the parameters ask for."""
+    with damage_refused(None, entry=entry):
+        array = np.array(found, dtype=float)
+    if array.shape != shape:
+        raise InputError(f"found the shape {array.shape}", column=entry, allowed=f"{shape}, as there are parameters")
+    return array
 
 
 def _with_payload(model: TorqueModel, columns: Sequence[int], values: Array, payload: ArrayLike | None) -> Array:

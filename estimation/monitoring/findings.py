@@ -80,6 +80,7 @@ class Finding(Record):
         "settled",
         "sentence",
         "advice",
+        "text?",
     )
 
     kind: Kind

@@ -23,7 +23,7 @@ from estimation.monitoring.windows.window_rows import settling
 from robots.common.errors import InputError
 from robots.common.files import write_atomic
 from robots.common.parallel import one_blas_thread
-from robots.common.records import Record, read, read_json
+from robots.common.records import Record, damage_refused, read, read_json
 
 Array = NDArray[np.float64]
 
@@ -214,8 +214,8 @@ class Monitor(Record, format="robot-oed monitor", whole=True):
             InputError: a missing or damaged file.
         """
         remedy = "start the monitor anew from the logs"
-        try:
-            data = read_json(path, cls.FORMAT, cls.FORMAT_VERSION, remedy=remedy)
+        data = read_json(path, cls.FORMAT, cls.FORMAT_VERSION, remedy=remedy)
+        with damage_refused(path, remedy=remedy):
             found = cls(
                 baseline_of(model_from_dict(data["model"]), data["model"]),
                 read(MonitorSettings, data["settings"], "settings"),
@@ -229,10 +229,6 @@ class Monitor(Record, format="robot-oed monitor", whole=True):
             found._windows.restore(data["stream"])
             if data["evaluation"] is not None:
                 found._evaluation = Evaluation.restored(data["evaluation"], found.baseline, found.settings)
-        except (InputError, AttributeError, KeyError, TypeError, ValueError) as e:
-            reason = e.problem if isinstance(e, InputError) else f"{type(e).__name__}: {e}"
-            problem = f"is not a state of a monitor, or is damaged ({reason})"
-            raise InputError(problem, file=path, remedy=remedy) from e
         return found
 
 

@@ -13,18 +13,23 @@ from numpy.typing import NDArray
 from estimation.monitoring.change_points import ChangePoint, find_change_points
 from estimation.monitoring.findings import LIGHTS, Finding, Severity, when, worst
 from estimation.monitoring.log_row import UNFIT, LogRow
+from robots.common.errors import InputError
 from robots.common.files import write_atomic
 from robots.common.records import Finding as Remark
-from robots.common.records import Result, findings_of
+from robots.common.records import Result, axes_for, findings_of, read, read_json
+from robots.common.tables.table_files import read_table
 
 if TYPE_CHECKING:
     import pandas as pd
+    from matplotlib.axes import Axes
 
     from estimation.monitoring.monitor import Monitor
 
 Array = NDArray[np.float64]
 
-RESULT = "monitor.json"
+RESULT, TABLE = "monitor.json", "trends.csv"
+REMEDY = "give the folder written by `oed monitor`"
+_COLUMNS = ("start", "end", "log", "friction_percent", "heat_percent", "rest_percent", "standard_error_percent")
 HEAT_WORDS = {
     "model": "the thermal model",
     "temperature": "measured joint temperatures",
@@ -53,6 +58,7 @@ class MonitorResult(Result, format="robot-oed monitoring", shares=("origin",)):
     FILE = RESULT
     ENTRIES = (
         "robot",
+        "joint_names",
         "light",
         "severity",
         "verdict",
@@ -211,9 +217,46 @@ class MonitorResult(Result, format="robot-oed monitoring", shares=("origin",)):
             }
         )
 
+    def plot(self, ax: Axes | None = None) -> Axes:
+        """Draws each joint's change of friction that temperature does not explain, over the time since the first log.
+
+        Args:
+            ax: where to draw; a new figure by default.
+        """
+        axes, hours = axes_for(ax, (7, 4)), (self.history["start"] - self.origin) / 3600.0
+        for name, rest in zip(self.joint_names, self.history["rest"].T, strict=True):
+            axes.plot(hours, 100.0 * np.expm1(rest), ".", markersize=3, label=name)
+        axes.set_xlabel("time [h]")
+        axes.set_ylabel("change of friction beyond temperature [%]")
+        axes.legend()
+        return axes
+
+    @classmethod
+    def load(cls, folder: str | Path) -> MonitorResult:
+        """Reads the files of `save`.
+
+        Args:
+            folder: with `monitor.json` and `trends.csv`.
+
+        Raises:
+            InputError: a missing or damaged file, or one of an earlier version.
+        """
+        file = Path(folder) / RESULT
+        data = read_json(file, cls.FORMAT, cls.FORMAT_VERSION, remedy=REMEDY)
+        names = read(tuple[str, ...], data.get("joint_names"), "joint_names", file=file, remedy=REMEDY)
+        columns = {name: np.asarray(x, dtype=float) for name, x in read_table(Path(folder) / TABLE).columns.items()}
+        lacking = [name for name in _COLUMNS if name not in columns]
+        if lacking:
+            raise InputError("is missing", file=Path(folder) / TABLE, column=lacking[0], remedy=REMEDY)
+        rows = {name: values.reshape(-1, len(names)) for name, values in columns.items()}
+        history = {name: rows[name][:, 0] for name in ("start", "end")} | {"log": rows["log"][:, 0] - 1.0}
+        history |= {name: np.log1p(rows[f"{name}_percent"] / 100.0) for name in ("friction", "heat", "rest")}
+        history["error"] = rows["standard_error_percent"] / 100.0
+        return cls.from_dict(data, file=file, remedy=REMEDY, history=history)
+
     def _save_beside(self, folder: Path, *, force: bool) -> None:
         """Writes `trends.csv`."""
-        write_atomic(folder / "trends.csv", self.to_frame().to_csv(index=False), force=force)
+        write_atomic(folder / TABLE, self.to_frame().to_csv(index=False), force=force)
 
     def rows_of(self, log: int) -> Sequence[int]:
         """Indices of the windows of a log, counted from 0."""

@@ -86,6 +86,9 @@ class Body:
 
         Args:
             pose: (4, 4) of that frame in this body's frame.
+
+        Returns:
+            The same body, its parameters about that frame.
         """
         return Body(moved_body(np.linalg.inv(np.asarray(pose, dtype=float))) @ self.parameters)
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -13,6 +12,7 @@ from estimation.predictions.earlier_logs import clock_shift, warmed
 from estimation.predictions.prediction import Prediction, predict
 from estimation.thermal import start_temperatures, thermal_from_dict
 from robots.common.errors import InputError
+from robots.common.records import read_json
 from robots.signals import Log
 
 
@@ -44,7 +44,7 @@ def heat_of(path: Path, model: Model, log: Log, earlier: Sequence[Log], ambient:
         InputError: an ambient temperature for a model without heat, or out of range.
     """
     file = path / "model.json" if path.is_dir() else path
-    thermal = thermal_from_dict(model, json.loads(file.read_text(encoding="utf-8")))
+    thermal = thermal_from_dict(model, read_json(file, remedy="give the model.json of oed thermal"))
     if thermal is None:
         if ambient is not None:
             raise InputError(

@@ -22,12 +22,13 @@ from estimation.regressions.preparation import torque_of
 from estimation.regressions.torque_meanings import as_joint_torque
 from robots.common.errors import InputError
 from robots.common.plain import joints_in_words, percent
-from robots.common.records import Finding, Result, findings_of
+from robots.common.records import Finding, Result, axes_for, findings_of
 from robots.common.tables.table_files import write_table
 from robots.signals import Log, Motion
 
 if TYPE_CHECKING:
     import pandas as pd
+    from matplotlib.axes import Axes
 
     from estimation.thermal import ThermalTorqueModel
 
@@ -227,6 +228,31 @@ class Prediction(Result):
         import pandas as pd
 
         return pd.DataFrame(self._columns())
+
+    def plot(self, ax: Axes | None = None, *, joint: int = 1) -> Axes:
+        """Draws the torque of a joint over time: predicted with its 95 % band, and as logged.
+
+        Args:
+            ax: where to draw; a new figure by default.
+            joint: counted from 1.
+
+        Raises:
+            InputError: a joint that there is not.
+        """
+        n = self.predicted.shape[1]
+        if not 1 <= joint <= n:
+            raise InputError("there is no such joint", joint=joint, allowed=f"1 to {n}")
+        axes, t, predicted = axes_for(ax, (7, 4)), self.motion.t, self.predicted[:, joint - 1]
+        if self.measured is not None:
+            axes.plot(t, self.measured[:, joint - 1], linewidth=0.8, color="0.6", label="logged")
+        axes.plot(t, predicted, label="predicted")
+        if self.band is not None:
+            half = self.band[:, joint - 1]
+            axes.fill_between(t, predicted - half, predicted + half, alpha=0.3, label="95 % band")
+        axes.set_xlabel("time [s]")
+        axes.set_ylabel(f"torque of {self.joint_names[joint - 1]} [N m or N]")
+        axes.legend()
+        return axes
 
     def save(self, path: str | Path, *, force: bool = False) -> None:
         """Writes CSV or Parquet: t, tau1..taun, and the band: tau1_lower, tau1_upper, tau1_extrapolates (0 or 1) ...

@@ -2,21 +2,19 @@
 
 from __future__ import annotations
 
-import json
 from dataclasses import dataclass
 from os import PathLike
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from robots.common.errors import InputError
-from robots.common.files import existing_file
-from robots.common.records import Record
+from robots.common.records import Record, damage_refused, read_json
 from robots.common.tables.table_files import read_table
 
 FORMAT, CASE_FORMAT, BENCHMARK_VERSION = "oed-benchmark", "oed-benchmark-case", 1
+REMEDY = "get the file again"
 MANIFEST, CASE, LOG, UNSEEN = "benchmark.json", "case.json", "log.csv", "unseen.csv"
 
 Array = NDArray[np.float64]
@@ -76,12 +74,15 @@ class Benchmark(Record):
     def case(self, name: str) -> BlindCase:
         """Reads what is known of a case.
 
+        Args:
+            name: of the case.
+
         Raises:
             InputError: a case file that is missing or damaged.
         """
         file = self.folder / name / CASE
-        data = read_json(file, CASE_FORMAT, "a case of a benchmark")
-        try:
+        data = read_json(file, CASE_FORMAT, BENCHMARK_VERSION, remedy=REMEDY)
+        with damage_refused(file, remedy=REMEDY):
             return BlindCase(
                 name=name,
                 folder=file.parent,
@@ -91,8 +92,6 @@ class Benchmark(Record):
                 noise=float(data["noise"]["torque_rms_over_signal_rms"]),
                 unseen_rows=int(data["unseen"]["rows"]),
             )
-        except (KeyError, TypeError, ValueError) as error:
-            raise InputError(f"lacks or garbles the entry {error}", file=file, remedy="get the file again") from error
 
     def summary(self) -> str:
         """Says what the benchmark is."""
@@ -114,50 +113,20 @@ def read_benchmark(folder: str | PathLike[str]) -> Benchmark:
         raise InputError(
             f"is no benchmark: it has no {MANIFEST}", file=folder, remedy="make one with `oed benchmark make FOLDER`"
         )
-    data = read_json(file, FORMAT, "a benchmark")
-    try:
+    data = read_json(file, FORMAT, BENCHMARK_VERSION, remedy=REMEDY)
+    with damage_refused(file, remedy=REMEDY):
         return Benchmark(
             folder=folder,
             identity=str(data["id"]),
             commitment=str(data["commitment"]["sha256"]),
             cases=tuple(map(str, data["cases"])),
         )
-    except (KeyError, TypeError) as error:
-        raise InputError(f"lacks or garbles the entry {error}", file=file, remedy="get the file again") from error
 
 
 def default_sealed(folder: Path) -> Path:
     """Returns where the answers of a folder lie by default."""
     absolute = folder.absolute()
     return folder.parent / f"{absolute.name}.answers"
-
-
-def read_json(file: Path, form: str, what: str) -> dict[str, Any]:
-    """Reads a JSON object of a stated format and version.
-
-    Args:
-        file: the file.
-        form: the required entry ``format``.
-        what: the file should be, for messages.
-
-    Raises:
-        InputError: no such file, no JSON, another format or version.
-    """
-    try:
-        data = json.loads(existing_file(file).read_text(encoding="utf-8"))
-    except (UnicodeDecodeError, json.JSONDecodeError) as error:
-        raise InputError(f"is no JSON ({error})", file=file) from error
-    if not isinstance(data, dict) or data.get("format") != form:
-        found = data.get("format") if isinstance(data, dict) else type(data).__name__
-        raise InputError(f"is not {what}: found the format {found!r}", file=file, column="format", allowed=form)
-    if data.get("format_version") != BENCHMARK_VERSION:
-        raise InputError(
-            f"found version {data.get('format_version')!r}",
-            file=file,
-            column="format_version",
-            allowed=str(BENCHMARK_VERSION),
-        )
-    return data
 
 
 def read_columns(file: Path, names: list[str]) -> Array:

@@ -100,6 +100,9 @@ def answer_benchmark(
         workers: number of processes; None for one per core.
         progress: receives the number of answered cases.
 
+    Returns:
+        The answers, as they were written.
+
     Raises:
         InputError: an unknown method; a folder that is no benchmark; existing answers.
     """

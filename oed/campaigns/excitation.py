@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from os import PathLike
 from pathlib import Path
 
@@ -11,7 +10,7 @@ from oed.experiments.results.design_file import DESIGN, TRAJECTORY
 from oed.experiments.results.result import Design
 from oed.exports import read_trajectory
 from robots.common.errors import InputError
-from robots.common.files import existing_file
+from robots.common.records import damage_refused, read_json
 from robots.robot import Robot
 
 
@@ -32,13 +31,10 @@ def excitation_stage(robot: Robot, design: Design | str | PathLike[str]) -> tupl
         data, motion, file = design.to_dict(), design.motion, None
     else:
         file = Path(design) / DESIGN
-        try:
-            data = json.loads(existing_file(file).read_text(encoding="utf-8"))
+        remedy = "give the folder written by `oed design`"
+        data = read_json(file, "robot-oed design", remedy=remedy)
+        with damage_refused(file, remedy=remedy):
             _ = data["robot"]["name"], data["robot"]["sha256"], data["segments"], data["quality"], data["criterion"]
-        except (OSError, UnicodeDecodeError, json.JSONDecodeError, KeyError, TypeError) as error:
-            raise InputError(
-                f"is not a design file, or is damaged ({type(error).__name__}: {error})", file=file
-            ) from error
         motion, _ = read_trajectory(Path(design) / TRAJECTORY)
     known = data["robot"]
     if known["name"] != robot.name or motion.n != robot.n:

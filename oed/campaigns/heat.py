@@ -67,7 +67,14 @@ class Temperatures:
     T2: Array
 
     def at(self, times: ArrayLike) -> tuple[Array, Array]:
-        """Interpolates T1 and T2, (K, n) each, at times (K,) [s]."""
+        """Interpolates the temperatures.
+
+        Args:
+            times: (K,) [s].
+
+        Returns:
+            T1 and T2, (K, n) each [degC].
+        """
         t = np.asarray(times, dtype=np.float64)
         first, second = (
             np.stack([np.interp(t, self.t, column) for column in values.T], axis=-1) for values in (self.T1, self.T2)

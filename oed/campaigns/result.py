@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field
 from functools import cached_property
@@ -24,8 +23,8 @@ from oed.experiments.safety_checks.margins import assumption_findings
 from oed.exports import read_trajectory, write_trajectory
 from robots.collision import Surroundings
 from robots.common.errors import InputError
-from robots.common.files import existing_file, sha256
-from robots.common.records import Finding, axes_for, findings_of, plain, write_json
+from robots.common.files import sha256
+from robots.common.records import Finding, axes_for, damage_refused, findings_of, plain, read_json, write_json
 from robots.loading import load_robot
 from robots.robot import Robot
 from robots.thermal import KnownThermal, SecondOrder
@@ -297,7 +296,7 @@ class Campaign(Planned, format="robot-oed campaign", tool=True):
             }
             write_trajectory(folder / stage.file, stage.motion, metadata, kinds=self.robot.chain.kinds, force=force)
             digests[stage.name] = sha256(folder / stage.file)
-        write_json(folder / self.FILE, self.to_dict(digests=digests), force=force)
+        write_json(folder / self.FILE, self.stated(digests=digests), force=force)
 
     @classmethod
     def load(cls, folder: str | PathLike[str], robot: Robot | None = None) -> Campaign:
@@ -310,9 +309,9 @@ class Campaign(Planned, format="robot-oed campaign", tool=True):
         Raises:
             InputError: a missing, damaged or changed file, or another robot.
         """
-        file = Path(folder) / CAMPAIGN
-        try:
-            data = json.loads(existing_file(file).read_text(encoding="utf-8"))
+        file, remedy = Path(folder) / CAMPAIGN, "run oed campaign again"
+        data = read_json(file, cls.FORMAT, cls.FORMAT_VERSION, remedy=remedy)
+        with damage_refused(file, remedy=remedy):
             known = robot or load_robot(data["robot"]["origin"], unlimited=True)
             if known.name != data["robot"]["name"]:
                 raise InputError(f"the campaign is for {data['robot']['name']}, not for {known.name}", file=file)
@@ -330,15 +329,13 @@ class Campaign(Planned, format="robot-oed campaign", tool=True):
             return cls.from_dict(
                 data,
                 file=file,
-                remedy="run oed campaign again",
+                remedy=remedy,
                 robot=known,
                 stages=tuple(stages),
                 thermal=thermal,
                 ambient=expected["ambient"],
                 cold_friction=expected["cold_friction"],
             )
-        except (OSError, UnicodeDecodeError, json.JSONDecodeError, KeyError, TypeError) as error:
-            raise InputError(f"is damaged, or no campaign: {type(error).__name__} {error}", file=file) from error
 
     def _last_slots(self) -> list[Slot]:
         return list({slot.cycle: slot for slot in self.slots}.values())

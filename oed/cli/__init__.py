@@ -15,7 +15,9 @@ def main() -> None:
     try:
         sys.exit(app(prog_name="oed", standalone_mode=False) or 0)
     except OedError as error:
-        print(f"oed: {with_nearest(error.problem, error.allowed, str(error))}", file=sys.stderr)
+        # Lines after the first are to be copied.
+        first, *more = with_nearest(error.problem, error.allowed, str(error)).split("\n")
+        print("\n".join([f"oed: {first}{f' ({error.code})' if error.code else ''}", *more]), file=sys.stderr)
         sys.exit(error.exit_code)
     except CommandLineError as error:
         if len(sys.argv) == 1:  # Help was asked for by asking for nothing.

@@ -10,6 +10,8 @@ from typing import Any
 
 import typer
 
+from robots.common.errors import ERROR_CODES
+
 # The parser's classes are not public in all versions of typer; those above its error of a bad value are the same.
 UsageError: type[Exception] = typer.BadParameter.__mro__[1]
 CommandLineError: type[Exception] = typer.BadParameter.__mro__[2]
@@ -33,7 +35,8 @@ def usage_message(error: Any) -> str:
     text = " ".join(str(_problem(error, context)).split()).rstrip(".")
     text = _OPTION.sub(r"\1", text[:1].lower() + text[1:])
     text = re.sub(r", unable to parse.*", "", text.replace(": Input should be ", ": it must be "))
-    return f"{text}; see `{path} --help`"
+    code = f" ({ERROR_CODES['unknown_option']})" if text.startswith(("no option", "no command")) else ""
+    return f"{text}; see `{path} --help`{code}"
 
 
 def _problem(error: Any, context: Any) -> str:

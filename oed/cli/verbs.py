@@ -77,7 +77,7 @@ class Verb:
         """
         verb = "does" if len(names) == 1 else "do"
         beside, remedy = self.reason(names)
-        return InputError(f"{', '.join(names)} {verb} not apply with {beside}", remedy=remedy)
+        return InputError(f"{', '.join(names)} {verb} not apply with {beside}", remedy=remedy, kind="option_not_used")
 
     def reason(self, names: Collection[str]) -> tuple[str, str]:
         """Says beside what options do not apply, and what to do.

@@ -2,30 +2,7 @@
 
 from __future__ import annotations
 
-from oed.controllers.clients.options import StreamOptions
-from oed.controllers.clients.playing import stream
-from oed.controllers.clients.result import StreamResult
-from oed.controllers.drivers import Driver, driver_of
-from oed.controllers.errors import ControllerError, LinkError
-from oed.controllers.links import Endpoint
-from oed.controllers.recording.pose import read_pose
-from oed.controllers.recording.recording import Recording, record
-from oed.controllers.virtual import ControllerOptions, Faults, VirtualController, virtual_controller
+from robots.common.lazy import lazy_exports
 
-__all__ = [
-    "ControllerError",
-    "ControllerOptions",
-    "Driver",
-    "Endpoint",
-    "Faults",
-    "LinkError",
-    "Recording",
-    "StreamOptions",
-    "StreamResult",
-    "VirtualController",
-    "driver_of",
-    "read_pose",
-    "record",
-    "stream",
-    "virtual_controller",
-]
+# The stub beside this file says which module has which name.
+__getattr__, __dir__, __all__ = lazy_exports(__name__, __file__)

@@ -69,6 +69,13 @@ def velocity_share(robot: Robot, stated: float | None) -> float:
 def usable_limits(limits: Limits, velocity_fraction: float = 1.0) -> Limits:
     """Completes infinite acceleration and jerk limits, and keeps a reserve for what happens between the samples.
 
+    Args:
+        limits: of the robot.
+        velocity_fraction: share of the velocity limits that is used.
+
+    Returns:
+        The limits for the samples of a design.
+
     Raises:
         InfeasibleError: a limit of zero.
         InputError: a joint without a velocity limit.

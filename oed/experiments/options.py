@@ -37,7 +37,8 @@ def _fourier() -> Family:
     return Fourier()
 
 
-def _surroundings() -> Surroundings:
+def usual_surroundings() -> Surroundings:
+    """Makes the floor of the robot's description, and no boxes."""
     from robots.collision import Surroundings
 
     return Surroundings()
@@ -161,7 +162,7 @@ class LimitOptions:
     torque_margin: float = 0.1
     collision: bool = True
     clearance: float = 0.01
-    surroundings: Surroundings = field(default_factory=_surroundings)
+    surroundings: Surroundings = field(default_factory=usual_surroundings)
     space: Sequence[GeometricLimit] = ()
     motion: Sequence[StateLimit] = ()
     effects: Sequence[PlantEffect] = ()

@@ -17,6 +17,9 @@ class ExportOptions:
         start_tolerance: tolerance of the start pose in programs and ros-goal [rad or m].
         name: name of the program or module. Default: that of the file for kuka and abb, else trajectory.
         remark: a line for the people who open the file, where the form has comments.
+
+    Raises:
+        InputError: a tolerance that is not positive, or a name that is no identifier.
     """
 
     start_tolerance: float = 0.01
@@ -24,11 +27,6 @@ class ExportOptions:
     remark: Annotated[str, Option(hidden=True)] = ""
 
     def __post_init__(self) -> None:
-        """Checks the choices.
-
-        Raises:
-            InputError: a tolerance that is not positive, or a name that is no identifier.
-        """
         if not self.start_tolerance > 0:
             raise InputError(f"a start tolerance of {self.start_tolerance}", allowed="above 0 [rad or m]")
         if self.name and not (self.name.isascii() and self.name.isidentifier()):

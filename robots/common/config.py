@@ -180,7 +180,7 @@ def parse_config(text: str, kind: type[C], *, file: str | PathLike[str]) -> C:
     name = str(file)
     data, node = _compose(text, name)
     if data is None:
-        raise InputError("the file is empty", file=name)
+        raise InputError("the file is empty", file=name, kind="empty_file")
     if not isinstance(data, dict):
         raise InputError(f"the file holds a {type(data).__name__}", file=name, allowed="keys and values")
     try:

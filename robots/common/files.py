@@ -38,7 +38,7 @@ def existing_file(path: str | PathLike[str]) -> Path:
         if path.is_dir():
             raise InputError("a folder, not a file", file=path, allowed="a file")
         if not path.exists():
-            raise InputError("no such file", file=path, remedy="check the path")
+            raise InputError("no such file", file=path, remedy="check the path", kind="no_such_file")
         if not path.is_file():
             raise InputError("a device or pipe, not a regular file", file=path, remedy="save the data to a file first")
         with path.open("rb"):
@@ -259,7 +259,7 @@ def _check_target(path: Path, force: bool) -> None:
                 "this is a folder, but a file should be written here", file=path, remedy="choose another name"
             )
         if os.path.lexists(path) and not force:
-            raise InputError("the file exists", file=path, remedy=_OVERWRITE)
+            raise InputError("the file exists", file=path, remedy=_OVERWRITE, kind="file_exists")
 
 
 @contextmanager

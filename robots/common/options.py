@@ -26,6 +26,8 @@ class Option:
         several: with `reads`: whether the option may be given again.
         names_file: whether the text may name a file; its place is then relative to a configuration file that has it.
         switch: whether a flag that is off by default has a spelling that switches it off.
+        degrees: whether an angle in radians is typed in degrees.
+        without: of a group: fields that are no options here.
         defaults: of a group: fields with another default here, and these.
         only: the uses of the verb to which the option belongs, see `oed.cli.verbs.Verb.use`; of all if it is empty.
     """
@@ -42,6 +44,8 @@ class Option:
     several: bool = False
     names_file: bool = False
     switch: bool = False
+    degrees: bool = False
+    without: tuple[str, ...] = ()
     defaults: tuple[tuple[str, Any], ...] = ()
     only: tuple[str, ...] = ()
 
@@ -59,7 +63,7 @@ def numbers(option: str, text: str) -> tuple[float, ...]:
     try:
         return tuple(float(part) for part in text.split(","))
     except ValueError:
-        raise InputError(f"{option} {text}", allowed="numbers, separated by commas") from None
+        raise InputError(f"{option} {text}", allowed="numbers, separated by commas", kind="not_numbers") from None
 
 
 def point(option: str, text: str) -> tuple[float, ...]:
@@ -74,7 +78,7 @@ def point(option: str, text: str) -> tuple[float, ...]:
     """
     values = numbers(option, text)
     if len(values) != 3:
-        raise InputError(f"{option} {text}", allowed="three numbers x, y, z")
+        raise InputError(f"{option} {text}", allowed="three numbers x, y, z", kind="not_numbers")
     return values
 
 
@@ -91,7 +95,7 @@ def box(option: str, text: str) -> tuple[float, ...]:
     values = numbers(option, text)
     if len(values) != 6:
         allowed = "six numbers xmin,xmax,ymin,ymax,zmin,zmax, such as 0.1,0.6,-0.5,0.5,0.05,inf"
-        raise InputError(f"{option} {text}", allowed=allowed)
+        raise InputError(f"{option} {text}", allowed=allowed, kind="not_numbers")
     return values
 
 

@@ -82,7 +82,9 @@ def select(tree: _Tree, tip: str | None, joints: Sequence[str] | None, locked: M
     """
     values = _locked_values(tree, locked or {})
     if tip is not None and tip not in tree.links:
-        raise InputError(f"there is no link {tip!r}", file=tree.file, remedy=nearest(tip, tree.links))
+        raise InputError(
+            f"there is no link {tip!r}", file=tree.file, remedy=nearest(tip, tree.links), kind="unknown_link"
+        )
     if joints is not None:
         moving = _by_names(tree, joints, tip, values)
     else:
@@ -118,7 +120,9 @@ def _locked_values(tree: _Tree, locked: Mapping[str, float]) -> dict[str, float]
 
 def _known(tree: _Tree, name: str) -> UrdfJoint:
     if name not in tree.joints:
-        raise InputError(f"there is no joint {name!r}", file=tree.file, remedy=nearest(name, tree.joints))
+        raise InputError(
+            f"there is no joint {name!r}", file=tree.file, remedy=nearest(name, tree.joints), kind="unknown_joint"
+        )
     return tree.joints[name]
 
 
@@ -180,6 +184,7 @@ def _only_one(tree: _Tree, locked: Mapping[str, float]) -> tuple[UrdfJoint, ...]
         file=tree.file,
         allowed="a tip link of these (tip: joints): " + "; ".join(lines[:_LISTED_TIPS]) + more,
         remedy="choose one by its tip (--tip) or its joints (--joints), or lock joints (--lock)",
+        kind="branches",
     )
 
 

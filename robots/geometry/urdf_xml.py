@@ -153,7 +153,7 @@ def _parse(content: bytes, file: str) -> ElementTree.Element:
         row = error.position[0]
         if b"xacro:" in content and "unbound prefix" in str(error):
             raise InputError("the file holds xacro macros", file=file, row=row, remedy=_EXPAND) from error
-        raise InputError(f"not well-formed XML: {error}", file=file, row=row) from error
+        raise InputError(f"not well-formed XML: {error}", file=file, row=row, kind="broken_xml") from error
     own = robot.tag.rpartition("}")[0]
     for element in robot.iter():
         # Comments have no name.

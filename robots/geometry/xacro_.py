@@ -100,7 +100,9 @@ def _expanded(path: Path, arguments: dict[str, str]) -> bytes:
         text = " ".join(str(error).split()) or type(error).__name__
         undefined = _UNDEFINED.search(text)
         wanted = f"give it behind the file name: '{path.name} {undefined[1]}:=VALUE'" if undefined else None
-        raise InputError(f"xacro cannot expand it: {text}", file=at, remedy=wanted) from error
+        raise InputError(
+            f"xacro cannot expand it: {text}", file=at, remedy=wanted, kind="xacro_not_expanded"
+        ) from error
     for line in _COLOUR.sub("", heard.getvalue()).splitlines():
         if line.strip():
             warnings.warn(f"{path}: xacro: {line.strip()}", AssumedValueWarning, stacklevel=2)
@@ -158,6 +160,7 @@ def find_package(name: str, beside: Path, inner: str | None = None) -> Path:
             file=beside,
             remedy="put it beside this package, with its package.xml or in a folder of that name, or set "
             "ROS_PACKAGE_PATH to the folder above it",
+            kind="package_not_found",
         )
     return found
 

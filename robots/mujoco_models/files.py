@@ -69,7 +69,9 @@ def _parsed(path: Path, sha: Any) -> Element:
         builder = ElementTree.TreeBuilder(insert_comments=True)
         root = ElementTree.fromstring(content, parser=ElementTree.XMLParser(target=builder))
     except ElementTree.ParseError as error:
-        raise InputError(f"not well-formed XML: {error}", file=path, row=error.position[0]) from error
+        raise InputError(
+            f"not well-formed XML: {error}", file=path, row=error.position[0], kind="broken_xml"
+        ) from error
     if root.tag not in ("mujoco", "mujocoinclude"):
         remedy = "a URDF's name must end in .urdf" if root.tag == "robot" else None
         raise InputError(f"the root element is <{root.tag}>", file=path, allowed="<mujoco>", remedy=remedy)

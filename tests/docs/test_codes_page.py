@@ -5,22 +5,24 @@ from __future__ import annotations
 from pathlib import Path
 
 from estimation.gate.explanations import EXPLANATIONS
+from robots.common.errors import ERRORS
 
 PAGE = Path(__file__).parents[2] / "docs" / "codes.md"
 
 HEAD = """# Codes of messages
 
-`oed check` and all commands that read logs state a code with each finding. `oed explain CODE` prints its entry. A code
-never changes its meaning.
+`oed check` and all commands that read logs state a code with each finding (`OED-L`). Frequent errors end with one:
+`OED-D` of data files, `OED-R` of robot descriptions, `OED-O` of options, `OED-F` of files of results. `oed explain
+CODE` prints its entry. A code never changes its meaning.
 """
 
 
 def page() -> str:
     """The page as the table gives it."""
     parts = [
-        f"## {item.code}: {item.name.replace('_', ' ')}\n\n{item.meaning}\n\n- A log that causes it: {item.example}\n"
+        f"## {item.code}: {item.name.replace('_', ' ')}\n\n{item.meaning}\n\n- {item.cause}: {item.example}\n"
         f"- What to do: {item.remedy}\n"
-        for item in EXPLANATIONS
+        for item in (*EXPLANATIONS, *ERRORS)
     ]
     return "\n".join([HEAD, *parts])
 

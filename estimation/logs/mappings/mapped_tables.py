@@ -252,6 +252,7 @@ def _value(table: Table, name: str) -> Column:
             file=table.path,
             column=name,
             allowed=present[:300] + (" ..." if len(present) > 300 else ""),
+            kind="mapping_without_column",
         )
     refuse_text(table, name)
     return table.columns[name]

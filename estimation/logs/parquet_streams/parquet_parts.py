@@ -198,5 +198,11 @@ def _chosen(
             )
     more = f"q{joints + 1}"
     if left["q"] and more in names:
-        raise InputError(f"the robot has {joints} joints", file=path, column=more, remedy="choose the robot of the log")
+        raise InputError(
+            f"the robot has {joints} joints",
+            file=path,
+            column=more,
+            remedy="choose the robot of the log",
+            kind="other_joints",
+        )
     return joints, [*named, *(name for name in wanted if name not in named)]

@@ -33,7 +33,7 @@ def read_matlab(path: Path, wanted: Callable[[str], bool]) -> Table:
     with path.open("rb") as stream:
         head = stream.read(520)
     if not head:
-        raise InputError("the file is empty", file=path)
+        raise InputError("the file is empty", file=path, kind="empty_file")
     variables = _read_new(path) if _HDF5 in head else _read_old(path)
     return columns_of(variables, path, wanted)
 

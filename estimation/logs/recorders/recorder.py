@@ -89,6 +89,7 @@ def numbered(table: Table, pattern: str, first: int = 0, count: int | None = Non
                 column=name,
                 row=table.first_row - 1 or None,
                 remedy="record the values of all joints",
+                kind="missing_column",
             )
     return names
 
@@ -127,4 +128,5 @@ def missing(table: Table, column: str, remedy: str) -> InputError:
         column=column,
         row=table.first_row - 1 or None,
         remedy=remedy,
+        kind="missing_column",
     )

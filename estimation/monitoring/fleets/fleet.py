@@ -24,6 +24,7 @@ from robots.common.errors import InputError, OedError
 from robots.common.files import sha256, write_atomic
 from robots.common.parallel import parallel_map
 from robots.common.progress import Progress
+from robots.common.records import read_json
 
 KEPT_VERSION = 2
 
@@ -205,7 +206,6 @@ def _baseline(model: Path, digest: str) -> Baseline:
 
 def _read(file: Path) -> dict[str, Any] | None:
     try:
-        data = json.loads(file.read_text(encoding="utf-8"))
-    except (OSError, ValueError):
+        return read_json(file, remedy="")
+    except InputError:
         return None
-    return data if isinstance(data, dict) else None

@@ -68,6 +68,7 @@ def find_members(folder: str | PathLike[str]) -> list[Member]:
             "no logs in the folder",
             file=place,
             allowed="a folder per robot, or a log per robot: " + ", ".join(SUFFIXES),
+            kind="no_logs",
         )
     names = [member.name for member in members]
     twice = next((name for name in names if names.count(name) > 1), None)

@@ -8,10 +8,11 @@ from typing import TYPE_CHECKING
 
 from estimation.monitoring.fleets.robot_row import LIGHTS, RobotRow
 from robots.common.files import write_atomic
-from robots.common.records import Finding, Result
+from robots.common.records import Finding, Result, axes_for, read_json
 
 if TYPE_CHECKING:
     import pandas as pd
+    from matplotlib.axes import Axes
 
 RESULT, TABLE = "fleet.json", "fleet.csv"
 LISTED_ROBOTS = 20
@@ -110,6 +111,31 @@ class FleetResult(Result, format="robot-oed fleet"):
                 for row in self.rows
             ]
         )
+
+    def plot(self, ax: Axes | None = None) -> Axes:
+        """Draws how many robots have which light.
+
+        Args:
+            ax: where to draw; a new figure by default.
+        """
+        axes, shown = axes_for(ax, (5, 4)), [light for light in LIGHTS if self.count(light)]
+        axes.bar(shown, [self.count(light) for light in shown], color=shown)
+        axes.set_ylabel("robots")
+        return axes
+
+    @classmethod
+    def load(cls, folder: str | Path) -> FleetResult:
+        """Reads the file of `save`; the rows have no trends.
+
+        Args:
+            folder: with `fleet.json`.
+
+        Raises:
+            InputError: a missing or damaged file.
+        """
+        file, remedy = Path(folder) / RESULT, "give the folder written by `oed fleet`"
+        data = read_json(file, cls.FORMAT, cls.FORMAT_VERSION, remedy=remedy)
+        return cls.from_dict(data, file=file, remedy=remedy)
 
     def _save_beside(self, folder: Path, *, force: bool) -> None:
         """Writes `fleet.csv`."""

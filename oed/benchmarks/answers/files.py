@@ -11,9 +11,10 @@ import numpy as np
 
 from oed.benchmarks.answers.answer import Answers, Array, CaseAnswer, NamedEffect
 from oed.benchmarks.answers.entries import case_answer
-from oed.benchmarks.folders import BENCHMARK_VERSION, Benchmark, BlindCase, read_columns, read_json
+from oed.benchmarks.folders import BENCHMARK_VERSION, Benchmark, BlindCase, read_columns
 from robots.common.errors import InputError
 from robots.common.files import ResultFolder
+from robots.common.records import read_json
 
 FORM = "oed-benchmark-answers"
 FILE = "answers.json"
@@ -32,7 +33,7 @@ def read_answers(path: str | PathLike[str], benchmark: Benchmark) -> Answers:
     """
     file = Path(path)
     file = file / FILE if file.is_dir() else file
-    data = read_json(file, FORM, "a file of answers")
+    data = read_json(file, FORM, BENCHMARK_VERSION, remedy="write them as docs/benchmark.md says")
     unknown = [key for key in data if key not in ("format", "format_version", "benchmark", "tool", "cases")]
     if unknown:
         raise InputError(f"unknown key {unknown[0]}", file=file, allowed="benchmark, tool, cases")

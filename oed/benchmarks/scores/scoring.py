@@ -97,6 +97,9 @@ def score_benchmark(
         answers: files of answers, or their folders, of one or more tools.
         sealed: the file of sealed answers; by default the folder's name with ``.answers``.
 
+    Returns:
+        A score for each tool.
+
     Raises:
         InputError: a folder that is no benchmark; sealed answers that are missing, were changed or belong to another
             benchmark; answers that are wrong in form, or answer another benchmark.

@@ -17,12 +17,12 @@ from estimation.diagnosis.experiment_plans.next_experiment import VARIANTS
 from estimation.diagnosis.experiment_plans.planned_limits import planned_problem
 from estimation.diagnosis.hypothesis_tests.hypotheses import Hypothesis
 from estimation.diagnosis.hypothesis_tests.problem import Problem
+from oed.campaigns.discrimination_options import DiscriminationOptions
 from oed.campaigns.discriminations.discrimination import Discrimination, DiscriminationScore
 from oed.campaigns.discriminations.motions import ExperimentBuilder, Run
 from oed.campaigns.discriminations.probabilities import EVALUATION_STEP, Discriminator, require_separable
 from oed.experiments.checks import velocity_share
 from robots.base_parameters import find_base_parameters
-from robots.collision import Surroundings
 from robots.common.errors import InfeasibleError, InputError, NotIdentifiableError
 from robots.common.progress import SILENT, Progress
 from robots.geometry.urdf_selection import nearest
@@ -41,14 +41,7 @@ def discriminate(
     robot: Robot,
     rivals: str | Sequence[str],
     *,
-    noise: ArrayLike | None = None,
-    size: float = 0.005,
-    friction: str = "polynomial",
-    home: ArrayLike | None = None,
-    velocity_fraction: float | None = None,
-    collision: bool = True,
-    surroundings: Surroundings | None = None,
-    seed: int = 0,
+    options: DiscriminationOptions | None = None,
     progress: Progress = SILENT,
 ) -> Discrimination:
     """Finds the experiment that distinguishes two effects best, before any log exists.
@@ -61,14 +54,7 @@ def discriminate(
         robot: the robot, its nominal dynamics known.
         rivals: two effects, such as ``stribeck:2,load_dependent_friction:2``. A joint left out is that of the other;
             left out of both, the one where the reference alone shows least.
-        noise: standard deviation of the torque noise (n,) [N m or N]; by default 2 % of each joint's torque RMS.
-        size: of what the effect shows beyond the base model, as a share of the joint's torque RMS in the reference.
-        friction: of the base model, ``polynomial`` or ``coulomb-viscous``.
-        home: pose (n,) at both ends of all motions; by default `Limits.home`.
-        velocity_fraction: share of the velocity limits to use; by default see `LimitOptions`.
-        collision: check the motions for collisions; they are not designed to avoid them, and the result says so.
-        surroundings: the floor, and boxes that the arm must not enter.
-        seed: of the reference motion.
+        options: what is planned with.
         progress: receives the progress of each kind.
 
     Raises:
@@ -77,10 +63,9 @@ def discriminate(
         InfeasibleError: no motion keeps the limits.
     """
     places = parse_rivals(rivals, robot)
-    level = _level(noise, robot)
-    if not (np.isfinite(size) and 0.0 < size <= 1.0):
-        raise InputError(f"found the size {size}", allowed="above 0, up to 1")
-    velocity_fraction = velocity_share(robot, velocity_fraction)
+    how = options or DiscriminationOptions()
+    level, size, home, seed = _level(how.noise, robot), how.size, how.home, how.seed
+    velocity_fraction, friction = velocity_share(robot, how.velocity_fraction), how.friction
     # Velocity [rad/s or m/s] at which the planned model's friction turns round.
     model = default_model(robot, friction=friction, velocity_scale=1e-3)
     builder = ExperimentBuilder(find_base_parameters(model), home=home, velocity_fraction=velocity_fraction, seed=seed)
@@ -143,7 +128,7 @@ def discriminate(
             "velocity_fraction": velocity_fraction,
             "seed": seed,
         },
-        surroundings=(surroundings or Surroundings()) if collision else None,
+        surroundings=how.surroundings if how.collision else None,
     )
 
 

@@ -5,18 +5,13 @@ from __future__ import annotations
 from dataclasses import asdict, dataclass, field
 from typing import TYPE_CHECKING, Any
 
+from oed.experiments.options import usual_surroundings
 from robots.common.errors import InputError
 from robots.common.options import Seed
 
 if TYPE_CHECKING:
     from robots.collision import CollisionModel, Surroundings
     from robots.robot import Robot
-
-
-def _usual_surroundings() -> Surroundings:
-    from robots.collision import Surroundings
-
-    return Surroundings()
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -36,6 +31,9 @@ class LoopOptions:
             all files say that the motion was not checked.
         surroundings: the floor, and boxes that the arm must not enter.
         seed: seed of the random numbers.
+
+    Raises:
+        InputError: a number out of range.
     """
 
     experiments: int = 4
@@ -45,15 +43,10 @@ class LoopOptions:
     velocity_fraction: float | None = None
     effort: str = "standard"
     collision: bool = True
-    surroundings: Surroundings = field(default_factory=_usual_surroundings)
+    surroundings: Surroundings = field(default_factory=usual_surroundings)
     seed: Seed = 0
 
     def __post_init__(self) -> None:
-        """Checks the numbers.
-
-        Raises:
-            InputError: a number out of range.
-        """
         if self.experiments != int(self.experiments) or self.experiments < 1:
             raise InputError(f"{self.experiments} experiments", allowed="a whole number, at least 1")
         if not 0.0 <= self.least_probability <= 1.0:

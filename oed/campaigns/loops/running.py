@@ -75,7 +75,7 @@ def run_loop(
         workers: processes of the design.
         executor: runs the design's searches instead.
         force: begin again, and remove what an earlier loop left in the folder.
-        report: writes a page into the folder of each diagnosis, such as `oed.reports.save_diagnosis_report`.
+        report: writes a page into the folder of each diagnosis, such as `oed.reports.save_report`.
         progress: listener.
 
     Returns:

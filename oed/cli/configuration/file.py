@@ -95,12 +95,18 @@ class Configuration:
             return typed_value(option, found, self.path.parent)
         except WrongValueError as error:
             shown = "a table" if isinstance(found, dict) else repr(found)
-            raise InputError(f"key {key}: found {shown}", file=self.path, allowed=str(error), remedy=remedy) from None
+            raise InputError(
+                f"key {key}: found {shown}",
+                file=self.path,
+                allowed=str(error),
+                remedy=remedy,
+                kind="configuration_value",
+            ) from None
 
     def _unknown(self, problem: str, path: str, key: str, known: Iterable[str]) -> InputError:
         close = nearest_name(key, sorted(known))
         remedy = f"did you mean {close}?" if close else "`oed COMMAND --help` lists the options"
-        return InputError(f"key {path}: {problem}", file=self.path, remedy=remedy)
+        return InputError(f"key {path}: {problem}", file=self.path, remedy=remedy, kind="configuration_key")
 
 
 def named_options(verb: type[Verb]) -> dict[str, Declared]:

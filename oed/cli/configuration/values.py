@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from oed.cli.declarations.declared import Declared
+from robots.common.options import box, numbers, point
 
 # Texts that may name a file, perhaps behind a number as in 2=payload.json or before arguments as in arm.xacro side:=l.
 _FILE = re.compile(r"((?:\d+=)?)(.*(?:/|\.(?:json|csv|urdf|xacro|xml|mjcf|ya?ml)(?:$|\s)).*)", re.IGNORECASE)
@@ -14,7 +15,7 @@ _EXPECTED = {
     bool: "true or false",
     int: "a whole number",
     float: "a number",
-    str: "a text in quotes, or an array of numbers",
+    str: "a text in quotes",
     Path: "a path in quotes",
 }
 
@@ -73,7 +74,8 @@ def _single(option: Declared, found: Any, folder: Path) -> Any:
         if how.most is not None and found > how.most:
             raise WrongValueError(f"{how.most:g} or less")
         return kind(found)
-    raise WrongValueError(_EXPECTED[kind] + (", or an array of them" if option.several else ""))
+    array = ", or an array of numbers" if how.reads in (numbers, point, box) else ""
+    raise WrongValueError(_EXPECTED[kind] + array + (", or an array of them" if option.several else ""))
 
 
 def _is_number(value: Any) -> bool:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 import sys
 from collections.abc import Iterator
@@ -80,13 +81,16 @@ class Declared:
         return None if typed is None else self._read(typed)
 
     def _read(self, typed: Any) -> Any:
+        if self.how.degrees:
+            return math.radians(typed)
         return self.how.reads(f"--{self.name}", typed) if self.how.reads and isinstance(typed, str) else typed
 
 
 def declared_options(cls: type) -> dict[str, Declared]:
     """Lists the options of a class and of the groups among its fields, by the names of the fields.
 
-    Fields of other types than numbers, texts, paths and flags, or tuples of them, are no options.
+    Fields of other types than numbers, texts, paths and flags, or tuples of them, are no options. Groups may have a
+    field of the same name, type and default: that is one option of all of them, described by the first.
 
     Args:
         cls: a dataclass; its docstring describes its fields under ``Attributes``.
@@ -95,17 +99,29 @@ def declared_options(cls: type) -> dict[str, Declared]:
 
 
 def group_of(cls: type, field: Field[Any]) -> type | None:
-    """Gives the options class of a field that holds a group of options; None for any other field."""
+    """Gives the options class of a field that holds a group of options, or None; None for any other field."""
     hint, how = _split(cls, field)
-    return hint if isinstance(hint, type) and is_dataclass(hint) and not how.hidden else None
+    parts = [part for part in _parts(hint) if part is not NoneType]
+    found = parts[0] if len(parts) == 1 and not how.hidden and how.reads is None else None
+    return found if isinstance(found, type) and is_dataclass(found) else None
+
+
+def required_fields(cls: type) -> list[str]:
+    """Lists the fields of an options class that have no default."""
+    return [field.name for field in fields(cls) if field.default is MISSING and field.default_factory is MISSING]
 
 
 @cache
 def _declared_options(cls: type) -> dict[str, Declared]:
     uses = getattr(cls, "uses", {})
-    found = {}
+    found: dict[str, Declared] = {}
     for item in _declared(cls, None, Option()):
-        assert item.field not in found, f"{cls.__name__} declares --{item.name} twice"
+        first = found.get(item.field, item)
+        same = (first.kind, first.several) == (item.kind, item.several) and item.default in (first.default, MISSING)
+        assert same, f"{cls.__name__} declares --{item.name} twice, with another type or default"
+        only = dict.fromkeys((*first.how.only, *item.how.only)) if first.how.only and item.how.only else ()
+        found[item.field] = replace(first, how=replace(first.how, only=tuple(only)))
+    for item in found.values():
         named = [uses[use] for use in item.how.only if use in uses]
         before = f"{' or '.join(named).capitalize()}: " if named and len(named) == len(item.how.only) else ""
         text = item.help[:1].lower() + item.help[1:] if before and not item.help[1:2].isupper() else item.help
@@ -127,26 +143,32 @@ def is_option(cls: type, field: Field[Any]) -> bool:
 def _declared(cls: type, instance: Any, outer: Option) -> Iterator[Declared]:
     texts = _texts(cls)
     for field in fields(cls):
+        if field.name in outer.without:
+            continue
         hint, how = _split(cls, field)
         how = replace(how, only=how.only or outer.only, section=how.section or outer.section)
         default = field.default if instance is None else getattr(instance, field.name)
         default = dict(outer.defaults).get(field.name, default)
         group = group_of(cls, field)
         if group is not None:
+            if default is None:
+                how = replace(how, defaults=(*how.defaults, *((name, None) for name in required_fields(group))))
             yield from _declared(group, None if default is MISSING else default, how)
             continue
         read = None if how.hidden else _kind(hint, how)
         if read is None:
             continue
         kind, several = read
-        if default is MISSING and callable(field.default_factory):
+        if default is MISSING and callable(field.default_factory) and not how.typed:
             default = field.default_factory()
+        if how.degrees and default is not MISSING:
+            default = round(math.degrees(default), 9)
         section = how.section or getattr(cls, "section", None) or (INPUT if kind is Path else SETTINGS)
         yield Declared(
             field=field.name,
             kind=kind,
             several=several,
-            default=default if default is MISSING or not how.reads else how.typed or _text(default, several),
+            default=how.typed or (default if default is MISSING or not how.reads else _text(default, several)),
             help=texts.get(field.name, ""),
             section="Arguments" if how.argument else section,
             how=how,
@@ -175,14 +197,17 @@ def _kind(hint: Any, how: Option) -> tuple[type, bool] | None:
     """What is typed: its kind, and whether several; None for a field that is no option."""
     if how.reads is not None:
         return str, how.several
-    parts = get_args(hint) if get_origin(hint) in (Union, UnionType) else (hint,)
-    inner = next((part for part in parts if part is not NoneType), None)
+    inner = next((part for part in _parts(hint) if part is not NoneType), None)
     several = get_origin(inner) is tuple and get_args(inner)[1:] == (...,)
     if several:
         inner = get_args(inner)[0]
     elif get_origin(inner) is Literal:
         inner = type(get_args(inner)[0])
     return (inner, several) if inner in KINDS else None
+
+
+def _parts(hint: Any) -> tuple[Any, ...]:
+    return get_args(hint) if get_origin(hint) in (Union, UnionType) else (hint,)
 
 
 def _text(value: Any, several: bool) -> Any:

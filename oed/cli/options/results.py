@@ -51,6 +51,19 @@ class Folder(Overwriting):
 
         return ResultFolder(self.out, self.force, names=names)
 
+    def save(self, folder: ResultFolder, result: Any, **beside: Any) -> None:
+        """Writes the files of a result and its report.
+
+        Args:
+            folder: as `opened` gave it.
+            result: with a file and a page.
+            beside: what its page shows beside it.
+        """
+        from oed.reports import save_report
+
+        result.save(folder.path("report.html").parent)
+        save_report(result, folder, png=self.png, **beside)
+
     def printed(self, result: Any, *lines: str, without: Collection[str] = (), **more: Any) -> Printed:
         """Gives what a command prints of a result: its summary, further lines and the folder; its data.
 
@@ -60,7 +73,9 @@ class Folder(Overwriting):
             without: keys of the data that are too long to print.
             more: further data.
         """
-        data: Mapping[str, Any] = result.to_dict()
+        from robots.common.records import Result
+
+        data: Mapping[str, Any] = result.stated() if isinstance(result, Result) else result.to_dict()
         data = {key: value for key, value in data.items() if key not in without} | more
         return Printed(summary="\n".join([result.summary(), *lines, f"written to {self.out.resolve()}"]), data=data)
 

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import time
 
-from oed.controllers.clients.options import StreamOptions
 from oed.controllers.clients.traffic import Traffic
 from oed.controllers.errors import ControllerError, LinkError, ProtocolError
 from oed.controllers.links import Link
+from oed.controllers.options import StreamOptions
 from oed.exports.simple_message import Comm, Frame, Kind, MessageError, Ping, Reply, WireFormat
 
 

@@ -5,9 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from oed.controllers.clients.options import StreamOptions
 from oed.controllers.errors import ControllerError
-from oed.controllers.links import Endpoint
+from oed.controllers.options import Endpoint, StreamOptions
 from oed.exports.simple_message import Status
 from oed.exports.simple_message.kinds import MANUAL
 from robots.common.errors import InputError

@@ -8,12 +8,12 @@ from collections.abc import Iterable
 import numpy as np
 
 from oed.controllers.clients.command_lag import CommandLag
-from oed.controllers.clients.options import StreamOptions
 from oed.controllers.clients.sender import Advance, Array, Sender, Watch
 from oed.controllers.clients.traffic import Traffic
 from oed.controllers.egm.link import EgmLink
 from oed.controllers.egm.messages import EgmForm
 from oed.controllers.errors import NoReplyError
+from oed.controllers.options import StreamOptions
 from oed.controllers.recording.recorder import Recorder
 from oed.exports.simple_message import FullPoint, MessageError, Point
 from robots.robot import Robot

@@ -14,7 +14,6 @@ import numpy as np
 from oed.controllers.clients.checks import check_start, check_status, require_known_form, status_problem
 from oed.controllers.clients.ending import Ending
 from oed.controllers.clients.guide import GuidePlayer
-from oed.controllers.clients.options import StreamOptions
 from oed.controllers.clients.program import ProgramPlayer
 from oed.controllers.clients.requests import Requests
 from oed.controllers.clients.result import StreamResult
@@ -24,7 +23,8 @@ from oed.controllers.clients.watching import tolerances, watch_of
 from oed.controllers.egm.link import EgmLink
 from oed.controllers.errors import ControllerError, NoReplyError, PointRefusedError
 from oed.controllers.interrupts import signals_held
-from oed.controllers.links import Endpoint, Link, open_link
+from oed.controllers.links import Link, open_link
+from oed.controllers.options import Endpoint, StreamOptions
 from oed.controllers.recording.clock import ClockAnchor
 from oed.controllers.recording.log_file import check_log_path
 from oed.controllers.recording.pose import require_torque

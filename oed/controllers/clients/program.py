@@ -13,10 +13,10 @@ from contextlib import suppress
 import numpy as np
 
 from oed.controllers.clients.command_lag import CommandLag
-from oed.controllers.clients.options import StreamOptions
 from oed.controllers.clients.sender import Advance, Array, Sender, Watch
 from oed.controllers.clients.traffic import Traffic
 from oed.controllers.errors import ControllerError, NoReplyError
+from oed.controllers.options import StreamOptions
 from oed.controllers.recording.recorder import Recorder
 from oed.controllers.rtde.link import ScriptLink
 from oed.exports.forms.urscript import SERVO_GAIN, SERVO_LOOKAHEAD, SERVO_SETTLING, start_check

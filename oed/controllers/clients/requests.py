@@ -8,12 +8,12 @@ from collections.abc import Iterable, Iterator
 from contextlib import suppress
 
 from oed.controllers.clients.channel import Channel
-from oed.controllers.clients.options import StreamOptions
 from oed.controllers.clients.replies import Verdict, answer_of, confirms_stop, described, reason
 from oed.controllers.clients.sender import Advance, Sender, Watch
 from oed.controllers.clients.traffic import Request, Traffic
 from oed.controllers.errors import ControllerError, NoReplyError, PointRefusedError
 from oed.controllers.links import Link
+from oed.controllers.options import StreamOptions
 from oed.exports.simple_message import (
     Bare,
     Comm,

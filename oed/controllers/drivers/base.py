@@ -5,8 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal
 
-from oed.exports.simple_message.kinds import MOTION_PORT, STATE_PORT
-from oed.exports.simple_message.points import PointType
+from oed.exports.simple_message.kinds import MOTION_PORT, STATE_PORT, PointType
 
 Protocol = Literal["simple_message", "rtde", "egm"]
 Pings = Literal["answered", "point", "end", "unknown"]

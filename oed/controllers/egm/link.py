@@ -8,8 +8,9 @@ import time
 from collections.abc import Callable
 
 from oed.controllers.errors import LinkError
-from oed.controllers.links.base import Endpoint, Link
+from oed.controllers.links.base import Link
 from oed.controllers.links.udp import unknown_host
+from oed.controllers.options import Endpoint
 from robots.common.errors import InputError
 
 Answer = Callable[[bytes], bytes | None]

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from oed.controllers.egm.link import EgmLink
-from oed.controllers.links.base import Endpoint, Link
+from oed.controllers.links.base import Link
 from oed.controllers.links.tcp import TcpLink
 from oed.controllers.links.udp import UdpLink
+from oed.controllers.options import Endpoint
 from oed.controllers.rtde.link import RtdeLink, ScriptLink
 
 

@@ -9,8 +9,9 @@ from collections import deque
 from typing import Protocol
 
 from oed.controllers.errors import LinkError
-from oed.controllers.links.base import Endpoint, Link
+from oed.controllers.links.base import Link
 from oed.controllers.links.udp import unknown_host
+from oed.controllers.options import Endpoint
 from oed.exports.simple_message import Splitter
 
 

@@ -7,7 +7,8 @@ import socket
 import time
 
 from oed.controllers.errors import LinkError, ProtocolError
-from oed.controllers.links.base import Endpoint, Link
+from oed.controllers.links.base import Link
+from oed.controllers.options import Endpoint
 from oed.exports.simple_message import MessageError, WireFormat
 from robots.common.errors import InputError
 

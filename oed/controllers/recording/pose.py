@@ -9,7 +9,8 @@ from numpy.typing import NDArray
 
 from oed.controllers.errors import ControllerError
 from oed.controllers.interrupts import signals_held
-from oed.controllers.links import Endpoint, open_link
+from oed.controllers.links import open_link
+from oed.controllers.options import Endpoint
 from oed.controllers.recording.feedback import Layout
 from oed.controllers.recording.recorder import Recorder
 from robots.robot import Robot
@@ -41,6 +42,9 @@ def read_pose(robot: Robot, endpoint: Endpoint, patience: float = 2.0, *, needs_
         endpoint: its controller.
         patience: longest silence [s].
         needs_torque: refuse a controller whose feedback carries neither torque nor current.
+
+    Returns:
+        The pose (n,) [rad or m].
 
     Raises:
         ControllerError: no torque where it is needed.

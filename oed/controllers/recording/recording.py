@@ -9,7 +9,8 @@ from os import PathLike, fspath
 from typing import Any
 
 from oed.controllers.interrupts import signals_held
-from oed.controllers.links import Endpoint, open_link
+from oed.controllers.links import open_link
+from oed.controllers.options import Endpoint
 from oed.controllers.recording.log_file import check_log_path
 from oed.controllers.recording.recorder import Recorder
 from oed.controllers.recording.reported_joints import require_no_further_joints, warn_of_other_robot

@@ -7,8 +7,8 @@ import time
 from math import nan
 
 from oed.controllers.errors import ControllerError, ProtocolError
-from oed.controllers.links.base import Endpoint
 from oed.controllers.links.tcp import TcpLink
+from oed.controllers.options import Endpoint
 from oed.controllers.rtde.packages import (
     AS_TORQUE,
     FIELDS,

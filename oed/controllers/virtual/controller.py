@@ -13,11 +13,11 @@ from oed.controllers.virtual.faults.network import Network
 from oed.controllers.virtual.fixed_packets import FixedPackets
 from oed.controllers.virtual.messages import feedback_frame, reply_frame, status_frame
 from oed.controllers.virtual.motoman import MotomanProgram
-from oed.controllers.virtual.options import ControllerOptions
 from oed.controllers.virtual.player import Fault, Outcome, Player
 from oed.controllers.virtual.ports import Client, Port, TcpPort, UdpPort
 from oed.controllers.virtual.robot import VirtualRobot
 from oed.controllers.virtual.service import Service
+from oed.controllers.virtual_options import ControllerOptions
 from oed.exports.simple_message import (
     Bare,
     Comm,

@@ -20,8 +20,8 @@ from oed.controllers.egm.messages import (
 )
 from oed.controllers.virtual.arm import Arm
 from oed.controllers.virtual.faults.paths import PathFault
-from oed.controllers.virtual.options import ControllerOptions
 from oed.controllers.virtual.service import Service
+from oed.controllers.virtual_options import ControllerOptions
 from oed.exports.forms.base import require_joints
 from oed.exports.simple_message import MessageError
 from robots.joints.controller_axes import axes_of, joints_of

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from oed.controllers.virtual.options import ControllerOptions
 from oed.controllers.virtual.player import Player, Sample
+from oed.controllers.virtual_options import ControllerOptions
 from oed.exports.simple_message import (
     Bare,
     Comm,

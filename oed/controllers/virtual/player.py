@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 
 from oed.controllers.virtual.buffer import Outcome, PointBuffer
 from oed.controllers.virtual.faults.paths import PathFault
-from oed.controllers.virtual.options import ControllerOptions
 from oed.controllers.virtual.robot import VirtualRobot
+from oed.controllers.virtual_options import ControllerOptions
 from oed.exports.simple_message import FullPoint, Point, Special
 
 Array = NDArray[np.float64]

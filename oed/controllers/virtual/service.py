@@ -29,7 +29,11 @@ class Service(ABC):
             self._turn()
 
     def serve(self, duration: float | None = None) -> None:
-        """Runs until Ctrl-C, or for a time [s], and closes the ports."""
+        """Runs until Ctrl-C, or for a time, and closes the ports.
+
+        Args:
+            duration: how long [s]; None for ever.
+        """
         end = None if duration is None else time.monotonic() + duration
         try:
             while end is None or time.monotonic() < end:

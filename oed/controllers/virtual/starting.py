@@ -7,8 +7,8 @@ from numpy.typing import NDArray
 
 from oed.controllers.virtual.controller import VirtualController
 from oed.controllers.virtual.egm import VirtualEgm
-from oed.controllers.virtual.options import ControllerOptions
 from oed.controllers.virtual.ur.controller import VirtualUr
+from oed.controllers.virtual_options import ControllerOptions
 from robots.plants import Plant
 from robots.robot import Robot
 

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
+from oed.experiments.drive_options import DriveDesignOptions
 from oed.experiments.drives.information import Loop, expected_errors
 from oed.experiments.drives.result import DriveDesign, ExpectedError
 from oed.experiments.drives.segments import candidates, chirp
@@ -27,44 +27,6 @@ PRIOR = 100.0
 """Standard deviation of what is known before, in sizes of the parameters."""
 SMALLER, TRIES = 0.7, 8
 """Factor on a segment that leaves a limit, and how often it is tried."""
-
-
-@dataclass(frozen=True, kw_only=True)
-class DriveDesignOptions:
-    """Settings of `design_drive_motion`.
-
-    Attributes:
-        duration: of the motion [s].
-        segment: of each piece [s].
-        period: of the command [s].
-        fastest: highest frequency [Hz].
-        reach: largest distance of a command from home [rad or m].
-        noise: standard deviation of measured positions [rad or m].
-        home: commanded position at start and end (n,); by default the middle of the range, within `reach` of zero.
-        margin: share of the limits that is left.
-        candidates: number of segments that are simulated.
-        seed: of their draw.
-    """
-
-    duration: float = 20.0
-    segment: float = 2.5
-    period: float = 0.002
-    fastest: float = 5.0
-    reach: float = 0.5
-    noise: float = 2e-4
-    home: tuple[float, ...] | None = None
-    margin: float = 0.1
-    candidates: int = 60
-    seed: int = 0
-
-    def __post_init__(self) -> None:
-        for name in ("duration", "segment", "period", "fastest", "reach", "noise"):
-            if not getattr(self, name) > 0:
-                raise InputError(f"{name} {getattr(self, name)}", allowed="a positive number")
-        if self.duration < self.segment:
-            raise InputError(f"a motion of {self.duration:g} s", allowed=f"{self.segment:g} s or more")
-        if self.fastest * self.period > 0.25:
-            raise InputError(f"{self.fastest:g} Hz by samples of {self.period:g} s", allowed="a quarter of their rate")
 
 
 @one_blas_thread()

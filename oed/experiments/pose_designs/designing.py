@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from oed.experiments.assembly import rest_pose
 from oed.experiments.checks import usable_limits, velocity_share
@@ -17,13 +16,12 @@ from oed.experiments.pose_designs.observability import pose_criterion
 from oed.experiments.pose_designs.ordering import Moves, Paths, ordered
 from oed.experiments.pose_designs.refinement import refined
 from oed.experiments.pose_designs.result import PoseDesign
-from oed.experiments.pose_designs.visibility import View
+from oed.experiments.pose_options import PoseOptions
 from oed.experiments.safety_checks.freedom import collides, freedom_of
-from robots.collision import CollisionModel, Surroundings
+from robots.collision import CollisionModel
 from robots.common.errors import InfeasibleError, InputError
 from robots.common.parallel import one_blas_thread
 from robots.common.progress import SILENT, Progress
-from robots.geometry_errors.measurements import Markers, Measurement
 from robots.geometry_errors.virtual import random_positions
 from robots.limits import Limits
 from robots.robot import Robot
@@ -34,59 +32,6 @@ Array = NDArray[np.float64]
 CANDIDATES = 1000
 DRAWS = 60  # times so many poses are drawn before the limits in space are called too tight
 REPAIRS = 4  # times an order is sought anew without a move that was found to collide
-NOISE = {"m": 1e-4, "rad": 1e-4, "px": 0.2}
-"""Usual noise of trackers, turn measurements and cameras."""
-
-
-@dataclass(frozen=True, kw_only=True)
-class PoseOptions:
-    """Which poses are allowed, and what is measured.
-
-    Attributes:
-        measurement: what the instrument measures.
-        kinds: of errors that the poses shall determine.
-        noise: standard deviation by unit: "m", "rad", "px".
-        view: what the instrument sees; None for all.
-        range_share: share of each joint's range that is used, around its middle.
-        collision: keep the arm clear of itself, the floor and obstacles, at the poses and on the way.
-        clearance: to keep [m].
-        surroundings: the floor, and boxes that the arm must not enter.
-        velocity_fraction: share of the velocity limits of the moves; see `LimitOptions`.
-        home: pose at both ends (n,) [rad or m]; by default that of the limits, or a free one.
-        dwell: time at each pose [s].
-        refine: whether poses move freely after the exchange.
-        seed: of the candidates.
-
-    Raises:
-        InputError: a share, clearance or time out of range, or noise that is not positive.
-    """
-
-    measurement: Measurement = field(default_factory=lambda: Markers(count=3))
-    kinds: tuple[str, ...] = ("joint_zero", "link_placement")
-    noise: Mapping[str, float] = field(default_factory=dict)
-    view: View | None = None
-    range_share: float = 0.9
-    collision: bool = True
-    clearance: float = 0.01
-    surroundings: Surroundings = field(default_factory=Surroundings)
-    velocity_fraction: float | None = None
-    home: ArrayLike | None = None
-    dwell: float = 2.0
-    refine: bool = True
-    seed: int = 0
-
-    def __post_init__(self) -> None:
-        if not 0.0 < self.range_share <= 1.0:
-            raise InputError(f"a share of {self.range_share:g} of the ranges", allowed="above 0, up to 1")
-        if self.clearance < 0.0 or self.dwell <= 0.0:
-            raise InputError(f"a clearance of {self.clearance:g} m and a dwell of {self.dwell:g} s", allowed="positive")
-        if any(not value > 0.0 for value in self.noise.values()):
-            raise InputError(f"noise of {dict(self.noise)}", allowed="positive numbers")
-
-    @property
-    def levels(self) -> dict[str, float]:
-        """Noise of all units."""
-        return {**NOISE, **self.noise}
 
 
 @one_blas_thread()

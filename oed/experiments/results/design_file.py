@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 from typing import Any
 
@@ -15,7 +14,7 @@ from oed.experiments.quality import design_model
 from oed.exports import read_trajectory
 from robots.base_parameters import find_base_parameters
 from robots.common.errors import InputError
-from robots.common.files import existing_file
+from robots.common.records import damage_refused, read_json
 from robots.loading import load_robot
 from robots.robot import Robot
 from robots.terms.situations.flange_body import carrying, payload_part
@@ -37,9 +36,9 @@ def read_design(
     Raises:
         InputError: a missing or damaged file, or another robot than the design's.
     """
-    file = Path(folder) / DESIGN
-    try:
-        data = json.loads(existing_file(file).read_text(encoding="utf-8"))
+    file, remedy = Path(folder) / DESIGN, "give the folder written by `oed design`"
+    data = read_json(file, "robot-oed design", remedy=remedy)
+    with damage_refused(file, remedy=remedy):
         settings = data["settings"]
         known = carrying(robot or load_robot(data["robot"]["origin"], unlimited=True), settings.get("payload"))
         model = design_model(known, settings)
@@ -56,5 +55,3 @@ def read_design(
             "motion": motion,
             "coefficients": np.array((data.get("fourier") or data["excitation"])["coefficients"]),
         }
-    except (OSError, UnicodeDecodeError, json.JSONDecodeError, KeyError, TypeError) as error:
-        raise InputError(f"is not a design file, or is damaged ({type(error).__name__}: {error})", file=file) from error

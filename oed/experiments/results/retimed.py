@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -22,9 +21,8 @@ from oed.exports import read_trajectory, write_trajectory
 from oed.retiming import Retimed
 from robots.base_parameters import BaseParameters, find_base_parameters
 from robots.common.errors import InputError
-from robots.common.files import existing_file
 from robots.common.plain import number
-from robots.common.records import Finding, Record, findings_of
+from robots.common.records import Finding, Record, damage_refused, findings_of, read_json
 from robots.limits import Margin
 from robots.loading import load_robot
 from robots.robot import Robot
@@ -212,9 +210,9 @@ class RetimedExperiment(Planned, format="robot-oed design", tool=True, shares=("
         Raises:
             InputError: a missing or damaged file, or another robot than the experiment's.
         """
-        file = Path(folder) / DESIGN
-        try:
-            data = json.loads(existing_file(file).read_text(encoding="utf-8"))
+        file, remedy = Path(folder) / DESIGN, "give the folder written by `oed retime`"
+        data = read_json(file, cls.FORMAT, cls.FORMAT_VERSION, remedy=remedy)
+        with damage_refused(file, remedy=remedy):
             known = robot or load_robot(data["robot"]["origin"], unlimited=True)
             base = find_base_parameters(design_model(known, data["settings"]))
             if list(base.names) != data["model"]["columns"]:
@@ -235,10 +233,6 @@ class RetimedExperiment(Planned, format="robot-oed design", tool=True, shares=("
                 waypoints=retiming.get("waypoints", False),
             )
             return cls.from_dict(data, file=file, robot=known, base=base, retimed=retimed)
-        except (OSError, UnicodeDecodeError, json.JSONDecodeError, KeyError, TypeError, ValueError) as error:
-            raise InputError(
-                f"is not a file of a retimed experiment, or is damaged ({type(error).__name__}: {error})", file=file
-            ) from error
 
 
 def torque_use(base: BaseParameters, motion: Motion) -> TorqueUse | None:

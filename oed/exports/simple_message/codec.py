@@ -9,8 +9,6 @@ from functools import lru_cache
 from math import isfinite
 from typing import Any, Literal
 
-import numpy as np
-
 from oed.exports.simple_message.errors import MessageError
 from oed.exports.simple_message.kinds import (
     HEADER_BYTES,
@@ -228,4 +226,6 @@ def _grouped(body: str, values: tuple[Any, ...]) -> list[int | float | Reals]:
 
 def shortest(value: float) -> float:
     """Gives the shortest decimal that a real of 4 bytes stands for: 99.996 and not 99.99600219726562."""
+    import numpy as np
+
     return float(str(np.float32(value)))

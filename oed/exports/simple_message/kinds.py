@@ -3,6 +3,10 @@
 from __future__ import annotations
 
 from enum import IntEnum, IntFlag
+from typing import Literal
+
+PointType = Literal["full", "short"]
+"""Messages with a point: JOINT_TRAJ_PT_FULL or JOINT_TRAJ_PT."""
 
 MESSAGE_JOINTS = 10
 """Reals in every array of joints; the unused ones are zero."""

@@ -3,17 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import Literal
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from oed.exports.simple_message.kinds import MESSAGE_JOINTS
+from oed.exports.simple_message.kinds import MESSAGE_JOINTS, PointType
 from oed.exports.simple_message.messages import FullPoint, Point
 from robots.common.errors import InputError
-from robots.limits import Limits
-from robots.signals import Motion
 
-PointType = Literal["full", "short"]
+if TYPE_CHECKING:
+    from robots.limits import Limits
+    from robots.signals import Motion
 
 
 def trajectory_points(
@@ -57,6 +57,7 @@ def trajectory_points(
         return
     if limits is None:
         raise InputError("points of type short need velocity limits", remedy="give the robot, or send full points")
+
     with np.errstate(divide="ignore", invalid="ignore"):
         share = np.nan_to_num(np.abs(motion.dq) / limits.velocity).max(axis=1).clip(0.0, 1.0)
     share = np.where(share > 0, share, resting).tolist()

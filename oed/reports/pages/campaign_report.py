@@ -9,13 +9,6 @@ import numpy as np
 from oed.campaigns import Campaign, Slot, Stage
 from oed.reports.pictures.campaign_pictures import temperature_picture, velocity_picture
 from oed.reports.rendering.page import Cell, Fact, Page, Section, Table, page_of, table_of
-from oed.reports.rendering.saving import save_page
-from robots.common.files import ResultFolder
-
-
-def save_campaign_report(campaign: Campaign, folder: ResultFolder, *, png: bool = False) -> None:
-    """Writes the page of a campaign, and its pictures as PNG on request."""
-    save_page(campaign_page(campaign), folder, png=png)
 
 
 def campaign_page(campaign: Campaign) -> Page:

@@ -12,17 +12,10 @@ from oed.reports.animations.building import animate
 from oed.reports.pages.motions.motion_report import animation_section, tightest_fact
 from oed.reports.pictures.trajectory_pictures import margins_picture, motion_picture, spectrum_picture
 from oed.reports.rendering.page import Cell, Fact, Page, Section, Table, page_of
-from oed.reports.rendering.saving import save_page
 from robots.collision import Surroundings
-from robots.common.files import ResultFolder
 from robots.limits import Margin
 
 Array = NDArray[np.float64]
-
-
-def save_design_report(design: Design, folder: ResultFolder, *, png: bool = False) -> None:
-    """Writes the page of a design, and its pictures as PNG on request."""
-    save_page(design_page(design), folder, png=png)
 
 
 def design_page(design: Design) -> Page:

@@ -7,11 +7,10 @@ from collections.abc import Sequence
 import numpy as np
 
 from estimation.diagnosis.experiment_plans.detection_limits import Limit
+from oed.campaigns.discriminations.detection_limits import DetectionLimits
 from oed.experiments.quality import ASSUMED_NOISE
 from oed.reports.rendering.page import Cell, Fact, Page, Section, Table
 from oed.reports.rendering.provenance import footer
-from oed.reports.rendering.saving import save_page
-from robots.common.files import ResultFolder
 from robots.common.records import findings_of
 from robots.terms.effects import EFFECTS
 
@@ -23,9 +22,14 @@ MUCH = 2.0
 """If the worst-case limit exceeds the usual one by this factor, it is shown as well."""
 
 
-def save_limits_report(limits: Sequence[Limit], robot: str, folder: ResultFolder) -> None:
-    """Writes the report on the effects that a planned experiment could show."""
-    save_page(limits_page(limits, robot), folder)
+def plan_page(result: DetectionLimits, *, robot: str = "") -> Page:
+    """Builds the page of a planned experiment.
+
+    Args:
+        result: the limits.
+        robot: its title; the name by default.
+    """
+    return limits_page(result.limits, robot or result.robot)
 
 
 def limits_page(limits: Sequence[Limit], robot: str) -> Page:

@@ -24,8 +24,6 @@ from oed.reports.rendering.joint_units import joint_titles
 from oed.reports.rendering.page import Cell, Fact, Page, Section, Table, page_of
 from oed.reports.rendering.picture import Picture
 from oed.reports.rendering.provenance import recordings_of
-from oed.reports.rendering.saving import save_page
-from robots.common.files import ResultFolder
 from robots.common.plain import percent, significant, two_digits
 from robots.signals import Log
 
@@ -35,28 +33,16 @@ SMALL = 1e-12
 """Smallest probability that is written: the tail of the noise distribution is unknown beyond it."""
 
 
-def save_diagnosis_report(
-    diagnosis: Diagnosis, folder: ResultFolder, *, log: Log | None = None, png: bool = False
-) -> None:
-    """Writes the page of a diagnosis, and its pictures as PNG on request.
-
-    Args:
-        diagnosis: what was found.
-        folder: where the page goes.
-        log: one of the logs, which the robot plays in 3-D.
-        png: whether to write the pictures.
-    """
-    animation = None if log is None else diagnosis_animation(diagnosis, log)
-    save_page(diagnosis_page(diagnosis, animation), folder, png=png)
-
-
-def diagnosis_page(diagnosis: Diagnosis, animation: Animation | None = None) -> Page:
+def diagnosis_page(diagnosis: Diagnosis, animation: Animation | None = None, *, log: Log | None = None) -> Page:
     """Builds the page: findings with their evidence, gain of the extended model, detection limits, next step.
 
     Args:
         diagnosis: just made; one that was loaded from a file has no curves.
         animation: the robot in 3-D with the joints marked that have a finding.
+        log: one of the logs, which the robot plays in 3-D where no animation is given.
     """
+    if animation is None and log is not None:
+        animation = diagnosis_animation(diagnosis, log)
     robot = diagnosis.model.robot
     sections = [_torque(diagnosis)]
     if animation is not None:

@@ -6,14 +6,7 @@ from oed.campaigns.discriminations.discrimination import Discrimination
 from oed.reports.pages.design_report import margins_section
 from oed.reports.pictures.trajectory_pictures import motion_picture
 from oed.reports.rendering.page import Fact, Page, Section, Table, page_of
-from oed.reports.rendering.saving import save_page
-from robots.common.files import ResultFolder
 from robots.terms.effects import EFFECTS, EXPERIMENTS
-
-
-def save_discrimination_report(result: Discrimination, folder: ResultFolder, *, png: bool = False) -> None:
-    """Writes the page, and its picture as PNG on request."""
-    save_page(discrimination_page(result), folder, png=png)
 
 
 def discrimination_page(result: Discrimination) -> Page:

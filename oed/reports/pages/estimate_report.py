@@ -12,21 +12,12 @@ from oed.reports.pictures.torque_pictures import residual_picture, torque_pictur
 from oed.reports.rendering.page import Cell, Fact, Page, Section, Table, page_of
 from oed.reports.rendering.picture import Picture
 from oed.reports.rendering.provenance import recordings_of
-from oed.reports.rendering.saving import save_page
-from robots.common.files import ResultFolder
 from robots.common.plain import significant, significant_error
 
 Array = NDArray[np.float64]
 
 # Pairs of parameters shown, and the correlation of their errors from which they are.
 PAIRS, CORRELATED = 12, 0.8
-
-
-def save_estimate_report(
-    estimate: Estimate, folder: ResultFolder, *, png: bool = False, methods: MethodTable | None = None
-) -> None:
-    """Writes the page of an identification, and its pictures as PNG on request."""
-    save_page(estimate_page(estimate, methods), folder, png=png)
 
 
 def estimate_page(estimate: Estimate, methods: MethodTable | None = None) -> Page:

@@ -10,16 +10,9 @@ from numpy.typing import NDArray
 from oed.experiments import ParetoFront
 from oed.reports.rendering.page import Fact, Page, Section, Table, page_of
 from oed.reports.rendering.picture import Panel, Picture, Series
-from oed.reports.rendering.saving import save_page
-from robots.common.files import ResultFolder
 
 WIDE = 5.0
 """Ratio of the largest to the smallest value from which an axis is logarithmic."""
-
-
-def save_pareto_report(front: ParetoFront, folder: ResultFolder, *, png: bool = False) -> None:
-    """Writes the page of a front, and its picture as PNG on request."""
-    save_page(pareto_page(front), folder, png=png)
 
 
 def pareto_page(front: ParetoFront) -> Page:

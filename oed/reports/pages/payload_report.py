@@ -9,15 +9,8 @@ from estimation.payloads.result import METHODS
 from oed.reports.pictures.parameter_pictures import error_bars_picture
 from oed.reports.rendering.page import Cell, Fact, Page, Section, Table, page_of
 from oed.reports.rendering.provenance import recordings_of
-from oed.reports.rendering.saving import save_page
-from robots.common.files import ResultFolder
 
 NAMES = {"mass": "mass", **{f"centre_{axis}": f"centre of mass, {axis}" for axis in "xyz"}}
-
-
-def save_payload_report(payload: PayloadEstimate, folder: ResultFolder, *, png: bool = False) -> None:
-    """Writes the page of a payload, and its picture as PNG on request."""
-    save_page(payload_page(payload), folder, png=png)
 
 
 def payload_page(payload: PayloadEstimate) -> Page:

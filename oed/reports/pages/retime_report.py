@@ -12,15 +12,8 @@ from oed.reports.pages.design_report import margins_section, parameters_section,
 from oed.reports.pages.motions.motion_report import animation_section
 from oed.reports.pictures.trajectory_pictures import motion_picture
 from oed.reports.rendering.page import Cell, Fact, Page, Section, Table, page_of
-from oed.reports.rendering.saving import save_page
-from robots.common.files import ResultFolder
 from robots.common.plain import finite
 from robots.signals import Motion
-
-
-def save_retime_report(result: RetimedExperiment, given: Motion, folder: ResultFolder, *, png: bool = False) -> None:
-    """Writes the page of a retimed experiment, and its pictures as PNG on request."""
-    save_page(retime_page(result, given), folder, png=png)
 
 
 def retime_page(result: RetimedExperiment, given: Motion) -> Page:

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from estimation.thermal import CampaignEstimate, ThermalChoice, ThermalEstimate
+from estimation.thermal.identification import ThermalIdentification
 from oed.reports.pictures.thermal_pictures import (
     duty_picture,
     duty_runs,
@@ -18,25 +19,15 @@ from oed.reports.pictures.thermal_pictures import (
 from oed.reports.rendering.page import Cell, Fact, Page, Section, Table, page_of
 from oed.reports.rendering.picture import Picture
 from oed.reports.rendering.provenance import recordings_from
-from oed.reports.rendering.saving import save_page
-from robots.common.files import ResultFolder
 from robots.common.plain import significant, significant_error
 from robots.signals import Log
 
 Array = NDArray[np.float64]
 
 
-def save_thermal_report(
-    estimate: CampaignEstimate,
-    logs: Sequence[Log],
-    folder: ResultFolder,
-    *,
-    joint: int,
-    choice: ThermalChoice | None = None,
-    png: bool = False,
-) -> None:
-    """Writes the page of a fit of friction and heat, and its pictures as PNG on request."""
-    save_page(thermal_page(estimate, logs, joint=joint, choice=choice), folder, png=png)
+def thermal_result_page(result: ThermalIdentification) -> Page:
+    """Builds the page of an identification with heat, see `thermal_page`."""
+    return thermal_page(result.estimate, result.logs, joint=result.joint, choice=result.choice)
 
 
 def thermal_page(

@@ -8,8 +8,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from estimation.uncertainty.quantiles import NORMAL_95
-from oed.reports.rendering.joint_units import joint_titles, joint_units
+from oed.reports.rendering.joint_units import joint_titles
 from oed.reports.rendering.palette import joint_role, sequence_role
+from oed.reports.rendering.panels import joint_bars, velocity_panel
 from oed.reports.rendering.picture import Line, Panel, Picture, Series
 from robots.signals import FloatArray
 
@@ -78,19 +79,18 @@ def significance_picture(
     """
     count = len(joint_names)
     titles = joint_titles(joint_names, count)
-    series = []
-    for index, (part, row) in enumerate(p_values.items()):
-        p = np.array([row.get(joint, np.nan) for joint in range(1, count + 1)])
-        texts = tuple(f"{title}, {part}: p = {value:.2g}" for title, value in zip(titles, p, strict=True))
-        height = -np.log10(np.maximum(p, SMALLEST_P))
-        places = np.arange(count, dtype=float)
-        series.append(Series(x=places, y=height, name=part, kind="bars", role=sequence_role(index), texts=texts))
-    top = max(float(np.nanmax(item.y, initial=0.0)) for item in series) if series else 0.0
-    panel = Panel(
+    found = {part: np.array([row.get(j, np.nan) for j in range(1, count + 1)]) for part, row in p_values.items()}
+    heights = {part: -np.log10(np.maximum(p, SMALLEST_P)) for part, p in found.items()}
+    top = max((float(np.nanmax(row, initial=0.0)) for row in heights.values()), default=0.0)
+    panel = joint_bars(
+        heights,
         y_label="-log10 of adjusted p-value [1]",
-        series=tuple(series),
+        joint_names=joint_names,
+        texts={
+            part: [f"{title}, {part}: p = {value:.2g}" for title, value in zip(titles, p, strict=True)]
+            for part, p in found.items()
+        },
         lines=(Line(value=float(-np.log10(alpha)), label="significant above"),),
-        categories=titles,
         y_range=(0.0, 1.15 * max(top, float(-np.log10(alpha)))),
     )
     return Picture(
@@ -125,20 +125,13 @@ def friction_runs_picture(
         joint_names: of all joints (n,).
         name: the stem of the file name.
     """
-    titles, units = joint_titles(joint_names, len(joint_names)), joint_units(kinds, len(kinds))
     panels = []
     for speed, torque, error, joint in zip(speeds, torques, errors, joints, strict=True):
-        panels.append(
-            Panel(
-                title=titles[joint - 1],
-                x_label=f"velocity [{units[joint - 1].velocity}]",
-                y_label=f"friction [{units[joint - 1].torque}]",
-                series=tuple(
-                    Series(x=speed, y=torque[k], error=NORMAL_95 * error[k], name=label, role=sequence_role(k))
-                    for k, label in enumerate(labels)
-                ),
-            )
-        )
+        series = [
+            Series(x=speed, y=torque[k], error=NORMAL_95 * error[k], name=label, role=sequence_role(k))
+            for k, label in enumerate(labels)
+        ]
+        panels.append(velocity_panel(joint, series, joint_names=joint_names, kinds=kinds, lines=()))
     return Picture(
         title="Friction of the runs",
         name=name,
@@ -172,7 +165,6 @@ def friction_difference_picture(
         joint_names: of all joints (n,).
         name: the stem of the file name.
     """
-    titles, units = joint_titles(joint_names, len(joint_names)), joint_units(kinds, len(kinds))
     panels = []
     for speed, percent, narrow, wide, joint in zip(speeds, percents, pointwise, simultaneous, joints, strict=True):
         role = joint_role(joint)
@@ -186,15 +178,8 @@ def friction_difference_picture(
             )
             for sign in (-1, 1)
         ]
-        panels.append(
-            Panel(
-                title=titles[joint - 1],
-                x_label=f"velocity [{units[joint - 1].velocity}]",
-                y_label="change [%]",
-                series=(Series(x=speed, y=percent, error=narrow, role=role), *edges),
-                lines=(Line(value=0.0, role="neutral", dash="solid"),),
-            )
-        )
+        series = [Series(x=speed, y=percent, error=narrow, role=role), *edges]
+        panels.append(velocity_panel(joint, series, joint_names=joint_names, kinds=kinds, y_label="change [%]"))
     return Picture(
         title="Change of friction",
         name=name,

@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from estimation.uncertainty.quantiles import NORMAL_95
-from oed.reports.rendering.joint_units import joint_titles
-from oed.reports.rendering.picture import Line, Panel, Picture, Series
+from oed.reports.rendering.panels import ZERO, joint_bars
+from oed.reports.rendering.picture import Panel, Picture, Series
 from robots.common.errors import InputError
 
 Array = NDArray[np.float64]
@@ -78,7 +78,7 @@ def cause_picture(
                     Series(x=x[some], y=values[some], kind="markers", role="neutral", opacity=0.25, name="samples"),
                     Series(x=middle, y=mean, error=error, role=role, name="mean with 95 % interval"),
                 ),
-                lines=(Line(value=0.0, role="neutral", dash="solid"),),
+                lines=(ZERO,),
                 y_range=(-top, top),
             )
         )
@@ -139,18 +139,15 @@ def gain_picture(
     old, new = np.asarray(before, dtype=np.float64), np.asarray(after, dtype=np.float64)
     if old.shape != new.shape or old.ndim != 1:
         raise InputError(f"shapes {old.shape} and {new.shape}", allowed="(n,), both")
-    places = np.arange(len(old), dtype=np.float64)
     return Picture(
         title="Error of the simulated torque on held-out data",
         name=name,
         panels=(
-            Panel(
+            joint_bars(
+                {"base model": 100 * old, "extended model": 100 * new},
                 y_label="error / torque RMS [%]",
-                series=(
-                    Series(x=places, y=100 * old, name="base model", kind="bars", role="residual"),
-                    Series(x=places, y=100 * new, name="extended model", kind="bars", role="good"),
-                ),
-                categories=joint_titles(joint_names, len(old)),
+                joint_names=joint_names,
+                roles=("residual", "good"),
             ),
         ),
     )

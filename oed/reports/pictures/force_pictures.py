@@ -11,6 +11,7 @@ from estimation.uncertainty.quantiles import NORMAL_95
 from oed.reports.rendering.gaps import break_at_pauses
 from oed.reports.rendering.joint_units import joint_titles, joint_units
 from oed.reports.rendering.palette import sequence_role
+from oed.reports.rendering.panels import ZERO
 from oed.reports.rendering.picture import Line, Panel, Picture, Series, Span
 from robots.signals import FloatArray
 
@@ -63,7 +64,7 @@ def load_picture(
             x_label="time [s]",
             y_label="force [N]",
             series=(_banded(times, values[:, k], spread[:, k], sequence_role(k)),),
-            lines=(Line(value=0.0, role="neutral", dash="solid"),),
+            lines=(ZERO,),
             spans=_spans(windows),
         )
         for k, axis in enumerate("xyz")

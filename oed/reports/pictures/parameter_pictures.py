@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from estimation.uncertainty.quantiles import NORMAL_95
-from oed.reports.rendering.joint_units import joint_titles, joint_units
-from oed.reports.rendering.palette import joint_role, sequence_role
+from oed.reports.rendering.palette import joint_role
+from oed.reports.rendering.panels import ZERO, joint_bars, velocity_panel
 from oed.reports.rendering.picture import Line, Panel, Picture, Series
 from robots.common.errors import InputError
 from robots.common.plain import significant, with_error
@@ -69,7 +69,7 @@ def parameter_picture(
             Panel(
                 y_label=f"value [{unit}]" if unit else "value [1]",
                 series=tuple(series),
-                lines=(Line(value=0.0, role="neutral", dash="solid"),),
+                lines=(ZERO,),
                 categories=tuple(_short(names[index]) for index in chosen),
             )
         )
@@ -115,7 +115,6 @@ def friction_picture(
     known = None if references is None else np.asarray(references, dtype=np.float64)
     spread = None if covariances is None else np.asarray(covariances, dtype=np.float64)
     count = len(table)
-    titles, units = joint_titles(joint_names, count), joint_units(kinds, count)
     panels = []
     for joint in range(count):
         dq = speeds[joint] * np.concatenate([np.linspace(-1.0, -1e-6, 100), [0.0], np.linspace(1e-6, 1.0, 100)])
@@ -130,15 +129,7 @@ def friction_picture(
         series = [Series(x=dq, y=columns @ table[joint], error=error, name=label, role=joint_role(joint + 1))]
         if known is not None and np.isfinite(known[joint]).all():
             series.append(Series(x=dq, y=columns @ known[joint], name="reference", role="neutral", dash="dash"))
-        panels.append(
-            Panel(
-                title=titles[joint],
-                x_label=f"velocity [{units[joint].velocity}]",
-                y_label=f"friction [{units[joint].torque}]",
-                series=tuple(series),
-                lines=(Line(value=0.0, role="neutral", dash="solid"),),
-            )
-        )
+        panels.append(velocity_panel(joint + 1, series, joint_names=joint_names, kinds=kinds, count=count))
     return Picture(
         title="Friction torque over velocity",
         name=name,
@@ -177,17 +168,11 @@ def error_bars_picture(
     lengths = {len(row) for row in rows.values()}
     if len(lengths) != 1:
         raise InputError(f"errors of {sorted(lengths)} joints", allowed="one number of joints")
-    count = lengths.pop()
-    panel = Panel(
+    panel = joint_bars(
+        {label: 100.0 * row for label, row in rows.items()},
         y_label="error of the torque [%]",
-        series=tuple(
-            Series(
-                x=np.arange(count, dtype=np.float64), y=100.0 * row, name=label, kind="bars", role=sequence_role(index)
-            )
-            for index, (label, row) in enumerate(rows.items())
-        ),
-        lines=tuple(Line(value=100.0 * level, label=label) for label, level in (references or {}).items()),
-        categories=joint_titles(joint_names, count),
+        joint_names=joint_names,
+        lines=[Line(value=100.0 * level, label=label) for label, level in (references or {}).items()],
     )
     return Picture(
         title="Error of the predicted torque",

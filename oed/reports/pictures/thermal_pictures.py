@@ -11,9 +11,10 @@ from numpy.typing import NDArray
 from estimation.thermal import RunFit, ThermalEstimate
 from estimation.uncertainty.quantiles import NORMAL_95
 from oed.reports.rendering.gaps import break_at_pauses
-from oed.reports.rendering.joint_units import joint_titles, joint_units
+from oed.reports.rendering.joint_units import joint_titles
 from oed.reports.rendering.palette import sequence_role
-from oed.reports.rendering.picture import Line, Panel, Picture, Series
+from oed.reports.rendering.panels import velocity_panel
+from oed.reports.rendering.picture import Panel, Picture, Series
 from oed.reports.rendering.thinning import thin_indices
 from robots.signals import Log
 from robots.thermal import cold_friction
@@ -163,7 +164,6 @@ def friction_curves_picture(
         joint_names: names (n,).
         kinds: "revolute" or "prismatic" of each joint.
     """
-    titles, units = joint_titles(joint_names, len(fits)), joint_units(kinds, len(fits))
     panels = []
     for j, fit in enumerate(fits):
         runs = _friction_runs(fit)
@@ -184,16 +184,9 @@ def friction_curves_picture(
                 )
             )
         ]
-        panels.append(
-            Panel(
-                title=titles[j],
-                x_label=f"velocity [{units[j].velocity}]",
-                y_label=f"friction [{units[j].torque}]",
-                series=tuple(series),
-                lines=(Line(value=0.0, role="neutral", dash="solid"),),
-                note=f"{100 * (most / least - 1.0):.0f} % more when cold" if least > 0.0 else "",
-            )
-        )
+        note = f"{100 * (most / least - 1.0):.0f} % more when cold" if least > 0.0 else ""
+        shown = velocity_panel(j + 1, series, joint_names=joint_names, kinds=kinds, count=len(fits), note=note)
+        panels.append(shown)
     return Picture(
         title="Friction against velocity, cold to warm",
         name="friction_curves",

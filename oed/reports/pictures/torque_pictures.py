@@ -12,7 +12,8 @@ from estimation.uncertainty.quantiles import NORMAL_95
 from oed.reports.rendering.gaps import break_at_pauses
 from oed.reports.rendering.joint_units import joint_titles, joint_units
 from oed.reports.rendering.palette import joint_role
-from oed.reports.rendering.picture import Band, Line, Panel, Picture, Series
+from oed.reports.rendering.panels import ZERO
+from oed.reports.rendering.picture import Band, Panel, Picture, Series
 from robots.common.errors import InputError
 from robots.common.plain import rounded_percent, significant
 from robots.signals import FloatArray
@@ -93,7 +94,7 @@ def torque_picture(
                 x_label="time [s]",
                 y_label=f"residual [{unit}]",
                 series=(*_band_of(times, width), Series(x=times, y=residual, name="residual", role="residual")),
-                lines=(Line(value=0.0, role="neutral", dash="solid"),),
+                lines=(ZERO,),
                 note="" if np.isfinite(residual).any() else "no measured torque to compare with",
             ),
         ]
@@ -239,7 +240,7 @@ def _against_velocity(errors: FloatArray, speeds: FloatArray, title: str, units:
         series=(
             Series(x=0.5 * (edges[1:] + edges[:-1])[full], y=mean[full], error=spread[full], kind="markers", role=role),
         ),
-        lines=(Line(value=0.0, role="neutral", dash="solid"),),
+        lines=(ZERO,),
     )
 
 

@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike
 
 from oed.reports.rendering.joint_units import JointUnits, joint_titles, joint_units
 from oed.reports.rendering.palette import joint_role, sequence_role
+from oed.reports.rendering.panels import joint_bars
 from oed.reports.rendering.picture import Line, Panel, Picture, Series, Span
 from robots.common.errors import InputError
 from robots.common.plain import significant
@@ -214,23 +215,13 @@ def margins_picture(
             row[margin.joint - 1] = min(use, MAXIMUM_USE)
             words[margin.joint - 1] = f"{margin.value:.4g} of {margin.limit:.4g} at {margin.time:.3f} s"
     shown = {quantity: row for quantity, row in used.items() if not np.isnan(row).all()} or used
-    series = tuple(
-        Series(
-            x=np.arange(count, dtype=np.float64),
-            y=row,
-            name=quantity,
-            kind="bars",
-            role=sequence_role(index),
-            texts=tuple(texts[quantity]),
-        )
-        for index, (quantity, row) in enumerate(shown.items())
-    )
     largest = max(100.0, *(float(np.nanmax(row, initial=0.0)) for row in shown.values()))
-    panel = Panel(
+    panel = joint_bars(
+        shown,
         y_label="use of the limit [%]",
-        series=series,
+        joint_names=joint_names,
+        texts=texts,
         lines=(Line(value=100.0, label="limit"),),
-        categories=joint_titles(joint_names, count),
         y_range=(0.0, 1.12 * largest),
     )
     return Picture(

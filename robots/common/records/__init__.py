@@ -1,7 +1,7 @@
 """Results as plain data: written, read back, and checked."""
 
 from robots.common.records.entries import entries_of, plain
-from robots.common.records.files import read_json, write_json
+from robots.common.records.files import damage_refused, read_json, write_json
 from robots.common.records.findings import Finding, effect_code, findings_of, severity
 from robots.common.records.reading import read, read_null_as
 from robots.common.records.record import Record, Result, axes_for
@@ -11,6 +11,7 @@ __all__ = [
     "Record",
     "Result",
     "axes_for",
+    "damage_refused",
     "effect_code",
     "entries_of",
     "findings_of",

@@ -62,7 +62,12 @@ class Reader:
     def fail(self, path: str, problem: str, allowed: str = "") -> InputError:
         """Makes the error of an entry."""
         return InputError(
-            problem, file=self.file, column=path or None, allowed=allowed or None, remedy=self.remedy or None
+            problem,
+            file=self.file,
+            column=path or None,
+            allowed=allowed or None,
+            remedy=self.remedy or None,
+            kind="damaged_result",
         )
 
     def record(self, kind: Any, data: object, path: str, given: Mapping[str, Any]) -> object:
@@ -84,6 +89,7 @@ class Reader:
                 f"{kind.__name__}: its JSON does not hold all of it ({', '.join(lacking)})",
                 file=self.file,
                 remedy="read its folder by the load function, or keep the object",
+                kind="damaged_result",
             )
         return kind(**found)
 
@@ -94,11 +100,15 @@ class Reader:
         hints = _hints(kind)
         nulls = {item.name: item.metadata.get("null", ()) for item in fields(kind)} if has_fields(kind) else {}
         parts: dict[str, list[Any]] = {}
+        inner: dict[str, dict[str, Any]] = {}
         for entry in entries_of(kind, self.whole):
             here = f"{path}.{entry.key}" if path else entry.key
             found = _inside(data, entry.key)
             for place, text in enumerate(entry.paths):
                 name, index = _item(text)
+                outer, _, within = text.partition(".")
+                if within and outer in nulls and outer not in given and found is not MISSING:
+                    inner.setdefault(outer, {})[within] = found
                 if name not in hints or name in given or (has_fields(kind) and name not in nulls):
                     continue
                 if found is MISSING and name not in optional and not (entry.unless_empty and not has_fields(kind)):
@@ -116,6 +126,10 @@ class Reader:
                         raise self.fail(here, f"found {_short(found)}", f"a list of {len(entry.paths)}")
                     item = found[place]
                 yield name, self.value(hint, item, here, nulls.get(name, ()))
+        for name, stated in inner.items():
+            # A record whose fields are all entries of this one.
+            if has_fields(hints[name]) and {item.name for item in fields(hints[name])} <= stated.keys():
+                yield name, self.record(hints[name], stated, path, {})
 
     def value(self, hint: Any, data: Any, path: str, null: Sequence[float] = ()) -> Any:
         """Reads one value of the kind that a hint states."""

@@ -138,7 +138,16 @@ class Result(Record):
             InputError: a file is there, and force is not given.
         """
         self._save_beside(Path(folder), force=force)
-        write_json(Path(folder) / self.FILE, self.to_dict(), force=force)
+        write_json(Path(folder) / self.FILE, self.stated(), force=force)
+
+    def stated(self, **context: Any) -> dict[str, Any]:
+        """Gives the record as plain data, with its conclusion and remarks, as files and ``--json`` have it.
+
+        Args:
+            context: see `Record.to_dict`.
+        """
+        remarks = [{key: text for key, text in vars(remark).items() if text} for remark in self.remarks]
+        return self.to_dict(**context) | {"conclusion": self.conclusion, "remarks": remarks}
 
     def _save_beside(self, folder: Path, *, force: bool) -> None:
         """Writes what belongs to the JSON file; nothing by default."""

@@ -127,7 +127,7 @@ def write_csv(
 
 def _opened(path: Path) -> mmap.mmap:
     if path.stat().st_size == 0:
-        raise InputError("the file is empty", file=path)
+        raise InputError("the file is empty", file=path, kind="empty_file")
     with path.open("rb") as stream:
         return mmap.mmap(stream.fileno(), 0, access=mmap.ACCESS_READ)
 

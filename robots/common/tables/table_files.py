@@ -90,7 +90,11 @@ def _suffix(path: Path) -> str:
     suffix = path.suffix.lower()
     if suffix not in SUFFIXES:
         raise InputError(
-            f"a file of type {path.suffix or '(none)'!r}", file=path, allowed=" or ".join(SUFFIXES), remedy="rename it"
+            f"a file of type {path.suffix or '(none)'!r}",
+            file=path,
+            allowed=" or ".join(SUFFIXES),
+            remedy="rename it",
+            kind="unknown_file_type",
         )
     return suffix
 
@@ -158,7 +162,7 @@ def read_parquet(path: Path, wanted: Callable[[str], bool]) -> Table:
         InputError: no Parquet file, a column twice, or a column that holds neither numbers nor text.
     """
     if path.stat().st_size == 0:
-        raise InputError("the file is empty", file=path)
+        raise InputError("the file is empty", file=path, kind="empty_file")
     try:
         with pq.ParquetFile(path, memory_map=True) as file:
             schema = file.schema_arrow

@@ -1,5 +1,6 @@
 import copy
 import json
+import re
 import shutil
 
 import numpy as np
@@ -176,14 +177,19 @@ DAMAGES = {
 
 @pytest.mark.parametrize("damage", DAMAGES.values(), ids=DAMAGES.keys())
 def test_damaged_files_are_refused(content, written, damage):
-    """Whatever is wrong with a model file, one error names the file."""
+    """Whatever is wrong with a model file, one error names file, entry and remedy, in the words of no library."""
     data = copy.deepcopy(content)
     damage(data)
     path = written(data)
     with pytest.raises(InputError) as caught:
         load_model(path)
     assert caught.value.file == str(path)
-    assert "\n" not in str(caught.value)
+    text = str(caught.value)
+    assert "\n" not in text
+    assert caught.value.remedy
+    assert not re.search(
+        r"\w+Error|NoneType|reshape|subscript|object has no|'str'|could not convert|unhashable", text
+    ), text
 
 
 @pytest.mark.parametrize("text", ["", "{", "[]", "null", "3", '"robot-oed model"', "\x00"])

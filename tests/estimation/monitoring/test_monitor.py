@@ -144,5 +144,5 @@ def test_rows_that_are_wrong_are_refused(arm, monitor, tmp_path):
         monitor.update(log.t, log.q, log.tau)
     file = tmp_path / "state.json"
     file.write_text("{}")
-    with pytest.raises(InputError, match="is not a state"):
+    with pytest.raises(InputError, match="is not a monitor file"):
         Monitor.load(file)

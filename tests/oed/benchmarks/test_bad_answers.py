@@ -59,8 +59,8 @@ def test_entries(blind, write, cases: Any, message: str):
     ("other", "message"),
     [
         ({"benchmark": "f" * 16}, "answers another benchmark"),
-        ({"format": "answers"}, "not a file of answers: found the format 'answers'"),
-        ({"format_version": 2}, "found version 2; allowed: 1"),
+        ({"format": "answers"}, "is not an oed-benchmark-answers file"),
+        ({"format_version": 2}, "format version 2; allowed: up to 1"),
         ({"tool": "mine"}, "tool: found 'mine'"),
         ({"seed": 1}, "unknown key seed"),
     ],
@@ -74,7 +74,7 @@ def test_heads(blind, write, other: dict[str, Any], message: str):
 def test_no_json(blind, tmp_path: Path):
     """A file that is no JSON says so."""
     (tmp_path / "broken.json").write_text("{")
-    with pytest.raises(InputError, match="is no JSON"):
+    with pytest.raises(InputError, match="is not an oed-benchmark-answers file"):
         read_answers(tmp_path / "broken.json", blind)
 
 

@@ -185,7 +185,7 @@ def test_a_changed_file_is_refused(saved: Path, tmp_path: Path) -> None:
     with pytest.raises(InputError, match=r"friction\.csv"):
         Campaign.load(folder)
     (folder / "campaign.json").write_text("{}")
-    with pytest.raises(InputError, match="damaged, or no campaign"):
+    with pytest.raises(InputError, match="is not a campaign file"):
         Campaign.load(folder)
 
 

@@ -111,11 +111,11 @@ def test_interrupted(command: str, run, arguments, tmp_path: Path, monkeypatch: 
 
     # The last step of each command: everything before has been done.
     places = {
-        "design": "oed.reports.save_design_report",
-        "retime": "oed.reports.save_retime_report",
+        "design": "oed.reports.save_report",
+        "retime": "oed.reports.save_report",
         "export": "oed.exports.writing.write_trajectory",
         "simulate": "estimation.logs.write_log",
-        "identify": "oed.reports.save_estimate_report",
+        "identify": "oed.reports.save_report",
         "predict": "estimation.predictions.prediction.Prediction.save",
     }
     monkeypatch.setattr(places[command], interrupt)

@@ -41,6 +41,20 @@ def test_help_is_light() -> None:
 
 
 @pytest.mark.slow
+def test_options_are_light() -> None:
+    """The options of all commands load none of the libraries that take seconds: a configuration file needs them all."""
+    code = (
+        "import sys\n"
+        "from oed.cli.app import VERBS\n"
+        "from oed.cli.declarations.declared import declared_options\n"
+        "assert all(declared_options(verb) for verb in VERBS.values())\n"
+        f"print('loaded:', *(set(sys.modules) & set({HEAVY}) - {{'numpy', 'scipy'}}))"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.splitlines()[-1].strip() == "loaded:"
+
+
+@pytest.mark.slow
 def test_help_is_quick() -> None:
     """`oed --help` takes less than half a second of the processor."""
     before = resource.getrusage(resource.RUSAGE_CHILDREN)

@@ -11,7 +11,6 @@ import pytest
 from oed.controllers import ControllerError, Endpoint, StreamOptions, record, stream
 from oed.controllers.errors import ProtocolError
 from oed.controllers.recording.pose import read_pose
-from oed.exports.simple_message import WireFormat
 from robots.common.errors import InputError
 from robots.signals import Motion
 from tests.oed.controllers.conftest import swing
@@ -29,7 +28,7 @@ def place_of(tap: Tap, transport: str, order: str = "little") -> Endpoint:
         transport=transport,  # type: ignore[arg-type]
         motion_port=tap.motion_port,
         state_port=tap.state_port,
-        form=WireFormat(byte_order=order),  # type: ignore[arg-type]
+        byte_order=order,  # type: ignore[arg-type]
         connect_time=10.0,
         handshake_interval=0.1,
     )

@@ -26,7 +26,6 @@ from oed.controllers import (
     stream,
 )
 from oed.controllers.errors import ProtocolError
-from oed.exports.simple_message import WireFormat
 from robots.common.errors import InputError
 from robots.signals import Motion
 from tests.oed.controllers.conftest import PATIENT, swing
@@ -205,8 +204,8 @@ def test_servers_that_wait_or_echo(robot, controllers, log: Path) -> None:
 @pytest.mark.slow
 def test_wrong_byte_order_is_named(robot, controllers, log: Path) -> None:
     """A controller with another byte order leads to a message that names it."""
-    _, endpoint = controllers(form=WireFormat(byte_order="big"))
-    place = replace(endpoint, form=WireFormat(), connect_time=1.0)
+    _, endpoint = controllers(byte_order="big")
+    place = replace(endpoint, byte_order="little", connect_time=1.0)
     with pytest.raises(LinkError, match="big byte order"):
         stream(swing(robot), robot, place, log=log, options=SHORT)
 

@@ -12,7 +12,7 @@ import pytest
 import oed
 from oed.constraints.tool import ToolBox
 from oed.experiments import Effort, InteriorPoint
-from oed.reports import save_design_report
+from oed.reports import save_report
 from robots.common.errors import InfeasibleError, InputError
 from robots.common.files import ResultFolder
 from robots.loading import load_robot
@@ -73,7 +73,7 @@ def test_file_and_report(name, tmp_path):
     design = oed.design(robot, model=MODEL, trajectory=plan, search=SEARCH)
     with ResultFolder(tmp_path / "out", False, names=["report.html"]) as folder:
         design.save(folder.path("report.html").parent)
-        save_design_report(design, folder)
+        save_report(design, folder)
     data = json.loads((tmp_path / "out" / "design.json").read_text(encoding="utf-8"))
     assert "fourier" not in data
     assert data["excitation"]["family"] == plan.excitation.settings()

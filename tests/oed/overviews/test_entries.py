@@ -14,20 +14,22 @@ from estimation.payloads.body import Body
 from estimation.payloads.result import PayloadEstimate
 from oed.overviews import find_results
 from robots.common.errors import InputError
+from robots.common.records import severity
+from tests.oed.reports.pages.test_pages_in_browser import monitored, payload
+from tests.oed.test_loading import calibrated, fleet
 
 DESIGN = {
     "format": "robot-oed design",
     "format_version": 1,
     "robot": {"name": "er3a"},
-    "assumed": [],
-    "model": {"columns": ["a", "b"]},
     "quality": [{"samples": 100, "cond_Y": 50.0}, {"samples": 2500, "cond_Y": 160.0}],
     "duration": 23.7,
     "smallest_margins": [
         {"limit": 2.0, "slack_fraction": 0.05},
         {"limit": None, "slack_fraction": 0.01},
     ],
-    "collision": {"clearance": 0.01, "pair": "base / flange", "time": 2.0, "certified": True},
+    "conclusion": "Play trajectory.csv on the robot.",
+    "remarks": [],
 }
 MODEL = {
     "format": "robot-oed model",
@@ -43,6 +45,8 @@ DIAGNOSIS = {
     "baseline": {"nrmse": [0.3, 0.4]},
     "extended": {"nrmse": [0.06, 0.08]},
     "explained": 0.9,
+    "conclusion": "Inspect joint 4.",
+    "remarks": [{"code": "effect.fault", "text": "Friction of joint 4 rose."}],
 }
 
 
@@ -70,34 +74,26 @@ def test_figures_come_from_the_files(tmp_path: Path) -> None:
     assert (model.robot, model.level) == ("ur10", "note")
     # The root mean square of 3 and 4 %.
     assert model.figures["NRMSE, held-out data [%]"] == pytest.approx(12.5**0.5)
-    assert (diagnosis.level, diagnosis.verdict) == ("act", "Found: friction step of joint 4.")
+    assert (diagnosis.level, diagnosis.verdict) == ("act", "Inspect joint 4.")
     assert diagnosis.figures["NRMSE, base model [%]"] == pytest.approx(100 * (0.125**0.5))
 
 
-@pytest.mark.parametrize(
-    ("change", "level", "text"),
-    [
-        ({"smallest_margins": [{"limit": 1.0, "slack_fraction": -0.1}]}, "act", "exceeds 1 limits"),
-        ({"quality": [{"samples": 2500, "cond_Y": None}]}, "act", "does not determine all"),
-        ({"quality": [{"samples": 2500, "cond_Y": 9e6}]}, "act", "does not determine all"),
-        ({"assumed": ["limits.torque"]}, "note", "Determines 2"),
-        ({"collision": None}, "act", "NOT CHECKED for collisions"),
-        ({"collision": DESIGN["collision"] | {"clearance": -0.02}}, "act", "COLLIDES: base / flange"),
-    ],
-)
-def test_designs_are_judged(tmp_path: Path, change: dict, level: str, text: str) -> None:
-    """A design that exceeds a limit, may collide or leaves parameters open asks for action; assumptions are a note."""
-    write(tmp_path, "design.json", DESIGN | change)
-    (entry,) = find_results(tmp_path)
-    assert entry.level == level
-    assert text in entry.verdict
+def test_a_result_says_what_its_file_says(tmp_path: Path) -> None:
+    """Verdict and urgency are the conclusion and the most urgent remark of the file, in the result's own words."""
+    for make in (monitored, payload, fleet, calibrated):
+        result = make()
+        result.save(tmp_path, force=True)
+        entry = by_path(tmp_path)[result.FILE]
+        assert entry.verdict == result.conclusion
+        assert entry.level == severity(remark.code for remark in result.remarks)
+        assert entry.figures
 
 
 def test_reports_have_the_last_word(tmp_path: Path) -> None:
     """Urgency and verdict are those of the report of the folder, for the result that the report is about."""
     head = '<meta name="oed:urgency" content="act">\n<meta name="oed:verdict" content="Inspect joint 2 &amp; 3.">'
     write(tmp_path, "d/report.html", f"<html>{head}")
-    write(tmp_path, "d/diagnosis.json", DIAGNOSIS | {"verdict": "none", "findings": []})
+    write(tmp_path, "d/diagnosis.json", DIAGNOSIS | {"verdict": "none", "findings": [], "remarks": []})
     write(tmp_path, "d/model.json", MODEL)
     found = by_path(tmp_path)
     assert found["d/diagnosis.json"].verdict == "Inspect joint 2 & 3."
@@ -121,10 +117,10 @@ def test_old_reports_have_links_only(tmp_path: Path) -> None:
         ("model.json", "[1, 2", "unreadable", "no whole JSON file"),
         ("model.json", "", "unreadable", "no whole JSON file"),
         ("model.json", "[" * 100_000, "unreadable", "no whole JSON file"),
-        ("design.json", {"format": "robot-oed design"}, "other version", "'smallest_margins' is missing"),
+        ("design.json", {"format": "robot-oed design"}, "other version", "'remarks' is missing"),
         ("model.json", MODEL | {"parameters": 3}, "other version", "another form"),
         ("x.json", {"format": "robot-oed telepathy"}, "telepathy", "No summary"),
-        ("diagnosis.json", {"verdict": "maybe", "findings": []}, "other version", "'maybe'"),
+        ("diagnosis.json", {"verdict": "none", "findings": []}, "other version", "'remarks' is missing"),
     ],
 )
 def test_bad_files_have_their_row(tmp_path: Path, name: str, content: object, kind: str, text: str) -> None:

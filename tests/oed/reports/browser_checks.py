@@ -6,9 +6,13 @@ from pathlib import Path
 
 from oed.reports import Page, render
 from tests.oed.reports.browser import Browser
+from tests.oed.reports.said_once import said_twice
 
 CONTRAST = 4.5
 """Least contrast of text to its ground (WCAG 2.1, level AA)."""
+
+LARGEST = 2_000_000
+"""Largest file of a report [bytes]."""
 
 # Opens what is closed and waits until each plot is drawn.
 DRAWN = """new Promise((resolve) => {
@@ -59,7 +63,7 @@ SETTLED = "new Promise((resolve) => setTimeout(() => requestAnimationFrame(() =>
 
 
 def check_page(browser: Browser, page: Page, path: Path) -> None:
-    """Checks one page: no errors, everything drawn, narrow and wide, dark and light, by keyboard, without scripts.
+    """Checks one page: size, findings once, all drawn, narrow and wide, dark and light, by keyboard, without scripts.
 
     Args:
         browser: without a network.
@@ -67,6 +71,8 @@ def check_page(browser: Browser, page: Page, path: Path) -> None:
         path: of the file to write.
     """
     path.write_text(render(page), encoding="utf-8")
+    assert path.stat().st_size <= LARGEST
+    assert said_twice(page) == []
     browser.open(path, width=390)
     browser.resize(390, height=30_000)
     assert browser.run(DRAWN) == 0, "plots that were not drawn"

@@ -39,6 +39,7 @@ class Whole(Result, format="test whole", version=2, shares=("labels",)):
     """A result with a bit of everything."""
 
     FILE = "whole.json"
+    conclusion = "Nothing follows."
     ENTRIES = (
         "values",
         "flags",

@@ -9,14 +9,16 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Annotated
 
 from oed.campaigns.loops.options import LoopOptions
-from oed.cli.options.links import Link, TimedStreaming
 from oed.cli.options.motions import Obstacles
 from oed.cli.options.results import Folder
 from oed.cli.options.robots import PlannedRobot
 from oed.cli.options.work import Processes
 from oed.cli.verbs import Printed, Verb
+from oed.controllers.options import OF_STREAM, Endpoint, StreamOptions
+from robots.common.options import Option
 from robots.common.progress import Progress
 
 
@@ -25,7 +27,6 @@ class Loop(Verb):
     """``oed loop``.
 
     Attributes:
-        host: name or IP address of the robot controller.
         design: folder of an `oed design` result for the first experiment. Default: one is designed.
     """
 
@@ -36,13 +37,12 @@ class Loop(Verb):
     )
 
     robot: PlannedRobot
-    host: str
     options: LoopOptions
     obstacles: Obstacles = Obstacles()
     design: Path | None = None
     work: Processes = Processes()
-    link: Link = Link()
-    streaming: TimedStreaming = TimedStreaming()
+    link: Endpoint
+    streaming: Annotated[StreamOptions, Option(without=OF_STREAM)]
     output: Folder = Folder(out=Path("loop"))
 
     def kept(self) -> str:
@@ -53,25 +53,25 @@ class Loop(Verb):
         """Makes the experiments."""
         from oed.campaigns.loops import run_loop
         from oed.controllers.interrupts import terminate_as_interrupt
-        from oed.reports import save_diagnosis_report, save_loop_report
+        from oed.reports import save_report
         from robots.common.files import ResultFolder
 
-        robot, place, output = self.robot.load(), self.link.endpoint(self.host), self.output
+        robot, output = self.robot.load(), self.output
         with self.work.executor() as executor, terminate_as_interrupt():
             result = run_loop(
                 robot,
-                place,
+                self.link,
                 output.out,
                 design=self.design,
                 options=replace(self.options, surroundings=self.obstacles.surroundings()),
-                stream_options=self.streaming.options(self.link, speed=self.streaming.speed),
+                stream_options=self.streaming,
                 speed=self.streaming.speed,
                 workers=self.work.workers,
                 executor=executor,
                 force=output.force,
-                report=save_diagnosis_report,
+                report=save_report,
                 progress=progress,
             )
         with ResultFolder(output.out, True, names=["report.html"]) as folder:
-            save_loop_report(result, folder, png=output.png)
+            save_report(result, folder, png=output.png)
         return replace(output.printed(result), code=0 if result.success else 1)

@@ -9,10 +9,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated
 
-from oed.cli.options.links import StateLink
 from oed.cli.options.results import Overwriting
 from oed.cli.options.robots import RobotOptions
 from oed.cli.verbs import Printed, Verb
+from oed.controllers.options import Endpoint
 from robots.common.options import Option
 from robots.common.progress import Progress
 
@@ -22,7 +22,6 @@ class Record(Verb):
     """``oed record``.
 
     Attributes:
-        host: name or IP address of the robot controller.
         log: log file to write, .csv.
         duration: stop after so long [s]. Default: Ctrl-C.
         patience: longest silence of the controller before giving up [s].
@@ -33,9 +32,8 @@ class Record(Verb):
     examples = ("oed record --robot er3a --host 192.168.0.10 --log log.csv --duration 60",)
 
     robot: RobotOptions
-    host: str
     duration: float | None = None
-    link: StateLink = StateLink()
+    link: Annotated[Endpoint, Option(without=("motion_port",))]
     patience: float = 2.0
     external_axes: bool = False
     log: Annotated[Path, Option(section="Output")] = Path("log.csv")
@@ -46,11 +44,11 @@ class Record(Verb):
         from oed.controllers import record
         from oed.controllers.interrupts import terminate_as_interrupt
 
-        place, robot = self.link.endpoint(self.host), self.robot.load()
+        robot = self.robot.load()
         with terminate_as_interrupt():
             result = record(
                 robot,
-                place,
+                self.link,
                 self.log,
                 duration=self.duration,
                 patience=self.patience,

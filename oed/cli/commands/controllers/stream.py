@@ -9,11 +9,11 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated
 
-from oed.cli.options.links import Link, Streaming
 from oed.cli.options.motions import Obstacles
 from oed.cli.options.results import Overwriting
 from oed.cli.options.robots import FileRobot
 from oed.cli.verbs import Printed, Verb
+from oed.controllers.options import Endpoint, StreamOptions
 from robots.common.options import Option
 from robots.common.progress import Progress
 
@@ -24,13 +24,8 @@ class Stream(Verb):
 
     Attributes:
         trajectory: a trajectory.csv.
-        host: name or IP address of the robot controller.
         log: log file to write, .csv.
         period: time between two points [s]. Default: that of the trajectory.
-        external_axes: the controller has axes behind those of the robot: they stay where they are.
-        reply_time: UDP: send a point again after so long without a reply [s].
-        robot_id: number of the robot at its controller.
-        ignore_status: start in spite of a reported error, e-stop or manual mode.
         collision: refuse a trajectory that collides with the robot itself, the floor or the obstacles in the robot
             file.
         dry_run: check trajectory, controller and pose; only listen.
@@ -43,15 +38,10 @@ class Stream(Verb):
     )
 
     trajectory: Annotated[Path, Option(argument=True)]
-    host: str
     robot: FileRobot = FileRobot()
-    link: Link = Link()
-    streaming: Streaming = Streaming()
+    link: Endpoint
+    options: Annotated[StreamOptions, Option(without=("speed",))]
     period: float | None = None
-    external_axes: bool = False
-    reply_time: float = 0.1
-    robot_id: int = 0
-    ignore_status: bool = False
     dry_run: bool = False
     collision: bool = True
     obstacles: Obstacles = Obstacles()
@@ -74,9 +64,7 @@ class Stream(Verb):
         from oed.exports.trajectory_checks import stated_collisions
         from robots.collision import Surroundings
 
-        file, place = self.trajectory, self.link.endpoint(self.host)
-        own = ("reply_time", "ignore_status", "robot_id", "external_axes")
-        options = self.streaming.options(self.link, **{name: getattr(self, name) for name in own})
+        file = self.trajectory
         motion, metadata = read_trajectory(file)
         if self.period is not None:
             motion = at_period(motion, self.period)
@@ -90,9 +78,9 @@ class Stream(Verb):
             result = stream(
                 motion,
                 robot,
-                place,
+                self.link,
                 log=None if self.dry_run else self.log,
-                options=options,
+                options=self.options,
                 metadata=metadata,
                 file=file,
                 dry_run=self.dry_run,

@@ -60,7 +60,6 @@ class Compare(Verb):
         """Compares models, or identifies logs and compares their models."""
         from estimation import compare
         from estimation.comparisons import identify_runs, read_model_runs
-        from oed.reports import save_comparison_report
 
         for path in self.models:
             if self.robot is not None and _is_model(path):
@@ -79,8 +78,7 @@ class Compare(Verb):
                 logs = self.columns.read(self.models, described)
                 runs = identify_runs(described, logs, friction=how.friction, seed=how.seed, progress=progress)
             result = compare(runs, alpha=self.false_alarms)
-            result.save(folder.path("model.json").parent)
-            save_comparison_report(result, folder, png=self.output.png)
+            self.output.save(folder, result)
         return self.output.printed(result)
 
 

@@ -84,15 +84,13 @@ class Diagnose(Verb):
         """Computes which effects planned motions could show; writes limits.json and report.html."""
         from oed.campaigns.discriminations.detection_limits import detection_limits
         from oed.exports import read_trajectory
-        from oed.reports import save_limits_report
 
         robot = self.robot.load()
         with self.output.opened("limits.json", "report.html") as folder:
             model = None if self.model is None else model_for(self.model, robot.n)
             motions = [read_trajectory(path, n=robot.n)[0] for path in self.trajectory]
             result = detection_limits(robot, motions, model=model, noise=self.noise, progress=progress)
-            result.save(folder.path("limits.json").parent)
-            save_limits_report(result.limits, robot.title or robot.name, folder)
+            self.output.save(folder, result, robot=robot.title or robot.name)
         return self.output.printed(result)
 
     def _diagnosis(self, progress: Progress) -> Printed:
@@ -101,7 +99,6 @@ class Diagnose(Verb):
         from estimation.diagnosis.experiment_plans.experiment_motions import at_rate
         from estimation.predictions.simulability import unfit_of
         from oed.exports import write_trajectory
-        from oed.reports import save_diagnosis_report
 
         output, robot = self.output, self.robot.load()
         with output.files() as files:
@@ -115,14 +112,13 @@ class Diagnose(Verb):
                 read, other = both[: len(read)], both[len(read) :]
                 friction, seed = self.fit.friction, self.fit.seed
                 result = diagnose(robot, read, held_out=other or None, friction=friction, seed=seed, progress=progress)
-                result.save(folder.path("diagnosis.json").parent)
+                output.save(folder, result, log=(other or read)[0])
                 following = result.next_experiment
                 kind, motions = ("", ()) if following is None else (following.kind, following.motions)
                 for number, made in enumerate(motions, start=1):
                     motion, stated = at_rate(made, robot.period), {"robot": robot.name, "experiment": kind}
                     path = folder.path(f"next_experiment_{number}.csv")
                     write_trajectory(path, motion, stated, kinds=robot.chain.kinds)
-                save_diagnosis_report(result, folder, log=(other or read)[0], png=output.png)
                 lines, data = [result.summary()], result.to_dict()
                 unfit = unfit_of(result.model, both)
                 if unfit is not None:

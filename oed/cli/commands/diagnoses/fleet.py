@@ -48,7 +48,6 @@ class Fleet(Verb):
     def run(self, progress: Progress) -> Printed:
         """Monitors the robots."""
         from estimation.monitoring.fleets import monitor_fleet
-        from oed.reports.pages.monitoring.fleet_report import save_fleet_report
 
         names = ("fleet.json", "fleet.csv", "report.html")
         with self.work.executor() as executor, self.output.opened(*names) as results:
@@ -62,7 +61,5 @@ class Fleet(Verb):
                 executor=executor,
                 progress=progress,
             )
-            result.save(results.path("fleet.json").parent)
-            results.path("fleet.csv")
-            save_fleet_report(result, results, png=self.output.png)
+            self.output.save(results, result)
         return self.output.printed(result)

@@ -69,7 +69,6 @@ class Force(Verb):
         from estimation.external_forces.online.c_export import observer_code
         from estimation.external_forces.thresholds.calibrations import read_calibration
         from estimation.predictions.heat import predict_warm
-        from oed.reports import save_force_report
         from oed.reports.rendering.provenance import recordings_from
         from robots.common.files import open_atomic
 
@@ -100,9 +99,7 @@ class Force(Verb):
                 predictor=predicted,
                 progress=progress,
             )
-            result.save(folder.path("forces.json").parent)
-            logs = recordings_from([recorded])
-            save_force_report(result, folder, kinds=robot.chain.kinds, logs=logs, png=output.png)
+            output.save(folder, result, kinds=robot.chain.kinds, logs=recordings_from([recorded]))
             if code is not None:
                 gravity, payload = recorded.gravity, recorded.payload
                 text = observer_code(

@@ -44,7 +44,6 @@ class Monitor(Verb):
     def run(self, progress: Progress) -> Printed:
         """Sends the logs through the monitor."""
         from estimation.monitoring import monitor_logs, open_monitor, read_monitored
-        from oed.reports.pages.monitoring.monitor_report import save_monitor_report
 
         if not self.log and self.log_dir is None:
             raise InputError("no logs", remedy="give --log, or --log-dir with a folder")
@@ -54,9 +53,7 @@ class Monitor(Verb):
             read, refused = read_monitored(self.log, self.log_dir, robot, self.known.stated)
             _, logs = self.known.as_joint_torque(robot, self.known.with_setup(read))
             result = monitor_logs(watcher, logs, refused=refused, progress=progress)
-            result.save(folder.path("monitor.json").parent)
-            folder.path("trends.csv")
-            save_monitor_report(result, folder, png=self.output.png)
+            self.output.save(folder, result)
             if self.state is not None:
                 watcher.save(self.state)
         return self.output.printed(result)

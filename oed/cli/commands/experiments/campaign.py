@@ -14,12 +14,12 @@ from typing import TYPE_CHECKING, Annotated
 
 from oed.campaigns.programme import Programme
 from oed.cli.declarations.declared import declared_options
-from oed.cli.options.links import Link, TimedStreaming
 from oed.cli.options.motions import Collisions
 from oed.cli.options.results import Folder
 from oed.cli.options.robots import PlannedRobot
 from oed.cli.options.work import Processes
 from oed.cli.verbs import Printed, Verb
+from oed.controllers.options import OF_STREAM, Endpoint, StreamOptions
 from robots.common.errors import InputError
 from robots.common.options import Option, Seed
 from robots.common.progress import Progress
@@ -61,8 +61,8 @@ class Campaign(Verb):
     seed: Seed = 0
     work: Processes = Processes()
     host: Annotated[str | None, Option(name="run")] = None
-    link: Annotated[Link, Option(only=("run",))] = Link()
-    streaming: Annotated[TimedStreaming, Option(only=("run",))] = TimedStreaming()
+    link: Annotated[Endpoint | None, Option(only=("run",))] = None
+    streaming: Annotated[StreamOptions, Option(only=("run",), without=OF_STREAM)]
     output: Folder = Folder(out=Path("campaign"))
 
     @property
@@ -73,7 +73,9 @@ class Campaign(Verb):
     def refusal(self, names: Collection[str]) -> InputError:
         """Says that a link needs a controller."""
         verb = "does" if len(names) == 1 else "do"
-        return InputError(f"{', '.join(names)} {verb} not apply without --run", remedy="add --run HOST")
+        return InputError(
+            f"{', '.join(names)} {verb} not apply without --run", remedy="add --run HOST", kind="option_not_used"
+        )
 
     def kept(self) -> str:
         """Says that the robot stops, if it is played on."""
@@ -84,7 +86,7 @@ class Campaign(Verb):
     def run(self, progress: Progress) -> Printed:
         """Plans the campaign, and plays it."""
         robot, output = self.robot.load(), self.output
-        place = None if self.host is None else self.link.endpoint(self.host)
+        place = self.link
         if place is None or not (output.out / "campaign.json").exists():
             planned = self._planned(robot, progress)
         elif output.force:
@@ -103,17 +105,20 @@ class Campaign(Verb):
         from oed.campaigns.runs import run_campaign
         from oed.controllers.interrupts import terminate_as_interrupt
 
-        speed = self.streaming.speed
-        options, collision = self.streaming.options(self.link, speed=speed), self.collisions.collision
         with terminate_as_interrupt():
             played = run_campaign(
-                output.out, place, robot=robot, options=options, speed=speed, collision=collision, progress=progress
+                output.out,
+                place,
+                robot=robot,
+                options=self.streaming,
+                speed=self.streaming.speed,
+                collision=self.collisions.collision,
+                progress=progress,
             )
         return Printed(played.summary(), played.to_dict())
 
     def _planned(self, robot: Robot, progress: Progress) -> Planned:
         from oed import campaign
-        from oed.reports import save_campaign_report
 
         stages = (f"{name}.csv" for name in self.programme.stage_names)
         with (
@@ -135,8 +140,7 @@ class Campaign(Verb):
                 executor=executor,
                 progress=progress,
             )
-            result.save(folder.path("campaign.json").parent)
-            save_campaign_report(result, folder, png=self.output.png)
+            self.output.save(folder, result)
         return result
 
     def _resumed(self, robot: Robot) -> Planned:

@@ -5,19 +5,21 @@ Writes trajectory.csv, design.json and report.html; for a calibration also poses
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection
+from collections.abc import Collection
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 
+from oed.campaigns.discrimination_options import DiscriminationOptions
 from oed.cli.options.models import model_for
 from oed.cli.options.motions import Excitation, Obstacles, tool_limits
-from oed.cli.options.poses import PoseSet
 from oed.cli.options.results import Folder
 from oed.cli.options.robots import Drives, PlannedRobot
 from oed.cli.options.work import Processes
 from oed.cli.verbs import Printed, Verb
+from oed.experiments.drive_options import DriveDesignOptions
 from oed.experiments.options import LimitOptions, ModelOptions, SearchOptions, TrajectoryOptions, WeightOptions
+from oed.experiments.pose_options import PoseOptions
 from robots.common.errors import InputError
 from robots.common.options import Option, box
 from robots.common.progress import Progress
@@ -36,7 +38,6 @@ class Design(Verb):
         for_: what the experiment is for: dynamics (a trajectory), calibration (poses), or actuators (commands for
             drives without torque).
         gains: a YAML file with the control law and its gains. Default: the MJCF's actuators.
-        duration: length of the motion [s].
         criterion: design criterion: cond (condition number), d (log determinant), a (trace of the inverse), e (smallest
             singular value), i (prediction variance, needs --task), or cond-d (cond and d). Calibration: also an
             observability index, o1 to o5. Default: cond; d for a calibration or a payload.
@@ -48,6 +49,7 @@ class Design(Verb):
         task: a trajectory.csv whose torques the identified model shall predict (criterion i).
         discriminate: design an experiment that distinguishes two effects, such as
             stribeck:2,load_dependent_friction:2 (effect:joint).
+        poses: number of poses.
     """
 
     function = "oed.design"
@@ -58,19 +60,9 @@ class Design(Verb):
     )
     introduces = True
     uses: ClassVar = {"calibration": "with --for calibration", "actuators": "with --for actuators"}
-    shared: ClassVar = {
-        "dynamics": set(),
-        "payload": set(),
-        "discriminate": {"friction", "home", "velocity_fraction", "collision", "noise", "seed"},
-        "calibration": {"home", "velocity_fraction", "collision", "clearance", "noise", "seed"},
-        "actuators": {"home", "seed"},
-    }
-    """Fields of a trajectory's design that other uses have, too."""
-
     robot: PlannedRobot
     for_: str = "dynamics"
     gains: Annotated[Path | None, Option(only=("actuators",))] = None
-    duration: Annotated[float, Option(only=("actuators",))] = 20.0
     criterion: Annotated[str | None, Option(only=(*TRAJECTORY, "calibration"))] = None
     model: Annotated[ModelOptions, Option(only=TRAJECTORY)] = ModelOptions()
     excitation: Annotated[Excitation, Option(only=TRAJECTORY)] = Excitation()
@@ -84,8 +76,11 @@ class Design(Verb):
     after: Annotated[Path | None, Option(only=("dynamics",))] = None
     task: Annotated[Path | None, Option(only=("dynamics",))] = None
     discriminate: Annotated[str | None, Option(only=("dynamics", "discriminate"))] = None
-    poses: Annotated[PoseSet, Option(only=("calibration",))] = PoseSet()
     search: Annotated[SearchOptions, Option(only=TRAJECTORY)]
+    rivals: Annotated[DiscriminationOptions, Option(only=("discriminate",))]
+    poses: Annotated[int, Option(least=1, only=("calibration",))] = 30
+    measured: Annotated[PoseOptions, Option(only=("calibration",))]
+    commands: Annotated[DriveDesignOptions, Option(only=("actuators",))] = DriveDesignOptions()
     work: Annotated[Processes, Option(only=TRAJECTORY)] = Processes()
     output: Folder = Folder()
 
@@ -100,7 +95,7 @@ class Design(Verb):
 
     def unused(self) -> Collection[str]:
         """Names what does not apply; to a payload, the criterion and strokes that a file gives for the arm."""
-        foreign = {*super().unused()} - self.shared[self.use]
+        foreign = {*super().unused()}
         if self.use == "payload":
             foreign |= {"offset", "essential"}
         if self.use == "actuators":
@@ -120,28 +115,15 @@ class Design(Verb):
 
     def run(self, progress: Progress) -> Printed:
         """Designs the experiment."""
-        from oed.reports import save_design_report, save_drive_design_report
-        from oed.reports.pages.calibrations.pose_design_report import save_pose_design_report
-        from oed.reports.pages.discrimination_report import save_discrimination_report
-
         usual = ("trajectory.csv", "design.json", "report.html")
-        design: Callable[..., Any] = self._trajectory
-        save_report: Callable[..., None] = save_design_report
-        names: tuple[str, ...] = usual
-        long: tuple[str, ...] = ("segments", "fourier", "excitation")
-        if self.use == "actuators":
-            design, save_report = self._commands, save_drive_design_report
-            names, long = ("commands.csv", "design.json", "report.html"), ()
-        elif self.use == "calibration":
-            design, save_report = self._poses, save_pose_design_report
-            names, long = ("poses.csv", *usual), ("segments", "eigenvalues", "random_eigenvalues")
-        elif self.use == "discriminate":
-            design, save_report = self._rivals, save_discrimination_report
-            long = ("segments", "quality")
+        design, names, long = {
+            "actuators": (self._commands, ("commands.csv", *usual[1:]), ()),
+            "calibration": (self._poses, ("poses.csv", *usual), ("segments", "eigenvalues", "random_eigenvalues")),
+            "discriminate": (self._rivals, usual, ("segments", "quality")),
+        }.get(self.use, (self._trajectory, usual, ("segments", "fourier", "excitation")))
         with self.work.executor() as executor, self.output.opened(*names) as folder:
             result = design(executor, progress)
-            result.save(folder.path("design.json").parent)
-            save_report(result, folder, png=self.output.png)
+            self.output.save(folder, result)
         printed = self.output.printed(result, without=long)
         if getattr(result, "interrupted", False):
             note = "oed: interrupted; the best design found so far was written"
@@ -179,48 +161,24 @@ class Design(Verb):
 
     def _poses(self, executor: Executor | None, progress: Progress) -> Any:
         """Designs poses to measure."""
-        from oed import PoseOptions, design_poses
+        from oed import design_poses
 
-        noise: Any = self.weights.noise
-        options = PoseOptions(
-            measurement=self.poses.instrument(),
-            kinds=self.poses.kinds,
-            noise=self.poses.noise_levels(noise),
-            view=self.poses.view(),
-            collision=self.limits.collision,
-            clearance=self.limits.clearance,
-            surroundings=self.obstacles.surroundings(),
-            velocity_fraction=self.limits.velocity_fraction,
-            home=self.trajectory.home,
-            seed=self.search.seed,
-        )
-        count, criterion = self.poses.poses, self.criterion or "d"
-        return design_poses(self.robot.load(), count=count, criterion=criterion, options=options, progress=progress)
+        options = replace(self.measured, surroundings=self.obstacles.surroundings())
+        robot, criterion = self.robot.load(), self.criterion or "d"
+        return design_poses(robot, count=self.poses, criterion=criterion, options=options, progress=progress)
 
     def _commands(self, executor: Executor | None, progress: Progress) -> Any:
         """Designs commands for drives without torque."""
-        from oed.experiments.drives import DriveDesignOptions, design_drive_motion
+        from oed.experiments.drives import design_drive_motion
 
         named = self.robot.chain
-        home: Any = self.trajectory.home
         drives = Drives(robot=self.robot.robot, gains=self.gains, joints=named.joints, lock=named.lock)
         chains, known = drives.load()
-        options = DriveDesignOptions(duration=self.duration, seed=self.search.seed, home=home)
-        return design_drive_motion(chains, known.drives, options=options, progress=progress)
+        return design_drive_motion(chains, known.drives, options=self.commands, progress=progress)
 
     def _rivals(self, executor: Executor | None, progress: Progress) -> Any:
         """Designs an experiment that distinguishes two effects."""
         from oed import discriminate
 
-        return discriminate(
-            self.robot.load(),
-            self.discriminate or "",
-            noise=self.weights.noise,
-            friction=str(self.model.friction),
-            home=self.trajectory.home,
-            velocity_fraction=self.limits.velocity_fraction,
-            collision=self.limits.collision,
-            surroundings=self.obstacles.surroundings(),
-            seed=self.search.seed,
-            progress=progress,
-        )
+        options = replace(self.rivals, surroundings=self.obstacles.surroundings())
+        return discriminate(self.robot.load(), self.discriminate or "", options=options, progress=progress)

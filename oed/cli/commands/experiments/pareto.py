@@ -47,7 +47,6 @@ class Pareto(Verb):
     def run(self, progress: Progress) -> Printed:
         """Designs the experiments."""
         from oed import pareto
-        from oed.reports import save_pareto_report
 
         workers = self.work.workers
         with self.work.executor() as executor, self.output.opened("pareto.json", "report.html") as folder:
@@ -62,6 +61,5 @@ class Pareto(Verb):
                 search=replace(self.search, workers=workers, executor=executor),
                 progress=progress,
             )
-            front.save(folder.path("pareto.json").parent)
-            save_pareto_report(front, folder, png=self.output.png)
+            self.output.save(folder, front)
         return self.output.printed(front)

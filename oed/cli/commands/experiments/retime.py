@@ -51,7 +51,6 @@ class Retime(Verb):
         from oed import read_trajectory, retime
         from oed.experiments.retiming import move_with_stops
         from oed.exports import read_waypoints
-        from oed.reports import save_retime_report
 
         with self.output.opened("trajectory.csv", "design.json", "report.html") as folder:
             robot = self.robot.load() if self.robot.robot else None
@@ -75,6 +74,5 @@ class Retime(Verb):
                 collision=self.collisions.collision,
                 surroundings=self.collisions.surroundings(),
             )
-            result.save(folder.path("trajectory.csv").parent)
-            save_retime_report(result, motion, folder, png=self.output.png)
+            self.output.save(folder, result, given=motion)
         return self.output.printed(result)

@@ -1,4 +1,4 @@
-"""Explains a finding of `oed check`: what it means, a log that causes it, and what to do.
+"""Explains the code of a message: what it means, what causes it, and what to do.
 
 Without a code it lists all of them.
 """
@@ -18,7 +18,7 @@ class Explain(Verb):
     """``oed explain``.
 
     Attributes:
-        code: a code such as OED-L014, or the name of a finding; all by default.
+        code: a code such as OED-L014, or the name behind it; all by default.
     """
 
     examples = ("oed explain OED-L014", "oed explain")
@@ -28,8 +28,10 @@ class Explain(Verb):
     def run(self, progress: Progress) -> Printed:
         """Explains one code, or lists all."""
         from estimation.gate.explanations import EXPLANATIONS, explain
+        from robots.common.errors import ERRORS
+        from robots.common.records import plain
 
-        found = (explain(self.code),) if self.code else EXPLANATIONS
-        listed = [f"{item.code}  {item.name:20} {item.meaning}" for item in found]
-        data = {"codes": [item.to_dict() for item in found]}
+        found = (explain(self.code),) if self.code else (*EXPLANATIONS, *ERRORS)
+        listed = [f"{item.code}  {item.name:22} {item.meaning}" for item in found]
+        data = {"codes": [plain({name: getattr(item, name) for name in item.ENTRIES}) for item in found]}
         return Printed(found[0].text() if self.code else "\n".join(listed), data)

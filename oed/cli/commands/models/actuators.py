@@ -44,7 +44,6 @@ class Actuators(Verb):
         from estimation.actuators import identify_actuators
         from estimation.actuators.command_logs import read_command_logs
         from estimation.actuators.exports import simulator_files
-        from oed.reports import save_actuators_report
 
         output, how = self.output, self.options
         with output.opened("actuators.json", "motion.parquet", "parameters.csv", "report.html") as folder:
@@ -55,10 +54,9 @@ class Actuators(Verb):
             )
             how = replace(how, free=(*how.free, *known.unknown))
             result = identify_actuators(chains, read, known.drives, held_out=outside, options=how, progress=progress)
-            result.save(folder.path("actuators.json").parent)
+            output.save(folder, result)
             result.to_frame().to_csv(folder.path("parameters.csv"), index=False)
             written = simulator_files(result, output.out)
             for name, text in written.files.items():
                 folder.path(name).write_text(text, encoding="utf-8")
-            save_actuators_report(result, folder, png=output.png)
         return output.printed(result, *(f"  {remark}" for remark in written.remarks))

@@ -62,7 +62,6 @@ class Calibrate(Verb):
         """Calibrates the robot."""
         from estimation import calibrate
         from estimation.calibrations.exports.files import calibrated_files
-        from oed.reports import save_calibration_report
 
         with self.output.opened(*FILES) as folder:
             arms = [self.robot.load()]
@@ -71,10 +70,9 @@ class Calibrate(Verb):
             measured = self._read(self.poses, arms)
             other = None if self.held_out is None else self._read(self.held_out, arms)
             result = calibrate(arms, measured, held_out=other, options=self.options, progress=progress)
-            result.save(folder.path("calibration.json").parent)
+            self.output.save(folder, result)
             for name, text in calibrated_files(result).items():
                 folder.path(name).write_text(text, encoding="utf-8")
-            save_calibration_report(result, folder, png=self.output.png)
         return self.output.printed(result, without=("poses", "robot", "corrected"))
 
     def _read(self, path: Path, arms: list[Robot]) -> MeasuredPoses:

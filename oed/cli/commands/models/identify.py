@@ -77,7 +77,6 @@ class Identify(Verb):
         from estimation.exports import c_code
         from estimation.identifications.streams import METHODS, identify_stream
         from estimation.logs.parquet_streams import is_large
-        from oed.reports import save_estimate_report
         from robots.common.records import plain
 
         output = self.output
@@ -95,8 +94,7 @@ class Identify(Verb):
                 table = compare_methods(described, logs, **options) if self.method == "all" else None
                 method = self.method if table is None else table.rows[0].method
                 result = identify(described, logs, method=method, **options)
-            result.save(folder.path("model.json").parent)
-            save_estimate_report(result, folder, png=output.png, methods=table)
+            output.save(folder, result, methods=table)
             lines, mjcf = output.write_models(result.model, described, files)
             if output.c_code is not None:
                 files[output.c_code].write(c_code(result.model).encode())

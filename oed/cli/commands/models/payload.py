@@ -84,7 +84,6 @@ class Payload(Verb):
         from estimation import identify_payload, load_model
         from estimation.payloads.exports import payload_export
         from estimation.payloads.stated import loaded_robot
-        from oed.reports import save_payload_report
         from robots.geometry.chain import pose_of
 
         if not self.without and self.model is None:
@@ -119,8 +118,7 @@ class Payload(Verb):
                 seed=self.seed,
                 progress=progress,
             ).seen_from(pose)
-            result.save(folder.path("payload.json").parent)
-            save_payload_report(result, folder, png=output.png)
+            self.output.save(folder, result)
             for form in forms if result.found else ():
                 folder.path(form.file).write_text(form.text(result.seen, result.source), encoding="utf-8")
         written = "".join(f"\n{form.title} written to {(output.out / form.file).resolve()}" for form in forms)

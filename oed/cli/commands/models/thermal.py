@@ -36,13 +36,10 @@ class Thermal(Verb):
     def run(self, progress: Progress) -> Printed:
         """Identifies robot and heat."""
         from estimation.thermal import identify_thermal
-        from oed.reports.pages.thermal_report import save_thermal_report
 
         with self.output.opened("model.json", "report.html") as folder:
             robot = self.robot.load()
             logs = self.columns.read(self.log, robot)
             result = identify_thermal(robot, logs, options=self.options, progress=progress)
-            result.save(folder.path("model.json").parent)
-            joint, choice, png = result.joint, result.choice, self.output.png
-            save_thermal_report(result.estimate, result.logs, folder, joint=joint, choice=choice, png=png)
+            self.output.save(folder, result)
         return self.output.printed(result)

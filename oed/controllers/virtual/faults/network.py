@@ -7,7 +7,7 @@ import math
 import random
 from collections.abc import Callable
 
-from oed.controllers.virtual.options import Faults
+from oed.controllers.virtual_options import Faults
 
 
 class Network:

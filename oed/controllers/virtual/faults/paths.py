@@ -2,16 +2,12 @@
 
 from __future__ import annotations
 
-from typing import Literal
-
 import numpy as np
 from numpy.typing import NDArray
 
+from oed.controllers.virtual_options import PathKind
+
 Array = NDArray[np.float64]
-
-Kind = Literal["none", "swap", "sign", "half-speed", "stall", "offset", "other-robot"]
-
-KINDS: tuple[Kind, ...] = ("none", "swap", "sign", "half-speed", "stall", "offset", "other-robot")
 
 
 class PathFault:
@@ -24,7 +20,7 @@ class PathFault:
         after: so long after the start of the trajectory [s].
     """
 
-    def __init__(self, kind: Kind, after: float) -> None:
+    def __init__(self, kind: PathKind, after: float) -> None:
         self._kind, self._after = kind, after
         self.begin()
 

@@ -29,11 +29,11 @@ from oed.controllers.rtde.packages import (
 from oed.controllers.rtde.state import PROGRAM_PLAYING, PROGRAM_STOPPED, ROBOT_RUNNING, Safety
 from oed.controllers.virtual.arm import Arm, ArmSample
 from oed.controllers.virtual.faults.paths import PathFault
-from oed.controllers.virtual.options import ControllerOptions
 from oed.controllers.virtual.ports import Client, TcpPort
 from oed.controllers.virtual.robot import VirtualRobot
 from oed.controllers.virtual.service import Service
 from oed.controllers.virtual.ur.script import Halt, Run, ScriptError, program_of, run_program
+from oed.controllers.virtual_options import ControllerOptions
 from oed.exports.forms.base import require_joints
 from oed.exports.forms.urscript import CYCLES
 from robots.plants import Plant, nominal_plant

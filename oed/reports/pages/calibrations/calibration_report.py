@@ -14,8 +14,6 @@ from oed.reports.animations.building import animate
 from oed.reports.rendering.joint_units import joint_titles
 from oed.reports.rendering.page import Cell, Fact, Page, Section, Table, page_of, table_of
 from oed.reports.rendering.picture import Panel, Picture, Series
-from oed.reports.rendering.saving import save_page
-from robots.common.files import ResultFolder
 from robots.geometry_errors.poses import approaches
 from robots.geometry_errors.state import ArmState, gravity_loads
 from robots.geometry_errors.terms import error_term
@@ -27,11 +25,6 @@ Array = NDArray[np.float64]
 
 WORST = 6  # poses in the picture of the robot
 HOLD, MOVE, STEP = 1.0, 1.5, 0.04  # s at a pose, between two, and between frames
-
-
-def save_calibration_report(calibration: Calibration, folder: ResultFolder, *, png: bool = False) -> None:
-    """Writes the page of a calibration, and its pictures as PNG on request."""
-    save_page(calibration_page(calibration), folder, png=png)
 
 
 def calibration_page(calibration: Calibration) -> Page:

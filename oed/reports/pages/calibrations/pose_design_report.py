@@ -9,14 +9,7 @@ from oed.experiments.safety_checks.freedom import freedom_text, is_free
 from oed.reports.animations.building import animate
 from oed.reports.rendering.page import Cell, Fact, Page, Section, Table, page_of, table_of
 from oed.reports.rendering.picture import Panel, Picture, Series
-from oed.reports.rendering.saving import save_page
-from robots.common.files import ResultFolder
 from robots.common.plain import finite
-
-
-def save_pose_design_report(design: PoseDesign, folder: ResultFolder, *, png: bool = False) -> None:
-    """Writes the page of a design of poses, and its picture as PNG on request."""
-    save_page(pose_design_page(design), folder, png=png)
 
 
 def pose_design_page(design: PoseDesign) -> Page:

@@ -24,16 +24,9 @@ from oed.reports.pictures.comparison_pictures import (
 from oed.reports.rendering.page import Cell, Fact, Page, Section, Table, page_of
 from oed.reports.rendering.picture import Picture
 from oed.reports.rendering.provenance import Recording
-from oed.reports.rendering.saving import save_page
-from robots.common.files import ResultFolder
 
 # Curves in one panel, and panels of parameters over the runs.
 CURVES, COURSES = 5, 12
-
-
-def save_comparison_report(comparison: ModelComparison, folder: ResultFolder, *, png: bool = False) -> None:
-    """Writes the page of a comparison, and its pictures as PNG on request."""
-    save_page(comparison_page(comparison), folder, png=png)
 
 
 def comparison_page(comparison: ModelComparison) -> Page:

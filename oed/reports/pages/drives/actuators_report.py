@@ -7,14 +7,7 @@ from oed.reports.pictures.drive_pictures import drive_error_picture, drive_motio
 from oed.reports.rendering.page import Fact, Page, Section, Table, page_of, table_of
 from oed.reports.rendering.picture import Picture
 from oed.reports.rendering.provenance import recordings_of
-from oed.reports.rendering.saving import save_page
-from robots.common.files import ResultFolder
 from robots.common.plain import significant
-
-
-def save_actuators_report(result: Actuators, folder: ResultFolder, *, png: bool = False) -> None:
-    """Writes the page of identified drives, and its pictures as PNG on request."""
-    save_page(actuators_page(result), folder, png=png)
 
 
 def actuators_page(result: Actuators) -> Page:

@@ -8,16 +8,9 @@ from oed.experiments.drives import DriveDesign
 from oed.reports.rendering.page import Fact, Page, Section, Table, page_of
 from oed.reports.rendering.palette import sequence_role
 from oed.reports.rendering.picture import Panel, Picture, Series
-from oed.reports.rendering.saving import save_page
-from robots.common.files import ResultFolder
 
 SHOWN = 3000
 """Samples of a curve at most."""
-
-
-def save_drive_design_report(design: DriveDesign, folder: ResultFolder, *, png: bool = False) -> None:
-    """Writes the page of a designed motion for drives."""
-    save_page(drive_design_page(design), folder, png=png)
 
 
 def drive_design_page(design: DriveDesign) -> Page:

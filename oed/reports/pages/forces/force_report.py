@@ -8,29 +8,7 @@ from estimation.external_forces import ForceEstimate
 from oed.reports.pictures.force_pictures import external_torque_picture, load_picture, statistic_picture
 from oed.reports.rendering.page import Fact, Page, Section, Table, page_of, table_of
 from oed.reports.rendering.provenance import Recording
-from oed.reports.rendering.saving import save_page
-from robots.common.files import ResultFolder
 from robots.common.plain import finite
-
-
-def save_force_report(
-    forces: ForceEstimate,
-    folder: ResultFolder,
-    *,
-    kinds: tuple[str, ...],
-    logs: tuple[Recording, ...] = (),
-    png: bool = False,
-) -> None:
-    """Writes the page of external forces, and its pictures as PNG on request.
-
-    Args:
-        forces: the result.
-        folder: for the files.
-        kinds: "revolute" or "prismatic" of each joint (n,).
-        logs: the recording.
-        png: whether to write the pictures as PNG too.
-    """
-    save_page(force_page(forces, kinds, logs), folder, png=png)
 
 
 def force_page(forces: ForceEstimate, kinds: tuple[str, ...], logs: tuple[Recording, ...] = ()) -> Page:

@@ -14,17 +14,10 @@ from oed.reports.rendering.page import Cell, Fact, Page, Section, Table, page_of
 from oed.reports.rendering.palette import joint_role
 from oed.reports.rendering.picture import Panel, Picture, Series
 from oed.reports.rendering.provenance import Recording
-from oed.reports.rendering.saving import save_page
-from robots.common.files import ResultFolder
 from robots.common.plain import two_digits
 
 CHANCE = 1e-3
 """Smallest p-value that is written as a number."""
-
-
-def save_loop_report(result: LoopResult, folder: ResultFolder, *, png: bool = False) -> None:
-    """Writes the page, and its pictures as PNG on request."""
-    save_page(loop_page(result), folder, png=png)
 
 
 def loop_page(result: LoopResult) -> Page:

@@ -8,16 +8,9 @@ from estimation.monitoring.fleets import FleetResult, RobotRow
 from oed.reports.rendering.page import Fact, Page, Section, Status, Table, page_of, table_of
 from oed.reports.rendering.palette import joint_role
 from oed.reports.rendering.picture import Line, Panel, Picture, Series
-from oed.reports.rendering.saving import save_page
-from robots.common.files import ResultFolder
 
 # Robots whose trends are drawn; the table lists all.
 DRAWN = 12
-
-
-def save_fleet_report(result: FleetResult, folder: ResultFolder, *, png: bool = False) -> None:
-    """Writes the page of a fleet, and its pictures as PNG on request."""
-    save_page(fleet_page(result), folder, png=png)
 
 
 def fleet_page(result: FleetResult) -> Page:

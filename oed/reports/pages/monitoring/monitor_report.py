@@ -11,16 +11,9 @@ from oed.reports.pictures.monitor_pictures import trend_picture
 from oed.reports.rendering.page import Cell, Fact, Page, Section, Status, Table, page_of, table_of
 from oed.reports.rendering.picture import Picture
 from oed.reports.rendering.provenance import Recording
-from oed.reports.rendering.saving import save_page
-from robots.common.files import ResultFolder
 
 STATUS: dict[str, Status] = {"green": "good", "amber": "note", "red": "act"}
 ROLES = {"green": "good", "amber": "warning", "red": "bad"}
-
-
-def save_monitor_report(result: MonitorResult, folder: ResultFolder, *, png: bool = False) -> None:
-    """Writes the page of a monitor, and its picture as PNG on request."""
-    save_page(monitor_page(result), folder, png=png)
 
 
 def monitor_page(result: MonitorResult) -> Page:

@@ -12,6 +12,7 @@ import pytest
 
 from estimation.diagnosis.experiment_plans.experiment_motions import MAKERS
 from estimation.diagnosis.hypothesis_tests.hypotheses import Hypothesis
+from oed.campaigns.discrimination_options import DiscriminationOptions
 from oed.campaigns.discriminations.design import discriminate, parse_rivals
 from oed.campaigns.discriminations.discrimination import Discrimination, DiscriminationScore
 from oed.campaigns.discriminations.motions import ExperimentBuilder
@@ -102,7 +103,7 @@ def test_files_say_what_to_play_and_how_sure_it_is(found: Discrimination, two: R
 
 def test_more_noise_needs_larger_effects(two: Robot, found: Discrimination) -> None:
     """What a rival leaves goes with the inverse square of the noise: twice the noise, twice the smallest size."""
-    noisy = discriminate(two, PAIR, noise=2 * found.noise)
+    noisy = discriminate(two, PAIR, options=DiscriminationOptions(noise=2 * found.noise))
     quiet = {judged.kind: judged.smallest(found.size) for judged in found.ranking}
     loud = {judged.kind: judged.smallest(noisy.size) for judged in noisy.ranking}
     # The same motions: the seed is the same, and no choice before the kind's depends on the noise.
@@ -143,7 +144,7 @@ def test_wrong_rivals_are_named(rivals: str, part: str, two: Robot) -> None:
 def test_wrong_noise_is_refused(noise: list[float], two: Robot) -> None:
     """The noise is one positive number per joint."""
     with pytest.raises(InputError, match="noise"):
-        discriminate(two, PAIR, noise=noise)
+        discriminate(two, PAIR, options=DiscriminationOptions(noise=noise))
 
 
 def test_rivals_that_nothing_separates_are_refused_with_the_reason() -> None:

@@ -92,7 +92,7 @@ def test_it_is_in_the_configuration_file(own: Callable[..., Any], tmp_path: Path
 
 def test_what_excludes_what_is_said_once(own: Callable[..., Any]) -> None:
     """An option of another use, and one of two alternatives, are refused."""
-    assert own("--slow").err == "oed: --slow does not apply with `loudly`; remove them\n"
+    assert own("--slow").err == "oed: --slow does not apply with `loudly`; remove them (OED-O002)\n"
     assert "--slow and --place together" in own("--slow", "--place", "1,2,3", "--loudness", "0").err
     assert "--place 1,x; allowed: numbers" in own("--place", "1,x").err
 

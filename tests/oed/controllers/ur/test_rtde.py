@@ -12,7 +12,7 @@ from estimation import read_log
 from oed.controllers import ControllerError, Endpoint, StreamOptions, driver_of, record, stream
 from oed.controllers.errors import LinkError, ProtocolError
 from oed.controllers.rtde.packages import Command, Packages, package
-from oed.exports.simple_message import MessageError, WireFormat
+from oed.exports.simple_message import MessageError
 from robots.common.errors import InputError
 from robots.loading import load_robot
 from robots.robot import Robot
@@ -115,7 +115,7 @@ def test_old_and_foreign_servers(ur10: Robot, log: Path) -> None:
     with pytest.raises(LinkError, match="nothing listens"):
         record(ur10, place, log)
     with pytest.raises(InputError, match="leave out --byte-order"):
-        replace(place, form=WireFormat())
+        replace(place, byte_order="little")
     with pytest.raises(InputError, match="knows no pings"):
         StreamOptions.of(UR, ping=True)
     assert not log.exists()

@@ -12,7 +12,7 @@ import pytest
 
 from oed.experiments import Design, Effort, Ipopt
 from oed.experiments.quality import excitation_findings
-from oed.reports import Page, design_page, render, save_design_report, significant
+from oed.reports import Page, design_page, render, save_report, significant
 from robots.common.files import ResultFolder
 from robots.geometry.chain import Chain, Joint
 from robots.limits import Limits
@@ -139,9 +139,9 @@ def test_the_limit_of_condition_numbers_is_that_of_noise(design: Design) -> None
 def test_pictures_on_request(design: Design, tmp_path: Path) -> None:
     """With PNG each picture is a file; without, the page is alone."""
     with ResultFolder(tmp_path / "plain") as folder:
-        save_design_report(design, folder)
+        save_report(design, folder)
     with ResultFolder(tmp_path / "pictures") as folder:
-        save_design_report(design, folder, png=True)
+        save_report(design, folder, png=True)
     assert [path.name for path in (tmp_path / "plain").iterdir()] == ["report.html"]
     pictures = sorted((tmp_path / "pictures").glob("*.png"))
     assert [p.stem for p in pictures] == sorted(picture.name for picture in design_page(design).pictures)

@@ -11,7 +11,7 @@ import pytest
 
 from estimation import identify
 from estimation.identifications.estimate import Estimate
-from oed.reports import Page, estimate_page, render, save_estimate_report, significant, significant_error
+from oed.reports import Page, estimate_page, render, save_report, significant, significant_error
 from robots.common.files import ResultFolder
 from robots.geometry.chain import Chain, Joint
 from robots.limits import Limits
@@ -97,7 +97,7 @@ def test_stands_alone(html: str) -> None:
 def test_pictures_on_request(estimate: Estimate, tmp_path: Path) -> None:
     """With PNG each picture is a file beside the page."""
     with ResultFolder(tmp_path / "out") as folder:
-        save_estimate_report(estimate, folder, png=True)
+        save_report(estimate, folder, png=True)
     names = {path.stem for path in (tmp_path / "out").glob("*.png")}
     assert names == {picture.name for picture in estimate_page(estimate).pictures}
 
