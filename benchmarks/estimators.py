@@ -137,8 +137,9 @@ def main() -> int:
     warnings.simplefilter("ignore", AssumedValueWarning)
     logs = int(sys.argv[1]) if len(sys.argv) > 1 else LOGS
     import clarabel
+    import cvxpy
 
-    print(f"Clarabel {clarabel.__version__}")
+    print(f"cvxpy {cvxpy.__version__}, Clarabel {clarabel.__version__}")
     print("semidefinite program, CPU seconds:         one solve   with its pull chosen by 4 blocks x 4 weights")
     for robot in ROBOTS:
         for pull in ("entropic", "euclidean"):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Mapping
 from difflib import get_close_matches
 from functools import partial
@@ -11,13 +12,12 @@ from scipy.linalg import null_space
 
 from estimation.estimators.base import Array, Solution
 from estimation.estimators.wls import WeightedLeastSquares
-from estimation.linear_algebra.conic import ConicProgram
 from estimation.linear_algebra.scaled import square_root
 from estimation.regressions.covariances import COVARIANCE_RIDGE, Equations, regressor_rows, robust_covariance
 from estimation.regressions.regression_data import RegressionData
 from estimation.regressions.regularisation import regularisation
 from estimation.regressions.standard_parameters import body_columns, largest_speed, nonnegative_rows, scaling
-from robots.common.errors import InputError
+from robots.common.errors import InfeasibleError, InputError, SolverError
 from robots.regressor import TorqueModel
 
 
@@ -158,18 +158,23 @@ def _covariance(data: RegressionData, values: Array, weights: Array, grouping: A
 
 def _solve(matrix: Array, target: Array, rows: Array, lower: Array, upper: Array) -> Array:
     """Min ||matrix x - target||^2 with lower <= rows x <= upper."""
-    rests, size = matrix.shape
-    # The residuals are variables of their own: squaring the matrix would square its condition.
-    program = ConicProgram(size + rests)
-    program.equal(np.hstack([matrix, -np.eye(rests)]), -target)
+    import cvxpy
+
+    x = cvxpy.Variable(matrix.shape[1])
     below, above, fixed = np.isfinite(lower) & (lower < upper), np.isfinite(upper) & (lower < upper), lower == upper
-    wide = np.hstack([rows, np.zeros((len(rows), rests))])
-    for demand, chosen, sign, bound in (
-        (program.nonnegative, below, 1.0, lower),
-        (program.nonnegative, above, -1.0, upper),
-        (program.equal, fixed, 1.0, lower),
-    ):
-        if chosen.any():
-            demand(sign * wide[chosen], -sign * bound[chosen])
-    quadratic = np.diag(np.concatenate([np.zeros(size), np.ones(rests)]))
-    return program.solve(quadratic, np.zeros(size + rests), "constrained fit")[:size]
+    constraints = [rows[below] @ x >= lower[below], rows[above] @ x <= upper[above], rows[fixed] @ x == lower[fixed]]
+    problem = cvxpy.Problem(
+        cvxpy.Minimize(cvxpy.sum_squares(matrix @ x - target)), [c for c in constraints if c.shape[0]]
+    )
+    try:
+        with warnings.catch_warnings():
+            # The status below says it, too.
+            warnings.filterwarnings("ignore", "Solution may be inaccurate", UserWarning)
+            problem.solve(solver=cvxpy.CLARABEL, max_threads=1)
+    except cvxpy.error.SolverError as error:
+        raise SolverError(f"constrained fit: {error}", remedy="check the bounds") from error
+    if problem.status in (cvxpy.INFEASIBLE, cvxpy.INFEASIBLE_INACCURATE):
+        raise InfeasibleError("constrained fit: no parameters obey all bounds", remedy="relax the bounds")
+    if problem.status not in (cvxpy.OPTIMAL, cvxpy.OPTIMAL_INACCURATE):
+        raise SolverError(f"constrained fit: Clarabel ended with {problem.status}", remedy="check the bounds")
+    return np.asarray(x.value, dtype=float)
