@@ -21,9 +21,10 @@ from oed.reports.animations.surfaces import (
 from robots.collision import Box, Capsule, CollisionModel, Plane, Surroundings, reach, segment_capsules
 from robots.collision.boxes import stated_scene
 from robots.collision.drawn.fitting import load_mesh
+from robots.collision.drawn.shapes import shapes_by_link
 from robots.collision.loading import RADIUS_FRACTION, stated_collision
 from robots.common.errors import AssumedValueWarning, InputError
-from robots.geometry.urdf_shapes import UrdfShape, drawn_shapes
+from robots.geometry.urdf_shapes import UrdfShape
 from robots.robot import Robot
 
 Array = NDArray[np.float64]
@@ -104,10 +105,8 @@ def _capsules(robot: Robot) -> tuple[Capsule, ...]:
 
 
 def _drawn(robot: Robot) -> tuple[Body, ...]:
-    if not robot.urdf or not robot.links:
-        return ()
     try:
-        visual, collision = drawn_shapes(robot.urdf, "visual"), drawn_shapes(robot.urdf, "collision")
+        visual, collision = shapes_by_link(robot, "visual"), shapes_by_link(robot, "collision")
     except InputError as error:
         warnings.warn(f"{robot.name}: {error}; capsules are drawn instead", AssumedValueWarning, stacklevel=4)
         return ()
