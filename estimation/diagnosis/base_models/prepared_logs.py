@@ -11,7 +11,7 @@ from estimation.diagnosis.base_models.baseline import base_parameters
 from estimation.diagnosis.base_models.payload_and_gravity import subtract_known_payload
 from estimation.diagnosis.recordings.log_reading import build_recording
 from estimation.diagnosis.recordings.recording import Recording
-from estimation.diagnosis.recordings.unusable_logs import find_unusable_logs
+from estimation.diagnosis.recordings.unusable_logs import find_unusable_logs, require_information
 from estimation.logs.clocks import put_on_clock
 from estimation.recordings import Recording as Ready
 from robots.base_parameters import BaseParameters
@@ -78,7 +78,7 @@ def prepare_logs(fit: Ready, unseen: Ready | None, friction: str | FrictionTerm)
         The prepared logs.
 
     Raises:
-        InputError: logs that are too short, or given twice.
+        InputError: logs that do not determine the parameters, or given twice.
         NotIdentifiableError: no joint moves.
     """
     robot = fit.robot
@@ -102,6 +102,7 @@ def prepare_logs(fit: Ready, unseen: Ready | None, friction: str | FrictionTerm)
         notes += [_UNUSABLE.format(k + 1, _in_brackets(recording.names[k]), 100 * s) for k, s in unusable.items()]
         logs = [log for k, log in enumerate(logs) if k not in unusable]
         recording = subtract_known_payload(robot, build_recording(robot, logs))
+    require_information(base, recording)
     return PreparedLogs(tuple(logs), tuple(other), recording, base, clocked.dated, tuple(notes))
 
 

@@ -32,8 +32,6 @@ from robots.terms.effects import Situation
 
 Array = NDArray[np.float64]
 
-SHORTEST_UNSEEN = 1.0  # shortest stretch of a held-out log that is used [s]
-
 
 @dataclass(frozen=True, eq=False)
 class HeldOutResult:
@@ -219,9 +217,7 @@ def _on_logs(
     """Computes the errors on held-out logs, and the states and columns of the members there."""
     recording = problem.recording
     travel = np.max([np.ptp(recording.q[run], axis=0) for run in recording.runs], axis=0)
-    other = subtract_known_payload(
-        robot, build_recording(robot, held_out, step=recording.step, shortest=SHORTEST_UNSEEN, travel=travel)
-    )
+    other = subtract_known_payload(robot, build_recording(robot, held_out, step=recording.step, travel=travel))
     other = other.with_trusted(recording.trusted)
     # One clock: later held-out logs start with the heat of the logs before.
     later = bool(other.t[0] > recording.t[-1])

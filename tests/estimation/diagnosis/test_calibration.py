@@ -34,7 +34,6 @@ NUMERICS = {
     "free_functions.py": {"CONTENDERS"},
     "gain_intervals.py": {"PARTS", "RESAMPLES", "BLOCK"},
     "gear_compliance.py": {"ALIGNED", "STIFFEST", "FEWEST", "MOST", "BLOCK"},
-    "held_out_errors.py": {"SHORTEST_UNSEEN"},
     "held_out_simulation.py": {"STRETCH", "ENOUGH_ROWS"},
     "prediction_settings.py": {"STRETCH", "POINTS", "FEWEST"},
     "residual_shares.py": {"FEWEST", "SLOW"},
