@@ -80,7 +80,7 @@ def require_information(base: BaseParameters, recording: Recording) -> None:
     values = 0.0
     for series in (left[known[:, j], j] for j in range(recording.n)):
         windows = np.array_split(series, max(1, round(len(series) * recording.step / WINDOW)))
-        values += sum(effective_rows(part) for part in windows if np.ptp(part) > 0)
+        values += sum(effective_rows(part) for part in windows if len(part) and np.ptp(part) > 0)
     if values < INDEPENDENT * Q.shape[1]:
         raise InputError(
             f"{recording.duration:.1f} s of usable logs hold about {values:.0f} independent values of torque for "

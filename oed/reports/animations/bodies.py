@@ -68,7 +68,7 @@ def bodies_of(robot: Robot, surroundings: Surroundings | None = None) -> tuple[B
     drawn = _drawn(robot)
     without = set(range(robot.n + 1)) - {body.link for body in drawn}
     around = surroundings or Surroundings()
-    model = _model(robot, around)
+    model = checked_model(robot, around)
     capsules: tuple[Capsule, ...] = ()
     if without - {0} or not drawn:
         capsules = model.capsules if model is not None else _capsules(robot)
@@ -88,12 +88,17 @@ def bodies_of(robot: Robot, surroundings: Surroundings | None = None) -> tuple[B
     )
 
 
-def _model(robot: Robot, surroundings: Surroundings) -> CollisionModel | None:
-    """The collision model; None where the robot's file gives none that fits."""
+def checked_model(robot: Robot, surroundings: Surroundings | None) -> CollisionModel | None:
+    """Makes the collision model; None where the robot's file gives none that fits.
+
+    Args:
+        robot: the robot.
+        surroundings: the floor, and further boxes; the robot's own by default.
+    """
     with warnings.catch_warnings(), suppress(InputError):
         # Whether a shape is assumed matters for distances, which a picture does not state.
         warnings.simplefilter("ignore", AssumedValueWarning)
-        return surroundings.model(robot)
+        return (surroundings or Surroundings()).model(robot)
     return None
 
 
