@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from robots.common.errors import InputError
+from robots.common.plain import as_html
 from robots.geometry.chain import Chain, LinkPlace
 from robots.joints.controller_axes import ControllerAxes
 from robots.limits import Limits
@@ -132,6 +133,11 @@ class Robot:
     def __repr__(self) -> str:
         known = "known" if self.has_inertia else "unknown"
         return f"Robot({self.name!r}, {self.n} joints, period {1e3 * self.period:g} ms, nominal dynamics {known})"
+
+    def _repr_html_(self) -> str:
+        from robots.robot_summary import robot_summary
+
+        return as_html(robot_summary(self))
 
     @property
     def n(self) -> int:

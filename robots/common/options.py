@@ -27,6 +27,8 @@ class Option:
         names_file: whether the text may name a file; its place is then relative to a configuration file that has it.
         switch: whether a flag that is off by default has a spelling that switches it off.
         defaults: of a group: fields with another default here, and these.
+        choices: where the values are listed, as ``module:name`` of a collection or of a function that gives one; a
+            shell completes them, and other values may be allowed.
         only: the uses of the verb to which the option belongs, see `oed.cli.verbs.Verb.use`; of all if it is empty.
     """
 
@@ -43,6 +45,7 @@ class Option:
     names_file: bool = False
     switch: bool = False
     defaults: tuple[tuple[str, Any], ...] = ()
+    choices: str = ""
     only: tuple[str, ...] = ()
 
 

@@ -71,7 +71,7 @@ class Design(Verb):
     for_: str = "dynamics"
     gains: Annotated[Path | None, Option(only=("actuators",))] = None
     duration: Annotated[float, Option(only=("actuators",))] = 20.0
-    criterion: Annotated[str | None, Option(only=(*TRAJECTORY, "calibration"))] = None
+    criterion: Annotated[str | None, Option(choices="oed.criteria:CRITERIA", only=(*TRAJECTORY, "calibration"))] = None
     model: Annotated[ModelOptions, Option(only=TRAJECTORY)] = ModelOptions()
     excitation: Annotated[Excitation, Option(only=TRAJECTORY)] = Excitation()
     trajectory: Annotated[TrajectoryOptions, Option(only=TRAJECTORY)]
@@ -83,7 +83,9 @@ class Design(Verb):
     weights: Annotated[WeightOptions, Option(only=TRAJECTORY)] = WeightOptions()
     after: Annotated[Path | None, Option(only=("dynamics",))] = None
     task: Annotated[Path | None, Option(only=("dynamics",))] = None
-    discriminate: Annotated[str | None, Option(only=("dynamics", "discriminate"))] = None
+    discriminate: Annotated[
+        str | None, Option(choices="robots.terms.effects:EFFECTS", only=("dynamics", "discriminate"))
+    ] = None
     poses: Annotated[PoseSet, Option(only=("calibration",))] = PoseSet()
     search: Annotated[SearchOptions, Option(only=TRAJECTORY)]
     work: Annotated[Processes, Option(only=TRAJECTORY)] = Processes()
