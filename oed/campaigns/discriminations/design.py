@@ -7,6 +7,7 @@ Of each kind of experiment, T-optimality asks how much of either cause base mode
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import partial
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -16,11 +17,15 @@ from estimation.diagnosis.experiment_plans.next_experiment import VARIANTS
 from estimation.diagnosis.experiment_plans.planned_limits import planned_problem
 from estimation.diagnosis.hypothesis_tests.hypotheses import Hypothesis
 from estimation.diagnosis.hypothesis_tests.problem import Problem
+from oed.campaigns.discriminations.clear_runs import ClearRuns
 from oed.campaigns.discriminations.discrimination import Discrimination, DiscriminationScore
 from oed.campaigns.discriminations.motions import ExperimentBuilder, Run
 from oed.campaigns.discriminations.probabilities import STEP, Discriminator, require_separable
 from oed.campaigns.discriminations.rivals import parse_rivals
+from oed.experiments.assembly import rest_pose
 from oed.experiments.checks import velocity_share
+from oed.experiments.options import LimitOptions
+from oed.experiments.safety_checks.safety import choose_safety
 from robots.base_parameters import find_base_parameters
 from robots.collision import Surroundings
 from robots.common.errors import InfeasibleError, InputError, NotIdentifiableError
@@ -69,7 +74,8 @@ def discriminate(
         friction: of the base model, ``polynomial`` or ``coulomb-viscous``.
         home: pose (n,) at both ends of all motions; by default `Limits.home`.
         velocity_fraction: share of the velocity limits to use; by default see `LimitOptions`.
-        collision: check the motions for collisions; they are not designed to avoid them, and the result says so.
+        collision: keep the motions free of collisions, which makes them smaller where they must be, and the home pose
+            another one if it is not given and has no room.
         surroundings: the floor, and boxes that the arm must not enter.
         seed: of the reference motion.
         progress: receives the progress of each kind.
@@ -85,9 +91,19 @@ def discriminate(
         raise InputError(f"found the size {size}", allowed="above 0, up to 1")
     velocity_fraction = velocity_share(robot, velocity_fraction)
     model = default_model(robot, friction=friction, velocity_scale=SHARP)
-    builder = ExperimentBuilder(find_base_parameters(model), home=home, velocity_fraction=velocity_fraction, seed=seed)
-    reference = builder.runs()[0]
-    base = builder.base.model
+    planned = find_base_parameters(model)
+    around = surroundings or Surroundings()
+    if collision:
+        kept = LimitOptions(velocity_fraction=velocity_fraction, torque=False, surroundings=around)
+        safety = choose_safety(robot, planned, rest_pose(robot.limits, home), kept, movable=home is None)
+        home = safety.home
+
+    def build(seed: int, share: float) -> ExperimentBuilder:
+        return ExperimentBuilder(planned, home=home, velocity_fraction=velocity_fraction, seed=seed, share=share)
+
+    clear = ClearRuns(build, safety.collision if collision else None)
+    builder, (reference, *_) = clear.reference(seed)
+    base = planned.model
     if level is None:
         m, nominal = reference.motion, np.nan_to_num(base.nominal)
         level = SHARE * np.sqrt(np.mean(base.torque(m.q, m.dq, m.ddq, nominal) ** 2, axis=0))
@@ -96,10 +112,10 @@ def discriminate(
     judge = Discriminator(problem, pair, size)
     best = judge("reference", (reference,))
     for draw in range(1, REFERENCES):
-        other = ExperimentBuilder(builder.base, home=home, velocity_fraction=velocity_fraction, seed=seed + draw)
-        drawn = judge("reference", other.runs())
-        if drawn.merit > best.merit:
-            builder, reference, best = other, other.runs()[0], drawn
+        other, alone = clear.reference(seed + draw)
+        drawn = judge("reference", alone)
+        if (not clear.problem(alone), drawn.merit) > (not clear.problem([reference]), best.merit):
+            builder, reference, best = other, alone[0], drawn
     index = next((h.joint - 1 for h in pair if h.joint is not None), int(np.argmax(np.ptp(reference.motion.q, axis=0))))
     judged: dict[str, DiscriminationScore] = {}
     runs: dict[str, tuple[Run, ...]] = {}
@@ -107,7 +123,7 @@ def discriminate(
     try:
         for number, (kind, make) in enumerate(MAKERS.items(), start=1):
             try:
-                runs[kind] = builder.runs(make(builder.room, index, 0), kind)
+                runs[kind] = clear.runs(builder, kind, partial(make, joint=index, variant=0))
                 judged[kind] = judge(kind, runs[kind])
             except InfeasibleError as error:
                 judged[kind] = DiscriminationScore.impossible(kind, str(error))
@@ -122,7 +138,7 @@ def discriminate(
     kind = max(runs, key=lambda name: judged[name].merit)
     for variant in range(1, VARIANTS if kind in VARIED else 1):
         try:
-            varied = builder.runs(MAKERS[kind](builder.room, index, variant), kind)
+            varied = clear.runs(builder, kind, partial(MAKERS[kind], joint=index, variant=variant))
         except InfeasibleError:
             continue
         better = judge(kind, varied)
@@ -144,7 +160,7 @@ def discriminate(
             "velocity_fraction": velocity_fraction,
             "seed": seed,
         },
-        surroundings=(surroundings or Surroundings()) if collision else None,
+        surroundings=around if collision else None,
     )
 
 
