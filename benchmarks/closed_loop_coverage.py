@@ -1,11 +1,11 @@
 """How often the 95 % intervals of a diagnosis hold the truth on robots that a physics engine integrates.
 
 Run it with ``python benchmarks/closed_loop_coverage.py --seeds 1 200``. Each seed is one fresh UR10 of MuJoCo, whose
-masses, rotors and friction differ from their description, under a position loop at 2 kHz with dry friction. One of eight
-effects is hidden in it, of a random size at a random joint, and 0.5 to 2.5 % of torque noise are added. The log of 45 s
-and the held-out one of 20 s have 250 Hz. Every determined parameter of the named effect counts, if the plant has its
-true value. Rows are added as they come, and a run that was stopped goes on where it was. ``--figures`` prints the
-table. A file of ``--logs`` keeps the motions, so a changed diagnosis reads them again.
+masses, rotors and friction differ from their description, under a position loop at 2 kHz with dry friction. One of
+eight effects is hidden in it, of a random size at a random joint, and 0.5 to 2.5 % of torque noise are added. The log
+of 45 s and the held-out one of 20 s have 250 Hz. Every determined parameter of the named effect counts, if the plant
+has its true value. Rows are added as they come, and a run that was stopped goes on where it was. ``--figures`` prints
+the table. A file of ``--logs`` keeps the motions, so a changed diagnosis reads them again.
 """
 
 from __future__ import annotations
@@ -27,7 +27,6 @@ import mujoco  # noqa: E402
 import numpy as np  # noqa: E402
 from numpy.typing import NDArray  # noqa: E402
 from scipy.signal import lfilter  # noqa: E402
-from scipy.stats import beta  # noqa: E402
 
 from benchmarks.closed_loop_parts.plants import (  # noqa: E402
     DAMPING,
@@ -43,6 +42,7 @@ from benchmarks.closed_loop_parts.plants import (  # noqa: E402
     reference,
 )
 from benchmarks.diagnosis import read_rows  # noqa: E402
+from estimation.uncertainty.quantiles import share_interval  # noqa: E402
 
 Array = NDArray[np.float64]
 
@@ -272,8 +272,8 @@ def figures(rows: list[dict[str, Any]]) -> str:
         held = sum(p["ci95"][0] <= p["truth"] <= p["ci95"][1] for p in found)
         share = ""
         if found:
-            low, high = beta.ppf(0.025, held, len(found) - held + 1), beta.ppf(0.975, held + 1, len(found) - held)
-            share = f"{100 * held / len(found):.0f} % ({100 * np.nan_to_num(low):.0f} to {100 * np.nan_to_num(high, nan=1.0):.0f})"
+            low, high = share_interval(held, len(found))
+            share = f"{100 * held / len(found):.0f} % ({100 * low:.0f} to {100 * high:.0f})"
         lines.append(
             f"{name:22} {len(some):6} {len(named):6} {sum(len(row['found']) == 1 for row in named):6} {len(found):10}  "
             f"{held} {share}"

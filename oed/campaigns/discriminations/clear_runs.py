@@ -74,6 +74,7 @@ class ClearRuns:
             if bodies.pairs and (bodies.clearance(motion.q[::EVERY]) < 0.0).any():
                 return "its motions meet the robot itself or its surroundings in every size"
             freedom = freedom_of(bodies, motion)
-            if not is_free(freedom):
+            # None where the links have no shape at all: the result then says that nothing was checked.
+            if freedom is not None and not is_free(freedom):
                 return freedom_text(freedom)
         return ""
