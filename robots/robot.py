@@ -135,9 +135,13 @@ class Robot:
         return f"Robot({self.name!r}, {self.n} joints, period {1e3 * self.period:g} ms, nominal dynamics {known})"
 
     def _repr_html_(self) -> str:
-        from robots.robot_summary import robot_summary
-
-        return as_html(robot_summary(self))
+        rows = [("joint", "kind", "lower", "upper", "velocity", "torque")]
+        for i, joint in enumerate(self.chain.joints):
+            limits = (self.limits.lower[i], self.limits.upper[i], self.limits.velocity[i], self.limits.torque[i])
+            rows.append((f"{i + 1} {joint.name}", joint.kind, *(f"{value:.4g}" for value in limits)))
+        widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
+        table = ["  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)) for row in rows]
+        return as_html("\n".join([repr(self), "", *table, *(f"note: {note}" for note in self.notes)]))
 
     @property
     def n(self) -> int:

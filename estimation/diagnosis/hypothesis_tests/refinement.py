@@ -58,7 +58,7 @@ def refine(
     best: list[FittedEffect] = []
 
     def picked(shape: tuple[float, ...]) -> int:
-        return sum(not hypothesis.effect.shapes[k].is_left(shape[k]) for k in chosen)
+        return sum(not hypothesis.effect.shapes[k].is_left(shape[k]) for k in chosen if k < len(shape))
 
     def evaluate(shape: tuple[float, ...], fitted: int | None = None) -> float:
         if fitted is None:
