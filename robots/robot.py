@@ -135,7 +135,7 @@ class Robot:
         return f"Robot({self.name!r}, {self.n} joints, period {1e3 * self.period:g} ms, nominal dynamics {known})"
 
     def _repr_html_(self) -> str:
-        rows = [("joint", "kind", "lower", "upper", "velocity", "torque")]
+        rows: list[tuple[str, ...]] = [("joint", "kind", "lower", "upper", "velocity", "torque")]
         for i, joint in enumerate(self.chain.joints):
             limits = (self.limits.lower[i], self.limits.upper[i], self.limits.velocity[i], self.limits.torque[i])
             rows.append((f"{i + 1} {joint.name}", joint.kind, *(f"{value:.4g}" for value in limits)))

@@ -75,8 +75,10 @@ class PayloadChange(Effect):
     def likely(
         self, situation: Situation, joint: Place, shape: tuple[float, ...], coefficients: Array
     ) -> tuple[tuple[float | None, ...], ...]:
-        """Lists point masses and bodies with their own moments of inertia, on the flange and on each link."""
-        return tuple((None, own, link) for link in self.choices(situation.robot, LINK) for own in (0.0, 1.0))
+        """Lists a body with its own moments of inertia, and the same kind of body on the flange and on other links."""
+        here = float(carrier(shape))
+        others = (link for link in self.choices(situation.robot, LINK) if link != here)
+        return ((None, 1.0, here), *((None, shape[1], link) for link in others))
 
     def columns(self, situation: Situation, joint: Place, shape: tuple[float, ...] = ()) -> Array:
         """Evaluates the torque of all joints per kg, kg m and kg m2 (N, n, 10)."""
