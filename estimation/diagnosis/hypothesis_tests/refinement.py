@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -60,14 +61,26 @@ def refine(
     def picked(shape: tuple[float, ...]) -> int:
         return sum(not hypothesis.effect.shapes[k].is_left(shape[k]) for k in chosen if k < len(shape))
 
+    @cache
+    def usual_degrees(shape: tuple[float, ...]) -> int:
+        """A choice that shows fewer coefficients than the usual one is not simpler for that."""
+        result = score(problem, problem.measured(hypothesis, shape), accepted)
+        return result.limited(hypothesis, situation.robot, shape).degrees
+
     def evaluate(shape: tuple[float, ...], fitted: int | None = None) -> float:
         if fitted is None:
             fitted = sum(not hypothesis.effect.shapes[k].is_left(shape[k]) for k in loose) + picked(shape)
         group = problem.measured(hypothesis, shape)
         result = score(problem, group, accepted)
         found = result.limited(hypothesis, situation.robot, shape)
+        degrees = found.degrees
+        if picked(shape):
+            usual = [start[k] if moments[k] else value for k, value in enumerate(shape)]
+            for k in chosen:
+                usual[k] = float(hypothesis.effect.shapes[k].default or 0.0)
+            degrees = max(degrees, usual_degrees(tuple(usual)))
         member = FittedEffect(
-            hypothesis, shape, group, found.gain, found.coefficients, found.degrees + fitted, result.visible
+            hypothesis, shape, group, found.gain, found.coefficients, degrees + fitted, result.visible
         )
         worth = member.bic_gain
         if not best or worth > best[0].bic_gain:
