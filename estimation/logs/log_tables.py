@@ -183,7 +183,8 @@ def _recognised(
 ) -> tuple[Table, Notes]:
     wanted = recorder.wanted.fullmatch
     table = read_foreign(path, lambda name: mapping is not None or wanted(name) is not None)
-    known = recorder.understood(table, joints)
+    # Names in the mapping are those of the file, in the robot's order.
+    known = recorder.understood(table, joints if mapping is None or mapping.joints is None else mapping.joints)
     stated = {} if mapping is None else {name: getattr(mapping, name) for name in mapping.model_fields_set}
     source = None if "torque" in stated or "current" in stated else known.source
     if "torque" in stated:

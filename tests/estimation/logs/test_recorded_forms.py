@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 
 import numpy as np
@@ -66,3 +67,27 @@ def test_positions_alone_are_said_to_lack_torque(tmp_path: Path) -> None:
     path.write_text("timestamp,cmdnum,J1,J2\n" + "".join(f"{t},1,{q[0]},{q[1]}\n" for t, q in zip(T, Q, strict=True)))
     with pytest.raises(InputError, match="no column looks like torque or current by its name"):
         read_log(path, 2)
+
+
+def test_records_beside_a_description_are_the_table(tmp_path: Path) -> None:
+    """A JSON file with one list of records is that list; what stands beside it is no column."""
+    path = tmp_path / "log.json"
+    entries = [{"timestamp": t, "position": q[0], "torque": 2.0} for t, q in zip(T.tolist(), Q.tolist(), strict=True)]
+    path.write_text(json.dumps({"mass": 0.5, "entries": entries}))
+    mapping = tmp_path / "m.yaml"
+    mapping.write_text("time: {column: timestamp}\nposition: {columns: [position]}\ntorque: {columns: [torque]}\n")
+    log = read_log(path, 1, mapping=mapping)
+    np.testing.assert_allclose(log.q[:, 0], Q[:, 0])
+
+
+def test_a_mapping_names_the_joints_of_a_printed_topic(tmp_path: Path) -> None:
+    """A printed topic with other names of joints is refused with a mapping that works."""
+    path = tmp_path / "topic.csv"
+    names = [f"field.{key}{k}" for key in ("name", "position", "effort") for k in (0, 1)]
+    rows = [f"{10**18 + round(1e9 * t)},b,a,{q[0]},{q[1]},1,2" for t, q in zip(T, Q, strict=True)]
+    path.write_text(",".join(["%time", *names]) + "\n" + "\n".join(rows) + "\n")
+    with pytest.raises(InputError, match=r"joints: \[b, a\]"):
+        read_log(path, 2, joints=("J1", "J2"))
+    mapping = tmp_path / "m.yaml"
+    mapping.write_text("joints: [a, b]\n")
+    np.testing.assert_allclose(read_log(path, 2, joints=("J1", "J2"), mapping=mapping).q, Q[:, ::-1])
