@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from robots.common.errors import InputError
+from robots.common.plain import as_html
 from robots.geometry.chain import Chain, LinkPlace
 from robots.joints.controller_axes import ControllerAxes
 from robots.limits import Limits
@@ -132,6 +133,15 @@ class Robot:
     def __repr__(self) -> str:
         known = "known" if self.has_inertia else "unknown"
         return f"Robot({self.name!r}, {self.n} joints, period {1e3 * self.period:g} ms, nominal dynamics {known})"
+
+    def _repr_html_(self) -> str:
+        rows: list[tuple[str, ...]] = [("joint", "kind", "lower", "upper", "velocity", "torque")]
+        for i, joint in enumerate(self.chain.joints):
+            limits = (self.limits.lower[i], self.limits.upper[i], self.limits.velocity[i], self.limits.torque[i])
+            rows.append((f"{i + 1} {joint.name}", joint.kind, *(f"{value:.4g}" for value in limits)))
+        widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
+        table = ["  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)) for row in rows]
+        return as_html("\n".join([repr(self), "", *table, *(f"note: {note}" for note in self.notes)]))
 
     @property
     def n(self) -> int:

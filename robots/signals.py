@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from robots.common.errors import InputError
+from robots.common.plain import as_html
 from robots.signal_checks import (
     checked_body,
     checked_common,
@@ -24,6 +25,9 @@ FloatArray = NDArray[np.float64]
 
 UNKNOWN_PAUSE = 60.0
 """Pause [s] assumed between two logs where it was not recorded."""
+
+
+_SIGNALS = ("q", "command", "dq", "ddq", "tau", "current", "temperature")
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,10 +52,18 @@ class _Samples:
     def __repr__(self) -> str:
         own = getattr(self, "name", "")
         name = f"{own!r}, " if own else ""
-        signals = ("q", "command", "dq", "ddq", "tau", "current", "temperature")
-        held = [key for key in signals if getattr(self, key, None) is not None]
+        held = [key for key in _SIGNALS if getattr(self, key, None) is not None]
         span = f"{self.t[0]:.6g} to {self.t[-1]:.6g} s"
         return f"{type(self).__name__}({name}{len(self)} samples, {self.n} joints, {span}, {', '.join(held)})"
+
+    def _repr_html_(self) -> str:
+        lines = [repr(self), "", "least to most    " + "".join(f"{f'joint {j + 1}':>22}" for j in range(self.n))]
+        for key in _SIGNALS:
+            values = getattr(self, key, None)
+            if values is not None:
+                ends = zip(np.nanmin(values, axis=0), np.nanmax(values, axis=0), strict=True)
+                lines.append(f"{key:16} " + "".join(f"{f'{low:.4g} to {high:.4g}':>22}" for low, high in ends))
+        return as_html("\n".join(lines))
 
     @property
     def n(self) -> int:

@@ -183,7 +183,8 @@ def _recognised(
 ) -> tuple[Table, Notes]:
     wanted = recorder.wanted.fullmatch
     table = read_foreign(path, lambda name: mapping is not None or wanted(name) is not None)
-    known = recorder.understood(table, joints)
+    # Names in the mapping are those of the file, in the robot's order.
+    known = recorder.understood(table, joints if mapping is None or mapping.joints is None else mapping.joints)
     stated = {} if mapping is None else {name: getattr(mapping, name) for name in mapping.model_fields_set}
     source = None if "torque" in stated or "current" in stated else known.source
     if "torque" in stated:
@@ -211,12 +212,24 @@ def _mapped(table: Table, mapping: LogMapping, joints: int, kinds: Sequence[str]
                 allowed="numbers with a unit, or times such as 2024-05-03T12:34:56.789 without one",
             )
         table = with_seconds(table, name)
+        if (finer := mapping.time.nanoseconds) is not None:
+            table = _with_nanoseconds(table, name, finer)
     # A log of another number of joints than the robot's is refused later, with both numbers.
     own = kinds if kinds is not None and len(kinds) == joints else None
     mapped = map_table(with_seconds(table, "t"), mapping, joints, own)
     kept = {name: values for name, values in mapped.columns.items() if parse_name(name) is not None}
     left = tuple(name for name in mapped.columns if name not in kept)
     return replace(mapped, columns=kept, skipped=(*mapped.skipped, *left))
+
+
+def _with_nanoseconds(table: Table, name: str, finer: str) -> Table:
+    """Adds a column of nanoseconds to that of whole seconds."""
+    for column in (name, finer):
+        if column not in table.columns or table.is_text(column):
+            problem = "the column holds text" if column in table.columns else "the column is missing"
+            raise InputError(problem, file=table.path, column=column, allowed="whole seconds, and nanoseconds")
+    whole = table.columns[name] + 1e-9 * table.columns[finer]
+    return replace(table, columns={**{k: v for k, v in table.columns.items() if k != finer}, name: whole})
 
 
 def with_seconds(table: Table, name: str) -> Table:

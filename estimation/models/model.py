@@ -16,6 +16,7 @@ from estimation.models.extension import Extension, extension_torque, read_extens
 from estimation.models.robot_in_file import build_robot, describe_robot, require_described
 from estimation.uncertainty.quantiles import normal_quantile
 from robots.common.errors import InputError
+from robots.common.plain import as_html
 from robots.common.records import Record, damage_refused, read, read_json, write_json
 from robots.regressor import TorqueModel
 from robots.robot import Robot
@@ -81,6 +82,9 @@ class Model(Record, format="robot-oed model", shares=("robot",)):
         found = f"{int(self.determined.sum())} of {len(self.values)} parameters determined"
         effects = "".join(f", {extension.effect} of joint {extension.joint}" for extension in self.extensions)
         return f"Model({self.robot.name!r}, {found}{effects})"
+
+    def _repr_html_(self) -> str:
+        return as_html(repr(self)) + self.to_frame().to_html()
 
     @property
     def gravities(self) -> tuple[tuple[float, ...], ...]:

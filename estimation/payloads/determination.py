@@ -149,7 +149,7 @@ def missing_motion(mount: Mount, q: ArrayLike, gravity: Array | None) -> str:
     wrist = [
         joint
         for joint in range(max(0, mount.joints - 3), mount.joints)
-        if robot.chain.kinds[joint] == "revolute" and ranges[joint] < 0.8
+        if robot.chain.kinds[joint] == "revolute" and ranges[joint] < 0.8 and _matters(mount, joint, gravity)
     ]
     if not steady and not wrist:
         return ""
@@ -160,6 +160,15 @@ def missing_motion(mount: Mount, q: ArrayLike, gravity: Array | None) -> str:
     goal = f", so that gravity turns along {', '.join(steady)} of the {mount.name}" if steady else ""
     design = f"; `oed design --robot {robot.stated or robot.name} --payload-only` designs such a motion"
     return f"{move}{goal}{design if mount.link is None else ''}"
+
+
+def _matters(mount: Mount, joint: int, gravity: Array | None) -> bool:
+    """Whether the torques by a payload depend on a joint's position; on that of a vertical first joint they do not."""
+    model = TorqueModel(mount.robot.under(gravity), (RigidBody(),))
+    q, dq, ddq = np.random.default_rng(0).uniform(-1.0, 1.0, (3, 1, mount.robot.n))
+    turned = q + np.eye(mount.robot.n)[joint]
+    here, there = (model.regressor(at, dq, ddq, columns=mount.columns(model)) for at in (q, turned))
+    return not np.allclose(here, there)
 
 
 def _gravity_spread(mount: Mount, positions: Array, gravity: Array | None) -> Array:

@@ -27,7 +27,8 @@ class DiscriminationOptions:
         friction: of the base model, ``polynomial`` or ``coulomb-viscous``.
         home: pose (n,) at both ends of all motions. Default: `Limits.home`.
         velocity_fraction: fraction of the velocity limits to use. Default: see `LimitOptions`.
-        collision: check the motions for collisions; they are not designed to avoid them, and the result says so.
+        collision: keep the motions free of collisions, which makes them smaller where they must be, and the home pose
+            another one if it is not given and has no room.
         surroundings: the floor, and boxes that the arm must not enter.
         seed: of the reference motion.
 

@@ -257,7 +257,7 @@ class SearchOptions:
         InputError: an unknown effort, or numbers out of range.
     """
 
-    effort: str | Effort = "standard"
+    effort: Annotated[str | Effort, Option(choices="oed.experiments.searches.search:EFFORTS")] = "standard"
     seed: Seed = 0
     time_limit: float = math.inf
     keep_on_interrupt: Annotated[bool, Option(hidden=True)] = False

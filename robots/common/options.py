@@ -29,6 +29,8 @@ class Option:
         degrees: whether an angle in radians is typed in degrees.
         without: of a group: fields that are no options here.
         defaults: of a group: fields with another default here, and these.
+        choices: where the values are listed, as ``module:name`` of a collection or of a function that gives one; a
+            shell completes them, and other values may be allowed.
         only: the uses of the verb to which the option belongs, see `oed.cli.verbs.Verb.use`; of all if it is empty.
     """
 
@@ -47,6 +49,7 @@ class Option:
     degrees: bool = False
     without: tuple[str, ...] = ()
     defaults: tuple[tuple[str, Any], ...] = ()
+    choices: str = ""
     only: tuple[str, ...] = ()
 
 

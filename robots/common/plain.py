@@ -149,3 +149,14 @@ def _word(value: float) -> str:
     if math.isnan(value):
         return "–"
     return "∞" if value > 0.0 else "-∞"
+
+
+def as_html(text: str) -> str:
+    """Writes a text as a notebook shows it.
+
+    Args:
+        text: of one or more lines.
+    """
+    from html import escape
+
+    return f"<pre>{escape(text)}</pre>"

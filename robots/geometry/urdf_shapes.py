@@ -31,6 +31,7 @@ class UrdfShape:
         pose: (4, 4) in the link's frame; cylinders and capsules are along z.
         file: of a mesh, as the URDF names it.
         scale: (3,) of a mesh.
+        surface: of a mesh without a file: vertices (k, 3) [m] and triangles (m, 3) of them.
     """
 
     link: str
@@ -39,6 +40,7 @@ class UrdfShape:
     pose: Array
     file: str = ""
     scale: Array | None = None
+    surface: tuple[Array, NDArray[np.int64]] | None = None
 
 
 def collision_shapes(source: str | Path) -> dict[str, tuple[UrdfShape, ...]]:

@@ -2,8 +2,12 @@
 
 from __future__ import annotations
 
+import inspect
 from collections.abc import Mapping, Sequence
 from typing import Any
+
+from robots.common.errors import InputError
+from robots.geometry.urdf_selection import nearest
 
 
 def effect_rows() -> list[dict[str, Any]]:
@@ -31,6 +35,35 @@ def effect_rows() -> list[dict[str, Any]]:
         }
         for effect in EFFECTS.values()
     ]
+
+
+def explained_effect(name: str) -> dict[str, Any]:
+    """Describes one effect: what `effect_rows` has, and a text with its formula and parameters.
+
+    Args:
+        name: of the effect.
+
+    Raises:
+        InputError: no such effect.
+    """
+    from robots.terms.effects import EFFECTS
+
+    if name not in EFFECTS:
+        raise InputError(f"there is no effect {name!r}", allowed=", ".join(EFFECTS), remedy=nearest(name, EFFECTS))
+    row: dict[str, Any] = next(row for row in effect_rows() if row["name"] == name)
+    effect, place = EFFECTS[name], "the whole robot" if row["acts_on"] == "robot" else "one joint"
+    shapes = [f"  {shape['name']}" + (f" [{shape['unit']}]" if shape["unit"] else "") for shape in row["shape"]]
+    lines = [
+        f"{name}: {row['title']}. It acts on {place}.",
+        *(["It is considered last: it resembles a common effect and is rare."] if row["rare"] else []),
+        "",
+        inspect.cleandoc(type(effect).__doc__ or ""),
+        *(["", "Parameters beside the coefficients:", *shapes] if shapes else []),
+        *(["", f"It resembles: {', '.join(row['rivals'])}."] if row["rivals"] else []),
+        *(["", "Experiments that separate it, the best first:"] if row["experiments"] else []),
+        *(f"  {experiment['name']}: {experiment['what']}" for experiment in row["experiments"]),
+    ]
+    return {**row, "text": "\n".join(lines)}
 
 
 def effect_text(rows: Sequence[Mapping[str, Any]]) -> str:

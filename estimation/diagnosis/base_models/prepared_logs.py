@@ -12,10 +12,12 @@ from estimation.diagnosis.base_models.payload_and_gravity import subtract_known_
 from estimation.diagnosis.calibration import MAX_UNEXPLAINED_POWER
 from estimation.diagnosis.recordings.log_reading import build_recording
 from estimation.diagnosis.recordings.recording import Recording
+from estimation.linear_algebra.orthonormal import orthonormal
 from estimation.logs.clocks import put_on_clock
 from estimation.recordings import Recording as Ready
+from estimation.uncertainty.correlations import effective_rows
 from robots.base_parameters import BaseParameters
-from robots.common.errors import NotIdentifiableError
+from robots.common.errors import InputError, NotIdentifiableError
 from robots.signals import Log
 from robots.terms import FINE_BENDS, BendingFriction, FrictionTerm
 from robots.terms.friction import USUAL_SPEED_SHARE
@@ -41,6 +43,11 @@ OWN = frozenset({"badly_excited", "clipped", "delay", "hardly_moves", "poorly_ex
 NO_MOTION = frozenset({"no_motion", "short"})
 # Duration [s] below which a stretch between gaps is dropped: filters are inaccurate at its ends.
 SHORTEST = 2.0
+# Independent values of torque per parameter below which the parameters only follow the noise. They are counted within
+# windows [s]: slower errors are those of the model, which more rows of the same motion do not reduce.
+INDEPENDENT, WINDOW = 2.0, 1.0
+# Directions of the scaled regressor below this share of the largest are not determined by the log.
+UNDETERMINED = 1e-7
 # Width of the friction sign [rad/s or m/s] before it is fitted to the logs.
 FIRST_VELOCITY_SCALE = 0.001
 
@@ -78,7 +85,7 @@ def prepare_logs(fit: Ready, unseen: Ready | None, friction: str | FrictionTerm)
         The prepared logs.
 
     Raises:
-        InputError: logs that are too short, or given twice.
+        InputError: logs that do not determine the parameters, or given twice.
         NotIdentifiableError: no joint moves.
     """
     robot = fit.robot
@@ -102,6 +109,7 @@ def prepare_logs(fit: Ready, unseen: Ready | None, friction: str | FrictionTerm)
         notes += [_UNUSABLE.format(k + 1, _in_brackets(recording.names[k]), 100 * s) for k, s in unusable.items()]
         logs = [log for k, log in enumerate(logs) if k not in unusable]
         recording = subtract_known_payload(robot, build_recording(robot, logs))
+    require_information(base, recording)
     return PreparedLogs(tuple(logs), tuple(other), recording, base, clocked.dated, tuple(notes))
 
 
@@ -183,3 +191,36 @@ def find_unusable_logs(base: BaseParameters, recording: Recording) -> dict[int, 
         if share > MAX_UNEXPLAINED_POWER:
             left[k] = float(np.sqrt(share))
     return left if len(left) < len(recording.runs) else {}
+
+
+def require_information(base: BaseParameters, recording: Recording) -> None:
+    """Refuses logs whose torque holds too few independent values for the parameters that their motion excites.
+
+    The limit is neither a number of rows nor a duration: noise may be correlated over many rows.
+
+    Args:
+        base: the base model.
+        recording: all logs of the fit.
+
+    Raises:
+        InputError: stating both numbers.
+    """
+    known = ~recording.sign_unknown
+    weights = known / np.maximum(recording.tau.std(axis=0), 1e-12)
+    runs = zip(recording.runs, recording.gravities, strict=True)
+    Y = [base.regressor(recording.q[r], recording.dq[r], recording.ddq[r], gravity=gravity) for r, gravity in runs]
+    A = (np.concatenate(Y) * weights[:, :, None]).reshape(-1, base.size)
+    Q, y = orthonormal(A, UNDETERMINED), (recording.tau * weights).reshape(-1)
+    left = (y - Q @ (Q.T @ y)).reshape(recording.tau.shape)
+    values = 0.0
+    for series in (left[known[:, j], j] for j in range(recording.n)):
+        windows = np.array_split(series, max(1, round(len(series) * recording.step / WINDOW)))
+        values += sum(effective_rows(part) for part in windows if len(part) and np.ptp(part) > 0)
+    if values < INDEPENDENT * Q.shape[1]:
+        raise InputError(
+            f"{recording.duration:.1f} s of usable logs hold about {values:.0f} independent values of torque for "
+            f"{Q.shape[1]} parameters",
+            file=recording.names[0] if len(recording.names) == 1 else None,
+            allowed=f"{INDEPENDENT:g} values per parameter or more",
+            remedy="record a longer log, or one with faster and more varied motion",
+        )

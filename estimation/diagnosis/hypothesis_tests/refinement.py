@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,8 +22,8 @@ Array = NDArray[np.float64]
 
 # Evaluations per shape parameter.
 EFFORT = 20
-# Change times: points of each successive search and their reach in spacings of the search before. WIDE is added on one
-# joint, as a sudden change has a narrow optimum within a broad one. AGAIN: first simplex step then, per grid spacing.
+# Change times: points of each successive search and their reach in spacings of the search before. WIDE is added, as a
+# sudden change has a narrow optimum within a broad one. AGAIN: first simplex step then, per grid spacing.
 ZOOMS, AGAIN = ((21, 1.2), (11, 1.2), (11, 1.2)), 0.1
 WIDE = (101, 6.0)
 # First step of the simplex search: a factor for logarithmic parameters, a share of the range for others.
@@ -51,17 +52,34 @@ def refine(
     bounds = hypothesis.effect.bounds(situation, hypothesis.joint)
     scales = [shape.scale for shape in hypothesis.effect.shapes]
     loose = [k for k, (low, high) in enumerate(bounds) if high > low]
+    # A choice beside the usual one counts, such as a link in place of the flange.
+    chosen = [k for k, shape in enumerate(hypothesis.effect.shapes) if shape.beside and k not in loose]
     moments = [shape.moment for shape in hypothesis.effect.shapes]
     best: list[FittedEffect] = []
 
+    def picked(shape: tuple[float, ...]) -> int:
+        return sum(not hypothesis.effect.shapes[k].is_left(shape[k]) for k in chosen if k < len(shape))
+
+    @cache
+    def usual_degrees(shape: tuple[float, ...]) -> int:
+        """A choice that shows fewer coefficients than the usual one is not simpler for that."""
+        result = score(problem, problem.measured(hypothesis, shape), accepted)
+        return result.limited(hypothesis, situation.robot, shape).degrees
+
     def evaluate(shape: tuple[float, ...], fitted: int | None = None) -> float:
         if fitted is None:
-            fitted = sum(not hypothesis.effect.shapes[k].is_left(shape[k]) for k in loose)
+            fitted = sum(not hypothesis.effect.shapes[k].is_left(shape[k]) for k in loose) + picked(shape)
         group = problem.measured(hypothesis, shape)
         result = score(problem, group, accepted)
         found = result.limited(hypothesis, situation.robot, shape)
+        degrees = found.degrees
+        if picked(shape):
+            usual = [start[k] if moments[k] else value for k, value in enumerate(shape)]
+            for k in chosen:
+                usual[k] = float(hypothesis.effect.shapes[k].default or 0.0)
+            degrees = max(degrees, usual_degrees(tuple(usual)))
         member = FittedEffect(
-            hypothesis, shape, group, found.gain, found.coefficients, found.degrees + fitted, result.visible
+            hypothesis, shape, group, found.gain, found.coefficients, degrees + fitted, result.visible
         )
         worth = member.bic_gain
         if not best or worth > best[0].bic_gain:
@@ -79,7 +97,7 @@ def refine(
             return evaluate(tuple(at))
 
         for k, step in steps.items():
-            sudden = len(free) == 1 and len(best[0].group.joints) == 1
+            sudden = len(free) == 1
             looks = (ZOOMS[0], WIDE, *ZOOMS[1:]) if sudden else ZOOMS
             _zoom(lambda value, k=k: evaluate((*at[:k], value, *at[k + 1 :])), at[k], step, bounds[k], looks)  # type: ignore[misc]
             at[:] = best[0].shape
@@ -108,7 +126,7 @@ def refine(
         refined = best[0]
         for known in hypothesis.effect.likely(situation, hypothesis.joint, refined.shape, refined.coefficients):
             shape = tuple(own if value is None else value for value, own in zip(known, refined.shape, strict=True))
-            evaluate(shape, sum(known[k] is None for k in loose))
+            evaluate(shape, sum(known[k] is None for k in loose) + picked(shape))
     found = best[0]
     if hypothesis.effect.at_reversals is AtReversals.LATE:
         return _with_scatter(problem, found, accepted)

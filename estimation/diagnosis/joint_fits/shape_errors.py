@@ -98,7 +98,7 @@ def shape_errors(problem: Problem, member: FittedEffect, others: Accepted) -> li
 
 def _chosen(problem: Problem, member: FittedEffect, k: int, others: Accepted) -> bool:
     """Whether the data reject all other values of a shape parameter with few choices."""
-    rest = [value for value in member.hypothesis.effect.shapes[k].choices if value != member.shape[k]]
+    rest = [value for value in member.hypothesis.effect.choices(problem.situation.robot, k) if value != member.shape[k]]
     gains = [_gain(problem, member, with_value(member.shape, k, value), others) for value in rest]
     return max(gains, default=-np.inf) < _gain(problem, member, member.shape, others) - MIN_BIC_GAIN
 

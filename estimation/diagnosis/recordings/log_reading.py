@@ -33,7 +33,7 @@ FASTEST = 260.0  # [Hz] faster sampling improves no effect of the catalogue
 # Derivatives are less accurate at the ends of a log, where the filter lacks data. `LOST` periods of the cut-off are
 # removed at each end, at most the share `MOST_LOST` of the log.
 LOST, MOST_LOST = 4.0, 0.02
-SHORTEST = 5.0  # [s] least duration for an estimate
+SHORTEST = 1.0  # [s] of rows without filter transients
 # Tolerance, as a share of a period, within which a step is a whole number of periods.
 WHOLE = 1e-3
 # The mean over repetitions is used if its cut-off is higher than that of a single pass by this factor.
@@ -48,7 +48,6 @@ def build_recording(
     logs: Sequence[Log],
     *,
     step: float | None = None,
-    shortest: float = SHORTEST,
     travel: Array | float = 0.0,
 ) -> Recording:
     """Builds a recording on a uniform grid from logs, with noise removed from the motion.
@@ -61,7 +60,6 @@ def build_recording(
         robot: the robot.
         logs: logs with t, q and tau or current.
         step: sample period of the grid [s]; by default that of the slowest log, longer if there are too many rows.
-        shortest: least total duration of the usable logs [s].
         travel: position ranges of the joints (n,) in other logs [rad or m]; they show which joints rest in all of these
             logs.
 
@@ -86,7 +84,7 @@ def build_recording(
     stride = round(step / own)
     whole = abs(step - stride * own) < WHOLE * own
     if stride > 1 and whole and sum(log.log.duration for log in prepared) / own <= MOST_FINE:
-        return decimate_recording(build_recording(robot, logs, step=own, shortest=shortest, travel=travel), stride)
+        return decimate_recording(build_recording(robot, logs, step=own, travel=travel), stride)
     spectra = [Spectra.of(log.positions) for log in prepared]
     found = [[of.of_positions(x) for x in log.positions.q.T] for of, log in zip(spectra, prepared, strict=True)]
     highest = np.max([[spectrum.cutoff() for spectrum in own] for own in found], axis=0)
@@ -95,12 +93,12 @@ def build_recording(
     never = np.all([np.ptp(part.q, axis=0) == 0 for part in parts], axis=0)
     held = still_joints([part.q for part in parts], travel) | never
     joined = join_recordings([_zero_resting_joints(*each) for each in zip(parts, held, strict=True)])
-    if joined.duration < shortest:
+    if joined.duration < SHORTEST:
         recorded = sum(log.log.duration for log in prepared)
         raise InputError(
             f"{joined.duration:.1f} s of usable logs ({recorded:.1f} s recorded, less filter transients at the ends)",
             file=prepared[0].log.metadata.get("file", prepared[0].log.name or None) if len(prepared) == 1 else None,
-            allowed=f"{shortest:g} s or more",
+            allowed=f"{SHORTEST:g} s or more",
             remedy="record a longer log",
         )
     return replace(joined, names=tuple(log.log.name or f"log {i}" for i, log in enumerate(prepared, start=1)))

@@ -31,8 +31,6 @@ from robots.terms.effects import Situation
 
 Array = NDArray[np.float64]
 
-SHORTEST_UNSEEN = 1.0  # shortest stretch of a held-out log that is used [s]
-
 
 @dataclass(frozen=True, eq=False)
 class HeldOutResult:
@@ -210,7 +208,7 @@ def read_held_out(robot: Robot, problem: Problem, logs: Sequence[Log]) -> Record
         return None
     recording = problem.recording
     travel = np.max([np.ptp(recording.q[run], axis=0) for run in recording.runs], axis=0)
-    unseen = build_recording(robot, logs, step=recording.step, shortest=SHORTEST_UNSEEN, travel=travel)
+    unseen = build_recording(robot, logs, step=recording.step, travel=travel)
     return subtract_known_payload(robot, unseen).with_trusted(recording.trusted)
 
 

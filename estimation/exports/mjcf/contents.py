@@ -17,6 +17,7 @@ from estimation.models.model import Model
 from robots.common.errors import InfeasibleError
 from robots.consistency import pseudo_inertia
 from robots.robot import Robot
+from robots.terms.effects.payload_change import carrier
 from robots.terms.situations.situation import situation
 
 Array = NDArray[np.float64]
@@ -176,12 +177,16 @@ def _positions(model: Model, robot: Robot, i: int) -> tuple[float, float]:
 
 def _payload(contents: Contents, extension: Extension) -> bool:
     body = np.asarray(extension.coefficients, dtype=float)
+    link = carrier(extension.shape)
     values = np.linalg.eigvalsh(pseudo_inertia(body))
     # A body without a positive mass, or with a negative eigenvalue beyond rounding, is none.
     if not body[0] > 0.0 or values[0] < -1e-9 * values[-1]:
         return False
-    contents.payload = body if contents.payload is None else contents.payload + body
-    contents.stated.append("payload")
+    if link:
+        contents.inertia[link - 1] += body
+    else:
+        contents.payload = body if contents.payload is None else contents.payload + body
+    contents.stated.append(f"payload on link {link}" if link else "payload")
     contents.remarks.append(f"the payload is the one from t = {extension.shape[0]:.2f} s of the log on")
     return True
 

@@ -61,7 +61,11 @@ def mapped_sources(mapping: LogMapping, names: Sequence[str], joints: int) -> li
         entry = getattr(mapping, key)
         if entry is not None:
             single = isinstance(entry, Single)
-            used.update([entry.column] if single else _columns(entry, mapping, joints, set(names)))
+            used.update(
+                filter(None, (entry.column, getattr(entry, "nanoseconds", None)))
+                if single
+                else _columns(entry, mapping, joints, set(names))
+            )
     return [name for name in names if name in used]
 
 

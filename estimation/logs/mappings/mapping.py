@@ -99,11 +99,21 @@ class Single(Config):
     unit: str | None = None
 
 
+class Clock(Single):
+    """The time, in one column or in two.
+
+    Attributes:
+        nanoseconds: a second column with what is to be added to whole seconds.
+    """
+
+    nanoseconds: str | None = None
+
+
 class LogMapping(Config):
     """The meaning of a foreign log's columns.
 
     Attributes:
-        time: the column of time.
+        time: the column of time, or the columns of seconds and nanoseconds.
         rate: rows per second [Hz], for a log without a column of time.
         position: joint positions; the other quantities are optional.
         velocity: joint velocities.
@@ -128,7 +138,7 @@ class LogMapping(Config):
         coupled_torques: whether the torques are those of the coupled axes, which do the joints' work together.
     """
 
-    time: Single | None = None
+    time: Clock | None = None
     rate: float | None = Field(default=None, gt=0.0, allow_inf_nan=False)
     position: PerJoint | None = None
     velocity: PerJoint | None = None

@@ -17,7 +17,7 @@ _WORDS = {
     "velocity": r"dq|qd|vel|velocity|velocities|speed|speeds|omega|geschwindigkeit|drehzahl",
     "current": r"i|iq|cur|curr|current|currents|amps|strom",
     "torque": r"tau|trq|tq|torque|torques|effort|efforts|moment|moments|mt|tauj|load|loads|drehmoment",
-    "position": r"q|pos|position|positions|angle|angles|axis|ax|theta|joint|j|mp|encoder|state|winkel|lage|achse",
+    "position": r"q|qmsr|pos|position|positions|angle|angles|axis|ax|theta|joint|j|mp|encoder|state|winkel|lage|achse",
 }
 _LOADS = ("current", "torque")
 _COMMANDED = re.compile(r"target|desired|des|cmd|command|commanded|ref|reference|setpoint|set|goal|soll|ext|external")
@@ -36,6 +36,7 @@ _TIME = re.compile(
     r"(?i)ts|epoch|secs?|seconds|millis|t([_ \[(]+[mun]?s(ec)?[\])]?)?|.*(time|stamp|zeit|clock).*"
     r"|(.*[ _])?(date|datum)([ _].*)?"
 )
+_NANO = re.compile(r"(?i)nano_?s(ec)?|(?<![a-z])nsecs?(?![a-z])")
 _TIME_UNITS = {
     "ms": "ms",
     "msec": "ms",
@@ -48,6 +49,10 @@ _TIME_UNITS = {
     "millis": "ms",
 }
 PLAIN_REMEDY = "rename the columns, or describe them in a mapping (--mapping)"
+NO_LOAD = (
+    "no column looks like torque or current by its name, and a dynamic model needs one (oed actuators works from "
+    "commands and positions)"
+)
 RATE_REMEDY = "if there is no column of time, state the rows per second, such as --rate 250"
 _KEYS = ("position", "velocity", "torque", "current", "temperature")
 
@@ -95,8 +100,10 @@ def remedy_for_columns(names: Sequence[str], n: int | None = None, joints: Seque
     if not _time_of(names) and "t" not in names and has_usual_names(names):
         return RATE_REMEDY
     suggested = suggest_mapping(names, n, joints)
-    if suggested is None or not ("torque:" in suggested or "current:" in suggested):
+    if suggested is None:
         return PLAIN_REMEDY
+    if not ("torque:" in suggested or "current:" in suggested):
+        return f"{PLAIN_REMEDY}; {NO_LOAD}"
     rate = "" if suggested.startswith("time:") else f"{RATE_REMEDY}; "
     return rate + save_mapping(suggested)
 
@@ -126,7 +133,7 @@ def suggest_mapping(names: Sequence[str], n: int | None = None, joints: Sequence
         return None
     count = n or len(position.names)
     by_name = any(group.by_name for group in chosen.values())
-    lines = [f"time: {{column: {_text(time)}, unit: {_time_unit(time)}}}"] if time else []
+    lines = [_time_line(names, time)] if time else []
     for key in _KEYS:
         found = chosen.get(key)
         if found is None or (key == "current" and "torque" in chosen) or len(found.names) < count:
@@ -166,7 +173,8 @@ def _groups(names: Sequence[str], joints: Sequence[str] | None) -> list[_Group]:
 
 
 def _words(pattern: str) -> tuple[str, ...]:
-    spaced = re.sub(r"([a-z])([A-Z][a-z])", r"\1 \2", pattern)
+    # Two letters before a capital are a word; one may be a prefix of a unit, as in mNm.
+    spaced = re.sub(r"([a-z])([A-Z][a-z])|([a-z]{2})([A-Z])", r"\1\3 \2\4", pattern)
     return tuple(word.lower() for word in re.findall(r"[A-Za-z°]+", spaced))
 
 
@@ -197,6 +205,14 @@ def _unit(key: str, word: str) -> str | None:
 def _time_unit(name: str) -> str:
     words = re.findall(r"[a-z]+", name.lower())
     return next((_TIME_UNITS[word] for word in reversed(words) if word in _TIME_UNITS), "s")
+
+
+def _time_line(names: Sequence[str], time: str) -> str:
+    """Writes the entry of the time; a column of nanoseconds beside one of seconds belongs to it."""
+    finer = next((name for name in names if name != time and _NANO.search(name)), None)
+    if finer is None or _NANO.search(time):
+        return f"time: {{column: {_text(time)}, unit: {_time_unit(time)}}}"
+    return f"time: {{column: {_text(time)}, nanoseconds: {_text(finer)}}}"
 
 
 def _time_of(names: Sequence[str]) -> str | None:

@@ -124,6 +124,13 @@ def open_part(path: Path, n: int | None, kinds: Sequence[str] | None, mapping: L
                 file=path,
                 remedy="add a column t [s] to the files, or read the log at once with --no-stream",
             )
+        if mapping.time is not None and mapping.time.nanoseconds is not None:
+            raise InputError(
+                "time in two columns, but the log is read in pieces",
+                file=path,
+                column=mapping.time.nanoseconds,
+                remedy="add a column t [s] to the files, or read the log at once with --no-stream",
+            )
         mapping = mapping.model_copy(update=dict.fromkeys(UNUSED))
     try:
         with pq.ParquetFile(path) as file:

@@ -62,6 +62,10 @@ def _records(path: Path) -> Iterator[tuple[int, Any]]:
             if line.strip():
                 yield number, _loaded(line, path, number)
         return
+    if isinstance(whole, dict):
+        lists = [v for v in whole.values() if isinstance(v, list) and v and all(isinstance(x, dict) for x in v)]
+        # What stands beside the only list of records describes the recording.
+        whole = lists[0] if len(lists) == 1 else whole
     yield from enumerate(whole if isinstance(whole, list) else [whole], start=1)
 
 

@@ -6,7 +6,7 @@ import re
 from collections.abc import Sequence
 from typing import ClassVar
 
-from estimation.logs.mappings.mapping import LogMapping, PerJoint, Single
+from estimation.logs.mappings.mapping import Clock, LogMapping, PerJoint
 from estimation.logs.recorders.recorder import Recognised, Recorder, missing, numbered, span
 from estimation.logs.torque_source import TorqueSource
 from robots.common.tables.table import Table
@@ -56,7 +56,7 @@ class KukaFri(Recorder):
             "the other sign",
         )
         mapping = LogMapping(
-            time=Single(column=time, unit=_TIMES[_plain(time)]),
+            time=Clock(column=time, unit=_TIMES[_plain(time)]),
             position=PerJoint(columns=q),
             torque=PerJoint(columns=tau),
         )

@@ -8,7 +8,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from estimation.logs.mappings.mapping import LogMapping, Single
+from estimation.logs.mappings.mapping import Clock, LogMapping
 from estimation.logs.recorders.recorder import Recognised, Recorder, first_of, missing, numbered, span
 from estimation.logs.torque_source import TorqueSource
 from robots.common.tables.table import Table
@@ -48,7 +48,7 @@ class LibFranka(Recorder):
             meaning="the link-side joint torque sensors, gravity included",
         )
         mapping = LogMapping(
-            time=Single(column=time, unit=_unit(table, time)),
+            time=Clock(column=time, unit=_unit(table, time)),
             position=first_of(table, (pattern.replace("@", "q"),), first, JOINTS)[1],
             velocity=first_of(table, (pattern.replace("@", "dq"),), first, JOINTS)[1] if dq else None,
             torque=first_of(table, (pattern.replace("@", "tau_J"),), first, JOINTS)[1],

@@ -6,7 +6,7 @@ import re
 from collections.abc import Sequence
 from typing import ClassVar
 
-from estimation.logs.mappings.mapping import LogMapping, PerJoint, Single
+from estimation.logs.mappings.mapping import Clock, LogMapping, PerJoint
 from estimation.logs.readers.joint_names import places
 from estimation.logs.recorders.recorder import Recognised, Recorder, numbered, span
 from estimation.logs.torque_source import TorqueSource
@@ -38,7 +38,8 @@ class RosTopicCsv(Recorder):
                 file=table.path,
                 column="field.name0",
                 allowed=f"names in the table: {', '.join(found)}",
-                remedy="choose the robot of this log",
+                remedy="choose the robot of this log, or name its joints in order in a mapping (--mapping), "
+                f"such as joints: [{', '.join(found)}]",
             )
         columns = {
             key: numbered(table, f"field.{key}{{}}", 0, len(found)) for key in ("position", "velocity", "effort")
@@ -55,7 +56,7 @@ class RosTopicCsv(Recorder):
         )
         return Recognised(
             mapping=LogMapping(
-                time=Single(column=stamp, unit="ns"),
+                time=Clock(column=stamp, unit="ns"),
                 position=PerJoint(columns=columns["position"]),
                 velocity=PerJoint(columns=columns["velocity"]) if columns["velocity"] else None,
                 torque=PerJoint(columns=effort) if effort else None,

@@ -6,7 +6,7 @@ import re
 from collections.abc import Sequence
 from typing import ClassVar
 
-from estimation.logs.mappings.mapping import LogMapping, Single
+from estimation.logs.mappings.mapping import Clock, LogMapping
 from estimation.logs.recorders.recorder import Recognised, Recorder, first_of, missing, span
 from estimation.logs.torque_source import TorqueSource
 from robots.common.tables.table import Table
@@ -60,7 +60,7 @@ class UrRtde(Recorder):
             )
         current = source is not None and source.quantity == "current"
         mapping = LogMapping(
-            time=Single(column="timestamp", unit="s"),
+            time=Clock(column="timestamp", unit="s"),
             position=q,
             velocity=dq if dq.columns else None,
             torque=torque if torque.columns and not current else None,

@@ -18,10 +18,14 @@ from estimation.diagnosis.experiment_plans.planned_limits import planned_problem
 from estimation.diagnosis.hypothesis_tests.hypotheses import Hypothesis
 from estimation.diagnosis.hypothesis_tests.problem import Problem
 from oed.campaigns.discrimination_options import DiscriminationOptions
+from oed.campaigns.discriminations.clear_runs import ClearRuns
 from oed.campaigns.discriminations.discrimination import Discrimination, DiscriminationScore
 from oed.campaigns.discriminations.motions import ExperimentBuilder, Run
 from oed.campaigns.discriminations.probabilities import EVALUATION_STEP, Discriminator, require_separable
+from oed.experiments.assembly import rest_pose
 from oed.experiments.checks import velocity_share
+from oed.experiments.options import LimitOptions
+from oed.experiments.safety_checks.safety import choose_safety
 from robots.base_parameters import find_base_parameters
 from robots.common.errors import InfeasibleError, InputError, NotIdentifiableError
 from robots.common.progress import SILENT, Progress
@@ -67,10 +71,18 @@ def discriminate(
     level, size, home, seed = _level(how.noise, robot), how.size, how.home, how.seed
     velocity_fraction, friction = velocity_share(robot, how.velocity_fraction), how.friction
     # Velocity [rad/s or m/s] at which the planned model's friction turns round.
-    model = default_model(robot, friction=friction, velocity_scale=1e-3)
-    builder = ExperimentBuilder(find_base_parameters(model), home=home, velocity_fraction=velocity_fraction, seed=seed)
-    reference = builder.runs()[0]
-    base = builder.base.model
+    planned = find_base_parameters(default_model(robot, friction=friction, velocity_scale=1e-3))
+    if how.collision:
+        kept = LimitOptions(velocity_fraction=velocity_fraction, torque=False, surroundings=how.surroundings)
+        safety = choose_safety(robot, planned, rest_pose(robot.limits, home), kept, movable=home is None)
+        home = safety.home
+
+    def build(seed: int, share: float) -> ExperimentBuilder:
+        return ExperimentBuilder(planned, home=home, velocity_fraction=velocity_fraction, seed=seed, share=share)
+
+    clear = ClearRuns(build, safety.collision if how.collision else None)
+    builder, (reference, *_) = clear.reference(seed)
+    base = planned.model
     if level is None:
         m, nominal = reference.motion, np.nan_to_num(base.nominal)
         level = NOISE_SHARE * np.sqrt(np.mean(base.torque(m.q, m.dq, m.ddq, nominal) ** 2, axis=0))
@@ -80,18 +92,18 @@ def discriminate(
     best = judge("reference", (reference,))
     # Largest number of random reference motions; the most informative one is used.
     for draw in range(1, 6):
-        other = ExperimentBuilder(builder.base, home=home, velocity_fraction=velocity_fraction, seed=seed + draw)
-        drawn = judge("reference", other.runs())
-        if drawn.merit > best.merit:
-            builder, reference, best = other, other.runs()[0], drawn
+        other, alone = clear.reference(seed + draw)
+        drawn = judge("reference", alone)
+        if (not clear.problem(alone), drawn.merit) > (not clear.problem([reference]), best.merit):
+            builder, reference, best = other, alone[0], drawn
     index = next((h.joint - 1 for h in pair if h.joint is not None), int(np.argmax(np.ptp(reference.motion.q, axis=0))))
     judged: dict[str, DiscriminationScore] = {}
     runs: dict[str, tuple[Run, ...]] = {}
     progress.start("kinds of experiment", len(MAKERS))
     try:
-        for number, (kind, make) in enumerate(MAKERS.items(), start=1):
+        for number, kind in enumerate(MAKERS, start=1):
             try:
-                runs[kind] = builder.runs(make(builder.room, index, 0), kind)
+                runs[kind] = clear.runs(builder, kind, index, 0)
                 judged[kind] = judge(kind, runs[kind])
             except InfeasibleError as error:
                 judged[kind] = DiscriminationScore.impossible(kind, str(error))
@@ -106,7 +118,7 @@ def discriminate(
     kind = max(runs, key=lambda name: judged[name].merit)
     for variant in range(1, VARIANTS if kind in VARIED else 1):
         try:
-            varied = builder.runs(MAKERS[kind](builder.room, index, variant), kind)
+            varied = clear.runs(builder, kind, index, variant)
         except InfeasibleError:
             continue
         better = judge(kind, varied)

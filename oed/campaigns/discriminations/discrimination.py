@@ -231,7 +231,6 @@ class Discrimination(
             notes.append(
                 f"Conservative limits were assumed where the robot's description states none: {', '.join(lacking)}."
             )
-        notes.append("Collisions are not checked.")
         return tuple(notes)
 
     @property

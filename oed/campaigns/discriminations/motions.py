@@ -85,15 +85,28 @@ class ExperimentBuilder:
     """Makes runs for one robot."""
 
     def __init__(
-        self, base: BaseParameters, *, home: ArrayLike | None = None, velocity_fraction: float = 1.0, seed: int = 0
+        self,
+        base: BaseParameters,
+        *,
+        home: ArrayLike | None = None,
+        velocity_fraction: float = 1.0,
+        seed: int = 0,
+        share: float = 1.0,
     ) -> None:
         """Finds the reference motion.
+
+        Args:
+            base: base parameters of the model.
+            home: pose (n,) at both ends of all motions; by default `Limits.home`.
+            velocity_fraction: share of the velocity limits to use.
+            seed: of the reference motion.
+            share: part of each joint's range, about the home pose, that the motions use.
 
         Raises:
             InputError: a home pose outside the limits, a joint without a velocity limit.
             InfeasibleError: no motion keeps the limits.
         """
-        self.base = base
+        self.base, self.seed, self.share = base, seed, share
         self.robot: Robot = base.model.robot
         self.period = self.robot.period
         self.limits = replace(self.robot.limits, velocity=velocity_fraction * self.robot.limits.velocity)
@@ -283,7 +296,9 @@ class ExperimentBuilder:
         lower = np.where(np.isfinite(limits.lower), limits.lower, self.home - widest)
         upper = np.where(np.isfinite(limits.upper), limits.upper, self.home + widest)
         inset = (1 - USED_LIMIT_SHARE) / 2 * (upper - lower)
-        return lower + inset, upper - inset
+        lower, upper = lower + inset, upper - inset
+        middle = np.clip(self.home, lower, upper)
+        return middle + self.share * (lower - middle), middle + self.share * (upper - middle)
 
     def _payload(self) -> float:
         """The mass of a payload that the robot carries well [kg], as the diagnosis chooses it."""

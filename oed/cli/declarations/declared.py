@@ -5,9 +5,10 @@ from __future__ import annotations
 import math
 import re
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import MISSING, Field, dataclass, fields, is_dataclass, replace
 from functools import cache
+from importlib import import_module
 from inspect import cleandoc
 from pathlib import Path
 from textwrap import dedent
@@ -36,6 +37,7 @@ class Declared:
         help: one or more sentences.
         section: of the help.
         how: what the field says beyond its type.
+        choices: all values of a type that lists them.
     """
 
     field: str
@@ -45,6 +47,7 @@ class Declared:
     help: str
     section: str
     how: Option
+    choices: tuple[str, ...] = ()
 
     @property
     def name(self) -> str:
@@ -66,6 +69,15 @@ class Declared:
         """How a flag is switched off, such as ``no-strokes``; None if leaving it out does so."""
         switched = self.kind is bool and (self.default is not False or self.how.switch)
         return f"no-{self.name}" if switched else None
+
+    def completed(self, begun: str) -> list[str]:
+        """Lists the values that begin with what was typed so far, for a shell; empty where files may be meant."""
+        known: Iterable[str] = self.choices
+        if self.how.choices:
+            module, _, name = self.how.choices.partition(":")
+            found = getattr(import_module(module), name)
+            known = found() if callable(found) else found
+        return sorted(value for value in known if value.startswith(begun))
 
     def value(self, typed: Any) -> Any:
         """Gives the value of the field.
@@ -172,6 +184,12 @@ def _declared(cls: type, instance: Any, outer: Option) -> Iterator[Declared]:
             help=texts.get(field.name, ""),
             section="Arguments" if how.argument else section,
             how=how,
+            choices=tuple(
+                str(value)
+                for part in (hint, *get_args(hint))
+                if get_origin(part) is Literal
+                for value in get_args(part)
+            ),
         )
 
 

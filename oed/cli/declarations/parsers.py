@@ -50,6 +50,8 @@ def _parameter(option: Declared) -> inspect.Parameter:
     kind: Any = list[option.kind] if option.several else option.kind  # type: ignore[name-defined]
     settings: dict[str, Any] = {"help": option.help, "show_default": option.has_default, "metavar": how.shown}
     settings |= {"min": how.least, "max": how.most}
+    if how.choices or option.choices:
+        settings["autocompletion"] = lambda incomplete: option.completed(incomplete)
     if how.argument:
         info = typer.Argument(**settings)
     else:

@@ -4,13 +4,16 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Annotated
 
 from robots.common.errors import InputError
-from robots.common.options import Seed
+from robots.common.options import Option, Seed
 
 if TYPE_CHECKING:
     from estimation import Model
+
+FRICTIONS = "robots.regressor:FRICTIONS"
+"""Where the friction models are listed, for shells."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -23,7 +26,7 @@ class Fit:
         seed: seed of the random numbers.
     """
 
-    friction: str = "auto"
+    friction: Annotated[str, Option(choices=FRICTIONS)] = "auto"
     seed: Seed = 0
 
 
@@ -35,7 +38,7 @@ class Planned:
         friction: friction model: polynomial (four coefficients a joint) or coulomb-viscous (two).
     """
 
-    friction: str = "polynomial"
+    friction: Annotated[str, Option(choices=FRICTIONS)] = "polynomial"
 
 
 def model_for(path: Path, joints: int) -> Model:

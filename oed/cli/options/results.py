@@ -15,6 +15,9 @@ if TYPE_CHECKING:
     from robots.common.files import ResultFolder
     from robots.robot import Robot
 
+OPEN = "open report.html there in a browser"
+"""What to do first with a folder of results."""
+
 
 @dataclass(frozen=True, kw_only=True)
 class Overwriting:
@@ -77,7 +80,9 @@ class Folder(Overwriting):
 
         data: Mapping[str, Any] = result.stated() if isinstance(result, Result) else result.to_dict()
         data = {key: value for key, value in data.items() if key not in without} | more
-        return Printed(summary="\n".join([result.summary(), *lines, f"written to {self.out.resolve()}"]), data=data)
+        return Printed(
+            summary="\n".join([result.summary(), *lines, f"written to {self.out.resolve()}; {OPEN}"]), data=data
+        )
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -132,7 +137,8 @@ class ModelFolder(Folder):
 
     def written(self) -> list[str]:
         """Says where folder and files are."""
-        return [f"written to {path.resolve()}" for path in (self.out, *self._paths()) if path is not None]
+        files = [f"written to {path.resolve()}" for path in self._paths() if path is not None]
+        return [f"written to {self.out.resolve()}; {OPEN}", *files]
 
     def _paths(self) -> tuple[Path | None, ...]:
         return self.urdf, self.mjcf

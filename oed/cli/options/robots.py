@@ -14,6 +14,9 @@ if TYPE_CHECKING:
     from robots.drives import DescribedDrives
     from robots.robot import Robot
 
+CATALOGUE = "robots.loading:catalogue"
+"""Where the names of robots are listed, for shells."""
+
 
 def locked_positions(texts: Sequence[str]) -> dict[str, float] | None:
     """Reads positions of locked joints by name [rad or m]; None without any.
@@ -81,7 +84,7 @@ class RobotOptions:
 
     section: ClassVar[str] = "Robot"
 
-    robot: Annotated[str, Option(names_file=True)]
+    robot: Annotated[str, Option(names_file=True, choices=CATALOGUE)]
     chain: Chain = Chain()
 
     def load(self, robot: str | None = None) -> Robot:
@@ -129,7 +132,7 @@ class FileRobot(SimulatedRobot):
             Default: the robot named in the trajectory file.
     """
 
-    robot: Annotated[str, Option(names_file=True)] = ""
+    robot: Annotated[str, Option(names_file=True, choices=CATALOGUE)] = ""
 
     def load_for(self, metadata: Mapping[str, Any], file: Path) -> Robot:
         """Loads the robot that the option names, else the one that a trajectory file names.
@@ -161,7 +164,7 @@ class Drives:
         lock: hold a joint at a position [rad or m], as name=value. Repeatable.
     """
 
-    robot: Annotated[str, Option(names_file=True, section="Robot")]
+    robot: Annotated[str, Option(names_file=True, section="Robot", choices=CATALOGUE)]
     gains: Path | None = None
     joints: Annotated[tuple[str, ...] | None, Option(reads=names, section="Robot")] = None
     lock: Annotated[tuple[str, ...], Option(section="Robot")] = ()

@@ -40,6 +40,7 @@ class Animation:
         approaches: the closest approaches to limits, the closest first.
         marks: what is wrong with a joint, by its number from 1.
         source: what is played, in words.
+        meetings: by frame, the links that meet (0 the base, -1 floor or obstacle); without frames in which none do.
     """
 
     robot: str
@@ -53,6 +54,7 @@ class Animation:
     approaches: tuple[Margin, ...] = ()
     marks: Mapping[int, str] = field(default_factory=dict)
     source: str = "motion"
+    meetings: Mapping[int, tuple[int, ...]] = field(default_factory=dict)
 
     @property
     def duration(self) -> float:
@@ -75,7 +77,17 @@ class Animation:
         return (
             f"{self.robot}, drawn with {' and '.join(parts) or 'its frames'}, plays the {self.source} of "
             f"{self.duration:.1f} s. The flange's path has {length:.2f} m. Obstacles: {obstacles or 'none'}.{marked}"
+            f"{f' Collision: {self.meeting}.' if self.meeting else ''}"
         )
+
+    @property
+    def meeting(self) -> str:
+        """Says in words which bodies meet first and when; empty if none do."""
+        if not self.meetings:
+            return ""
+        frame = min(self.meetings)
+        names = ["the surroundings" if k < 0 else f"link {k}" if k else "the base" for k in self.meetings[frame]]
+        return f"{' and '.join(names)} meet at {self.t[frame]:.2f} s"
 
     def to_json(self) -> str:
         """Writes the data for the page's script: lengths in 0.1 mm, positions in 1e-4, shares in 1e-3."""
@@ -90,6 +102,7 @@ class Animation:
             "path": _whole(1e4 * self.path),
             "marks": {str(joint): text for joint, text in self.marks.items()},
             "near": round(1e3 * (1.0 - NEAR)),
+            "meetings": {str(frame): list(links) for frame, links in self.meetings.items()},
         }
         # "<" cannot end the script element once it is written as an escape of JSON.
         return json.dumps(data, separators=(",", ":"), allow_nan=False).replace("<", "\\u003c")

@@ -21,9 +21,10 @@ from oed.reports.animations.surfaces import (
 from robots.collision import Box, Capsule, CollisionModel, Plane, Surroundings, reach, segment_capsules
 from robots.collision.boxes import stated_scene
 from robots.collision.drawn.fitting import load_mesh
+from robots.collision.drawn.shapes import shapes_by_link
 from robots.collision.loading import RADIUS_FRACTION, stated_collision
 from robots.common.errors import AssumedValueWarning, InputError
-from robots.geometry.urdf_shapes import UrdfShape, drawn_shapes
+from robots.geometry.urdf_shapes import UrdfShape
 from robots.robot import Robot
 
 Array = NDArray[np.float64]
@@ -67,7 +68,7 @@ def bodies_of(robot: Robot, surroundings: Surroundings | None = None) -> tuple[B
     drawn = _drawn(robot)
     without = set(range(robot.n + 1)) - {body.link for body in drawn}
     around = surroundings or Surroundings()
-    model = _model(robot, around)
+    model = checked_model(robot, around)
     capsules: tuple[Capsule, ...] = ()
     if without - {0} or not drawn:
         capsules = model.capsules if model is not None else _capsules(robot)
@@ -87,12 +88,17 @@ def bodies_of(robot: Robot, surroundings: Surroundings | None = None) -> tuple[B
     )
 
 
-def _model(robot: Robot, surroundings: Surroundings) -> CollisionModel | None:
-    """The collision model; None where the robot's file gives none that fits."""
+def checked_model(robot: Robot, surroundings: Surroundings | None) -> CollisionModel | None:
+    """Makes the collision model; None where the robot's file gives none that fits.
+
+    Args:
+        robot: the robot.
+        surroundings: the floor, and further boxes; the robot's own by default.
+    """
     with warnings.catch_warnings(), suppress(InputError):
         # Whether a shape is assumed matters for distances, which a picture does not state.
         warnings.simplefilter("ignore", AssumedValueWarning)
-        return surroundings.model(robot)
+        return (surroundings or Surroundings()).model(robot)
     return None
 
 
@@ -104,10 +110,8 @@ def _capsules(robot: Robot) -> tuple[Capsule, ...]:
 
 
 def _drawn(robot: Robot) -> tuple[Body, ...]:
-    if not robot.urdf or not robot.links:
-        return ()
     try:
-        visual, collision = drawn_shapes(robot.urdf, "visual"), drawn_shapes(robot.urdf, "collision")
+        visual, collision = shapes_by_link(robot, "visual"), shapes_by_link(robot, "collision")
     except InputError as error:
         warnings.warn(f"{robot.name}: {error}; capsules are drawn instead", AssumedValueWarning, stacklevel=4)
         return ()

@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 
 from estimation.preprocessing import LowPass, resample, smooth
 from oed.reports.animations.animation import Animation
-from oed.reports.animations.bodies import bodies_of
-from robots.collision import Surroundings
+from oed.reports.animations.bodies import bodies_of, checked_model
+from robots.collision import Capsule, CollisionModel, Surroundings
 from robots.common.errors import InputError
 from robots.limits import Margin, symmetric_margins
 from robots.regressor import default_model
@@ -87,7 +87,20 @@ def animate(
         ),
         marks=dict(marks or {}),
         source=source or ("log" if measured else "motion"),
+        meetings=_meetings(checked_model(robot, surroundings), q),
     )
+
+
+def _meetings(model: CollisionModel | None, q: Array) -> dict[int, tuple[int, ...]]:
+    """By frame, what meets by the collision model: links, 0 for the base, -1 for floor and obstacles."""
+    if model is None or not model.pairs:
+        return {}
+    meet = model.clearance(q) < 0.0
+    links = [{pair.first.link if isinstance(pair.first, Capsule) else -1, pair.second.link} for pair in model.pairs]
+    return {
+        int(frame): tuple(sorted(set().union(*(links[k] for k in np.flatnonzero(meet[frame])))))
+        for frame in np.flatnonzero(meet.any(axis=1))
+    }
 
 
 def _smoothed(log: Log) -> Motion:

@@ -22,6 +22,9 @@ BINS = 41
 LAGS = 200
 """Longest lag of the autocorrelation, in samples."""
 
+WIDE = 1.5
+"""A band that is so much higher than the rest of a residual plot is cut at its edges."""
+
 
 def torque_picture(
     t: ArrayLike,
@@ -95,6 +98,7 @@ def torque_picture(
                 y_label=f"residual [{unit}]",
                 series=(*_band_of(times, width), Series(x=times, y=residual, name="residual", role="residual")),
                 lines=(ZERO,),
+                y_range=_view(residual, width),
                 note="" if np.isfinite(residual).any() else "no measured torque to compare with",
             ),
         ]
@@ -119,6 +123,19 @@ def measured_line(t: FloatArray, values: FloatArray) -> tuple[Series, ...]:
         values: (N,); all NaN where nothing was measured.
     """
     return (Series(x=t, y=values, name="measured", role="measured"),) if np.isfinite(values).any() else ()
+
+
+def _view(residual: FloatArray, width: FloatArray | None) -> tuple[float, float] | None:
+    """The range that shows the residual and the usual band; None where that is all there is.
+
+    Friction at standstill makes the band many times wider, which would flatten the residual in motion.
+    """
+    known = np.abs(residual[np.isfinite(residual)])
+    widths = np.empty(0) if width is None else width[np.isfinite(width)]
+    if not len(known) or not len(widths):
+        return None
+    half = 1.1 * max(float(known.max()), float(np.median(widths)))
+    return (-half, half) if widths.max() > WIDE * half else None
 
 
 def _band_of(t: FloatArray, width: FloatArray | None) -> tuple[Series, ...]:

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from oed.reports.rendering.palette import GRID, INK, colour, translucent
 from oed.reports.rendering.picture import Band, Panel, Picture, Series, Span
@@ -23,6 +25,9 @@ AXIS_GAP = 34
 """More space where each panel has an x axis of its own [px]."""
 
 LABEL_SIZE = 11
+
+DECADES = 300.0
+"""Ratio of the values on a logarithmic axis up to which 1, 2 and 5 of each decade are written."""
 
 
 def to_plotly(picture: Picture, *, points: int = POINTS) -> Figure:
@@ -271,14 +276,28 @@ def _axes(figure: Any, picture: Picture, index: int, row: int, column: int) -> N
     if panel.categories:
         x_axis |= {"tickvals": list(range(len(panel.categories))), "showgrid": False}
         x_axis["ticktext"] = [_escape(name) for name in panel.categories]
+    elif panel.x_log:
+        x_axis |= _log_ticks([series.x for series in panel.series])
     y_axis = common | {"title_text": _escape(panel.y_label), "type": "log" if panel.y_log else "linear", "nticks": 6}
     if panel.y_log:
-        y_axis["exponentformat"] = "power"
-        y_axis["dtick"] = 1
+        y_axis |= _log_ticks([panel.y_range] if panel.y_range is not None else [series.y for series in panel.series])
     if panel.y_range is not None:
         y_axis["range"] = list(np.log10(panel.y_range)) if panel.y_log else list(panel.y_range)
     figure.update_xaxes(x_axis, row=row, col=column)
     figure.update_yaxes(y_axis, row=row, col=column)
+
+
+def _log_ticks(shown: Sequence[ArrayLike]) -> dict[str, Any]:
+    """Powers of ten over several decades, else 1, 2 and 5 with all digits: plotly writes 2 for 2000 between them."""
+    values = np.concatenate([np.ravel(np.asarray(some, dtype=np.float64)) for some in (*shown, [np.nan])])
+    values = values[np.isfinite(values) & (values > 0.0)]
+    if not len(values) or values.max() > DECADES * values.min():
+        return {"exponentformat": "power", "dtick": 1}
+    powers = np.arange(np.floor(np.log10(values.min())), np.log10(values.max()) + 1)
+    # Steps of 1 within a factor of two, so that two ticks at least are seen.
+    digits = (1, 2, 5) if values.max() > 2.5 * values.min() else range(1, 10)
+    ticks = [float(f"{digit}e{int(power)}") for power in powers for digit in digits]
+    return {"tickvals": ticks, "ticktext": [f"{tick:.10g}" for tick in ticks]}
 
 
 def _compact(values: FloatArray) -> FloatArray:

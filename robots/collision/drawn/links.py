@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from robots.collision.boxes import Box
 from robots.collision.capsules import Capsule, numbered
 from robots.collision.drawn.fitting import Balls, fit_capsule, shape_balls
-from robots.collision.drawn.shapes import BodyPair, DrawnBodies, shapes_of
+from robots.collision.drawn.shapes import BodyPair, DrawnBodies, left_out_pairs, shapes_of
 from robots.collision.pairs import SAMPLED_POSES, always_touching, body_clearance, distinct_rows, poses_of, random_poses
 from robots.common.errors import AssumedValueWarning, InputError
 from robots.geometry.urdf_shapes import UrdfShape
@@ -49,10 +49,10 @@ class DrawnLinks:
 # A design, its check and its campaign ask for the same robot; meshes take their time.
 @lru_cache(maxsize=8)
 def drawn_links(robot: Robot) -> DrawnLinks | None:
-    """Fits capsules to the shapes of a robot's URDF: of each link those for collisions, else the visual ones.
+    """Fits capsules to the shapes of a robot's URDF or MJCF: of each link those for collisions, else the visual ones.
 
     Args:
-        robot: a robot; one that is not from a URDF, or whose URDF draws nothing, gives None.
+        robot: a robot; one whose file draws nothing gives None.
 
     Raises:
         InputError: naming the link, on a shape that is not possible.
@@ -92,7 +92,7 @@ def drawn_links(robot: Robot) -> DrawnLinks | None:
     return DrawnLinks(
         capsules=capsules,
         boxes=tuple(boxes),
-        ignored=_touching(poses, capsules, boxes),
+        ignored=(*_touching(poses, capsules, boxes), *left_out_pairs(robot)),
         without=tuple(sorted(without)),
         bodies=bodies,
         joined=joined,

@@ -1,4 +1,4 @@
-"""The shapes that a robot's URDF draws, by the body that carries them, and whether those of two bodies meet."""
+"""The shapes that a robot's URDF or MJCF draws, by the body that carries them, and whether those of two bodies meet."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from functools import cached_property
 from importlib import import_module
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -35,18 +35,44 @@ class DrawnShape:
     shape: UrdfShape
 
 
-def shapes_of(robot: Robot) -> tuple[DrawnShape, ...]:
-    """Reads the shapes of a robot's URDF: for each link those for collisions, else the visual ones.
+def shapes_by_link(robot: Robot, use: Literal["collision", "visual"]) -> dict[str, tuple[UrdfShape, ...]]:
+    """Reads the shapes of a robot's URDF or MJCF by the names of its links.
 
     Args:
-        robot: one that is not from a URDF has none.
+        robot: one from another file has none.
+        use: which shapes: those for distances or those for pictures.
 
     Raises:
         InputError: naming the link, on a shape that is not possible.
     """
-    if not robot.urdf or not robot.links:
-        return ()
-    drawn = drawn_shapes(robot.urdf, "visual") | drawn_shapes(robot.urdf, "collision")
+    if robot.mjcf:
+        from robots.mujoco_models.shapes import mjcf_shapes
+
+        return mjcf_shapes(robot.mjcf, use)
+    return drawn_shapes(robot.urdf, use) if robot.urdf else {}
+
+
+def left_out_pairs(robot: Robot) -> set[BodyPair]:
+    """Lists the pairs of bodies between which a robot's MJCF states no contacts; none of another file."""
+    if not robot.mjcf:
+        return set()
+    from robots.mujoco_models import shapes
+
+    bodies = {place.name: place.body for place in robot.links}
+    stated = {frozenset(bodies.get(name, -1) for name in pair) for pair in shapes.left_out_pairs(robot.mjcf)}
+    return {pair for pair in stated if -1 not in pair and len(pair) == 2}
+
+
+def shapes_of(robot: Robot) -> tuple[DrawnShape, ...]:
+    """Reads the shapes of a robot: for each link those for collisions, else the visual ones.
+
+    Args:
+        robot: one that is neither from a URDF nor from an MJCF has none.
+
+    Raises:
+        InputError: naming the link, on a shape that is not possible.
+    """
+    drawn = shapes_by_link(robot, "visual") | shapes_by_link(robot, "collision")
     return tuple(
         DrawnShape(body=place.body, pose=place.pose, shape=shape)
         for place in robot.links
@@ -64,6 +90,13 @@ def mesh_tree(shape: UrdfShape, source: str | Path) -> Any:
     Raises:
         InputError: a mesh that is not found or cannot be read, or coal is not installed.
     """
+    if shape.surface is not None:
+        made = coal().BVHModelOBBRSS()
+        made.beginModel(len(shape.surface[1]), len(shape.surface[0]))
+        made.addVertices(np.asfortranarray(shape.surface[0]))
+        made.addTriangles(np.asfortranarray(shape.surface[1]))
+        made.endModel()
+        return made
     path = mesh_file(shape, source)
     try:
         mesh = coal().MeshLoader().load(str(path), np.asarray(shape.scale))

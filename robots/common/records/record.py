@@ -23,6 +23,7 @@ from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar, Self, cast
 
+from robots.common.plain import as_html
 from robots.common.records.entries import value_at, written
 from robots.common.records.files import write_json
 from robots.common.records.findings import Finding
@@ -153,9 +154,7 @@ class Result(Record):
         """Writes what belongs to the JSON file; nothing by default."""
 
     def _repr_html_(self) -> str:
-        from html import escape
-
-        return f"<pre>{escape(self.summary())}</pre>"
+        return as_html(self.summary())
 
 
 def axes_for(ax: Axes | None, size: tuple[float, float]) -> Axes:

@@ -69,7 +69,7 @@ def read_head(data: mmap.mmap | bytes, path: Path) -> Head:
         except UnicodeDecodeError as error:
             raise encoding_error(path, row) from error
         begin, position = position, stop
-        if line.startswith("#"):
+        if line.startswith(("#", "% ")):
             block.append(line)
         elif row == 1 and (delimiter := stated_delimiter(line)) is not None:
             stated = delimiter
@@ -115,11 +115,11 @@ def _split(line: str, dialect: Dialect, path: Path, row: int) -> list[str]:
 
 
 def _names_in(block: list[str], count: int, dialect: Dialect) -> tuple[int, list[str]] | None:
-    """Finds names behind a ``#``: the last line with as many different words as there are cells."""
+    """Finds names behind a ``#`` or a ``%``: the last line with as many different words as there are cells."""
     delimiters = dict.fromkeys((dialect.delimiter, ",", ";", "\t", " "))
     for index in range(len(block) - 1, -1, -1):
         for delimiter in delimiters:
-            names = [name.strip() for name in split_line(block[index].lstrip("#"), Dialect(delimiter))]
+            names = [name.strip() for name in split_line(block[index].lstrip("#%"), Dialect(delimiter))]
             if len(names) == len(set(names)) == count and all(name and not is_number(name) for name in names):
                 return index, names
     return None

@@ -14,7 +14,9 @@ from robots.common.tables.table import Table
 
 FloatArray = NDArray[np.float64]
 
-_FORM = re.compile(r"\s*(\d{4}-\d{2}-\d{2}[T ])?\d{2}:\d{2}:\d{2}([.,]\d+)?\s*(Z|[+-]\d{2}:?\d{2})?\s*")
+_FORM = re.compile(r"\s*(\d{4}-\d{2}-\d{2}[T ])?\d{2}:\d{2}:\d{2}([.,]\d+|:(\d{3}){1,3})?\s*(Z|[+-]\d{2}:?\d{2})?\s*")
+# Milli-, micro- or nanoseconds behind a colon, as 12:34:56:789.
+_COLON = re.compile(r"(\d{2}:\d{2}:\d{2}):(\d{3,9})")
 SECONDS_PER_HOUR, SECONDS_PER_DAY = 3600.0, 86_400.0
 YEAR_2000 = 946_684_800.0  # [s since 1970]; earlier times are counted from another start
 # Spreadsheets: 3.5.2024 12:34:56,789; 5/3/2024 1:02:03.5 PM; 2024/05/03 12:34. Without a date also 34:56.7, which is
@@ -70,7 +72,7 @@ def seconds_of(table: Table, name: str) -> FloatArray:
         try:
             if not isinstance(text, str) or _FORM.fullmatch(text) is None:
                 raise ValueError("another form")
-            values[row] = _seconds(text.strip().replace(",", "."))
+            values[row] = _seconds(_COLON.sub(r"\1.\2", text.strip().replace(",", ".")))
         except ValueError as error:
             raise _no_time(table, name, row) from error
     return _unwrapped(values, SECONDS_PER_DAY) if str(texts[0]).strip()[4:5] != "-" else values

@@ -179,6 +179,10 @@ class Effect(ABC):
         """Returns the range in which each shape parameter is refined; a single point if it has only few choices."""
         return tuple(shape.choices[:1] * 2 if shape.choices else (shape.lower, shape.upper) for shape in self.shapes)  # type: ignore[misc]
 
+    def choices(self, robot: Robot, k: int) -> tuple[float, ...]:
+        """Lists the only possible values of shape parameter k, if they are few; empty otherwise."""
+        return self.shapes[k].choices
+
     def likely(
         self, situation: Situation, joint: Place, shape: tuple[float, ...], coefficients: Array
     ) -> tuple[tuple[float | None, ...], ...]:

@@ -152,6 +152,11 @@ def _tool(chain: Chain, q: casadi.SX, dq: casadi.SX, ddq: casadi.SX, pi: casadi.
     return rigid_torque(chain, q, dq, ddq, [*none, carried], casadi.SX(chain.gravity))
 
 
+def _bodies_on_links(chain: Chain, q: casadi.SX, dq: casadi.SX, ddq: casadi.SX, pi: casadi.SX) -> casadi.SX:
+    each = [casadi.SX(np.kron(np.eye(chain.n)[i], np.eye(10))) for i in range(chain.n)]
+    return rigid_torque(chain, q, dq, ddq, each, casadi.SX(chain.gravity))
+
+
 def _jacobian(chain: Chain, q: casadi.SX, dq: casadi.SX, ddq: casadi.SX, pi: casadi.SX) -> casadi.SX:
     poses, flange = _forward(chain, q)
     columns = [
@@ -239,6 +244,7 @@ KINDS: dict[str, Callable[..., casadi.SX]] = {
     "inertia": _inertia,
     "gravity": _gravity,
     "tool": _tool,
+    "bodies": _bodies_on_links,
     "jacobian": _jacobian,
     "flange": _flange,
     "moment": _moment,

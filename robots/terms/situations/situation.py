@@ -174,6 +174,7 @@ class Situation:
                 - ``inertia``: inertia matrix without rotors (N, n, n)
                 - ``gravity``: d rigid/d(gravity in the base frame) (N, n, 3)
                 - ``tool``: torque per inertial parameter of a body at the flange, in the flange's frame (N, n, 10)
+                - ``bodies``: torque per inertial parameter of a body on each link, in the link's frame (N, n, 10 n)
                 - ``jacobian``: Jacobian of the flange in the base frame, linear, then angular (N, 6, n)
                 - ``flange``: position of the flange in the base frame [m] (N, 3, 1)
                 - ``moment``: first moment of the links' masses in the base frame [kg m] (N, 3, 1)

@@ -29,7 +29,6 @@ NUMERICS = {
     "name_comparison.py": {"CONTENDERS"},
     "gain_intervals.py": {"PARTS", "RESAMPLES", "BLOCK"},
     "gear_compliance.py": {"ALIGNED", "STIFFEST", "FEWEST", "MOST", "BLOCK"},
-    "held_out_errors.py": {"SHORTEST_UNSEEN"},
     "extended_model.py": {"STRETCH", "POINTS", "FEWEST"},
     "residual_shares.py": {"FEWEST", "SLOW"},
     "simulation_result.py": {"WORSE"},

@@ -102,3 +102,10 @@ def test_mass_and_the_horizontal_centre_come_with_intervals(description: Path, s
     assert found.to_dict()["quantities"][3]["ci95"] == [None, None]
     assert found.to_frame().loc["centre_z", ["lower", "upper"]].isna().all()
     assert "assumed, not determined by the logs: centre_z" in found.source
+
+
+def test_a_joint_that_changes_nothing_is_no_remedy(scara: Robot) -> None:
+    """A turn of a vertical first joint leaves all torques by a body as they are: it is not asked for."""
+    still = np.zeros((400, 4)) + 0.1
+    assert "joint 2 (" in missing_motion(Mount(scara, 2), still, None)
+    assert "joint 1 (" not in missing_motion(Mount(scara, 2), still, None)

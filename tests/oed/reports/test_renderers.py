@@ -117,3 +117,13 @@ def test_png_is_a_picture(everything: Picture, tmp_path: Path) -> None:
     assert pixels.std() > 5
     assert min(pixels.shape) > 200
     assert plt.get_fignums() == before
+
+
+def test_logarithmic_axes_write_whole_numbers() -> None:
+    """Within a few decades ticks are 1, 2 and 5 with all digits; over many they are powers of ten."""
+    narrow = Panel(x_log=True, series=(Series(x=np.array([210.0, 5800.0]), y=np.array([1.0, 2.0])),))
+    wide = Panel(x_log=True, series=(Series(x=np.array([1.0, 1e6]), y=np.array([1.0, 2.0])),))
+    drawn = to_plotly(Picture(title="p", name="p", panels=(narrow, wide), columns=2)).layout
+    assert drawn.xaxis.ticktext[:6] == ("100", "200", "500", "1000", "2000", "5000")
+    assert drawn.xaxis2.ticktext is None
+    assert drawn.xaxis2.dtick == 1

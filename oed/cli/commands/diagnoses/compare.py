@@ -13,7 +13,7 @@ from typing import Annotated
 from oed.cli.options.logs import Columns
 from oed.cli.options.models import Fit
 from oed.cli.options.results import Folder
-from oed.cli.options.robots import Chain
+from oed.cli.options.robots import CATALOGUE, Chain
 from oed.cli.verbs import Printed, Verb
 from robots.common.errors import InputError
 from robots.common.options import Option
@@ -40,7 +40,7 @@ class Compare(Verb):
     )
 
     models: Annotated[tuple[Path, ...], Option(argument=True)]
-    robot: Annotated[str | None, Option(section="Robot", names_file=True, only=("logs",))] = None
+    robot: Annotated[str | None, Option(section="Robot", names_file=True, choices=CATALOGUE, only=("logs",))] = None
     chain: Annotated[Chain, OfLogs] = Chain()
     columns: Annotated[Columns, OfLogs] = Columns()
     fit: Fit = Fit()

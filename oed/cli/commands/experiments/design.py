@@ -63,7 +63,7 @@ class Design(Verb):
     robot: PlannedRobot
     for_: str = "dynamics"
     gains: Annotated[Path | None, Option(only=("actuators",))] = None
-    criterion: Annotated[str | None, Option(only=(*TRAJECTORY, "calibration"))] = None
+    criterion: Annotated[str | None, Option(choices="oed.criteria:CRITERIA", only=(*TRAJECTORY, "calibration"))] = None
     model: Annotated[ModelOptions, Option(only=TRAJECTORY)] = ModelOptions()
     excitation: Annotated[Excitation, Option(only=TRAJECTORY)] = Excitation()
     trajectory: Annotated[TrajectoryOptions, Option(only=TRAJECTORY)]
@@ -75,7 +75,9 @@ class Design(Verb):
     weights: Annotated[WeightOptions, Option(only=TRAJECTORY)] = WeightOptions()
     after: Annotated[Path | None, Option(only=("dynamics",))] = None
     task: Annotated[Path | None, Option(only=("dynamics",))] = None
-    discriminate: Annotated[str | None, Option(only=("dynamics", "discriminate"))] = None
+    discriminate: Annotated[
+        str | None, Option(choices="robots.terms.effects:EFFECTS", only=("dynamics", "discriminate"))
+    ] = None
     search: Annotated[SearchOptions, Option(only=TRAJECTORY)]
     rivals: Annotated[DiscriminationOptions, Option(only=("discriminate",))]
     poses: Annotated[int, Option(least=1, only=("calibration",))] = 30

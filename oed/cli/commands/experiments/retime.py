@@ -40,7 +40,7 @@ class Retime(Verb):
     trajectory: Annotated[Path, Option(argument=True)]
     method: str = "toppra"
     robot: FileRobot = FileRobot()
-    criterion: str = "cond"
+    criterion: Annotated[str, Option(choices="oed.criteria:CRITERIA")] = "cond"
     model: Planned = Planned()
     tolerance: float = 0.01
     collisions: Collisions = Collisions()

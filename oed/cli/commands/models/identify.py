@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 from oed.cli.options.logs import KnownLogs
 from oed.cli.options.models import Fit
@@ -15,6 +15,7 @@ from oed.cli.options.results import ModelFolder
 from oed.cli.options.robots import RobotOptions
 from oed.cli.verbs import Printed, Verb
 from robots.common.errors import InputError
+from robots.common.options import Option
 from robots.common.progress import Progress
 
 if TYPE_CHECKING:
@@ -63,7 +64,7 @@ class Identify(Verb):
     robot: RobotOptions
     log: tuple[Path, ...]
     known: KnownLogs = KnownLogs()
-    method: str = "wls"
+    method: Annotated[str, Option(choices="estimation.estimators:ESTIMATORS")] = "wls"
     fit: Fit = Fit()
     position: bool | None = None
     rotor: bool = True

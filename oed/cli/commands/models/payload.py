@@ -13,7 +13,7 @@ from typing import Annotated
 
 from oed.cli.options.logs import KnownLogs
 from oed.cli.options.results import Folder
-from oed.cli.options.robots import Chain
+from oed.cli.options.robots import CATALOGUE, Chain
 from oed.cli.verbs import Printed, Verb
 from robots.common.errors import InputError
 from robots.common.options import Numbers, Option, Seed
@@ -58,7 +58,7 @@ class Payload(Verb):
     log: tuple[Path, ...]
     without: tuple[Path, ...] = ()
     model: Path | None = None
-    robot: Annotated[str | None, Option(section="Robot", names_file=True)] = None
+    robot: Annotated[str | None, Option(section="Robot", names_file=True, choices=CATALOGUE)] = None
     chain: Chain = Chain()
     known: KnownLogs = KnownLogs()
     frame: Numbers = None

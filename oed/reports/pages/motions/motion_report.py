@@ -34,6 +34,12 @@ def motion_page(animation: Animation, *, logs: Sequence[Recording] = (), finding
         )
         for margin in beyond
     ]
+    # The capsules of a description are larger than its bodies: what was recorded did not collide.
+    meet = "" if recorded else animation.meeting
+    if meet:
+        found.insert(
+            0, Finding(code="collision.found", text=f"in the {animation.source}, {meet}.", action="Do not play it.")
+        )
     facts = [
         Fact(label="Duration", value=f"{animation.duration:.1f} s"),
         Fact(label="Joints", value=animation.chain.n),
@@ -43,7 +49,7 @@ def motion_page(animation: Animation, *, logs: Sequence[Recording] = (), finding
     return Page(
         title=TITLE,
         robot=animation.robot,
-        verdict=_verdict(animation, beyond, tightest, len(findings)),
+        verdict=_verdict(animation, meet, beyond, tightest, len(findings)),
         logs=tuple(logs),
         findings=(*found, *findings),
         facts=tuple(facts),
@@ -82,7 +88,9 @@ def tightest_fact(margin: Margin, *, exceeded: Status = "act") -> Fact:
     )
 
 
-def _verdict(animation: Animation, beyond: Sequence[Margin], tightest: Margin | None, effects: int) -> str:
+def _verdict(animation: Animation, meet: str, beyond: Sequence[Margin], tightest: Margin | None, effects: int) -> str:
+    if meet:
+        return f"Do not play the {animation.source}: {meet}."
     if beyond:
         return f"The {animation.source} exceeds {len(beyond)} of the robot's limits, first {beyond[0].text}."
     if tightest is None:

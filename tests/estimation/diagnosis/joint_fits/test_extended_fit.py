@@ -48,7 +48,7 @@ def _estimable(problem: Problem, member: FittedEffect) -> np.ndarray:
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("name", "joint", "shape"),
-    [("payload_change", None, (MIDDLE, 1.0)), ("torque_sensor_drift", 1, None), ("friction_step", 2, (MIDDLE,))],
+    [("payload_change", None, (MIDDLE, 1.0, 0.0)), ("torque_sensor_drift", 1, None), ("friction_step", 2, (MIDDLE,))],
 )
 def test_what_a_log_leaves_open_has_no_interval(
     recording: Recording,

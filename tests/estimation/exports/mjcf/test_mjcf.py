@@ -142,7 +142,7 @@ def test_a_payload_hangs_on_the_flange(tmp_path):
     """A payload picked up during the log becomes a body; torques after the pick-up agree."""
     robot = file_of(tmp_path, ARM, tip="tool")
     body = [1.2, 0.12, 0.0, 0.06, 0.02, 0.001, -0.008, 0.03, 0.0, 0.025]
-    model = made(robot, extensions=[effect("payload_change", None, (5.0, 1.0), body)])
+    model = made(robot, extensions=[effect("payload_change", None, (5.0, 1.0, 0.0), body)])
     written = export_mjcf(model, tmp_path / "corrected.xml", robot=robot)
     assert "payload" in written.stated
     assert any("t = 5.00 s" in remark for remark in written.remarks)

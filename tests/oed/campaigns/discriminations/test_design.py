@@ -17,10 +17,13 @@ from oed.campaigns.discriminations.design import discriminate, parse_rivals
 from oed.campaigns.discriminations.discrimination import Discrimination, DiscriminationScore
 from oed.campaigns.discriminations.motions import ExperimentBuilder
 from oed.campaigns.discriminations.probabilities import require_separable
+from oed.experiments.safety_checks.freedom import is_free
 from oed.exports import read_trajectory
 from oed.reports import Page
 from oed.reports.pages.discrimination_report import discrimination_page
+from robots import load_robot
 from robots.base_parameters import find_base_parameters
+from robots.collision import CoalChecker, collision_model
 from robots.common.errors import InfeasibleError, InputError, NotIdentifiableError
 from robots.geometry.chain import Chain, Joint
 from robots.limits import Limits
@@ -205,3 +208,15 @@ def test_a_robot_too_weak_to_hold_itself_is_refused() -> None:
 def test_page_works_in_a_browser(found: Discrimination, in_browser: Callable[[Page], None]) -> None:
     """The page passes all checks of `browser_checks`."""
     in_browser(discrimination_page(found))
+
+
+@pytest.mark.slow
+def test_motions_meet_neither_the_robot_nor_the_floor() -> None:
+    """All runs of an arm that could reach the floor are free, by pinocchio and coal on the capsules of its file."""
+    robot = load_robot("er3a")
+    found = discriminate(robot, "spring:2,base_tilt")
+    assert is_free(found.freedom)
+    assert "Do not play" not in found.conclusion
+    model = collision_model(robot)
+    for run in found.runs:
+        assert CoalChecker(model).clearance(run.motion.q[::25]).min() > 0.0

@@ -161,3 +161,13 @@ def test_doctor_without_a_compiler(run, monkeypatch: pytest.MonkeyPatch) -> None
     done = run("doctor")
     assert done.code == 0
     assert "C compiler: none" in done.out
+
+
+def test_one_effect_is_explained(run) -> None:
+    """`oed effects NAME` gives the formula, the parameters and what separates it; a wrong name is answered."""
+    done = run("effects", "spring")
+    for text in ("tau = (p + c1 s", "lever_ratio", "static_hold: many static poses"):
+        assert text in done.out
+    done = run("effects", "sprin")
+    assert done.code == 2
+    assert "did you mean 'spring'?" in done.err

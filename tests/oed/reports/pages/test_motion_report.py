@@ -9,6 +9,8 @@ import numpy as np
 import pytest
 
 from oed.reports import Finding, animate, motion_page, render
+from oed.reports.rendering.page import Section
+from oed.reports.rendering.picture import Panel, Picture, Series
 from robots.limits import Margin
 from tests.oed.reports.animations.test_building import motion, robot
 
@@ -47,6 +49,50 @@ def test_verdicts() -> None:
     found = motion_page(kept, findings=[Finding(code="effect.design", text="A spring.")])
     assert "the diagnosis has 1 finding." in found.verdict
     assert found.level == "note"
+
+
+INSTANT = (
+    "(() => { const line = document.querySelector('.instant'); return line && !line.hidden && line.offsetLeft; })()"
+)
+
+
+@pytest.mark.slow
+def test_plots_and_robot_share_one_instant(browser, tmp_path: Path) -> None:
+    """The line in a plot over time follows the robot, and the robot the plot that is pointed at."""
+    animation = animate(robot(), motion())
+    panel = Panel(x_label="time [s]", series=(Series(x=animation.t, y=animation.q[:, 0]),))
+    section = Section(title="Over time", pictures=(Picture(title="q", name="q", panels=(panel,)),))
+    page = motion_page(animation)
+    path = tmp_path / "page.html"
+    path.write_text(render(replace(page, sections=(*page.sections, section))))
+    browser.open(path, width=1000)
+    wait = "new Promise((resolve) => setTimeout(resolve, 300))"
+    browser.run("document.querySelector('.plot').scrollIntoView()")
+    browser.run(wait)
+    browser.run("document.querySelector('.animation').focus()")
+    browser.press("End", 35)
+    browser.run(wait)
+    last = browser.run(INSTANT)
+    browser.press("Home", 36)
+    browser.run(wait)
+    assert browser.run(INSTANT) < last
+    browser.run("document.dispatchEvent(new CustomEvent('oed-pointed', { detail: 1.0 }))")
+    browser.run(wait)
+    assert browser.run("document.querySelector('.clock').textContent").startswith("1.00")
+    assert not browser.problems
+
+
+def test_a_motion_with_a_collision_is_not_to_be_played() -> None:
+    """The frames in which bodies meet come with their links; words, verdict and badge say it, but not of a log."""
+    free = animate(robot(), motion())
+    assert "Collision" not in free.summary()
+    hit = replace(free, meetings={3: (-1, 2)})
+    words = f"the surroundings and link 2 meet at {hit.t[3]:.2f} s"
+    assert f"Collision: {words}." in hit.summary()
+    assert '"meetings":{"3":[-1,2]}' in hit.to_json()
+    page = motion_page(hit)
+    assert (page.level, page.verdict) == ("act", f"Do not play the motion: {words}.")
+    assert motion_page(replace(hit, source="log")).level == "good"
 
 
 @pytest.mark.slow

@@ -91,6 +91,8 @@ def test_columns_fit_the_parameters(effect, seen):
             size = size[[bool(coefficient.name) or k == 3 for k, coefficient in enumerate(described)]]
         if effect.name == "external_contact":  # one a joint, or a wrench's six
             size = size[: now.robot.n]
+        if effect.name == "payload_change" and point[2]:  # a first link shows few parameters of its body
+            size = size[size > 0]
         if effect.name != "torque_sensor_drift":  # of which a straight line is one column of eight
             assert size.min() > 0
         others = sorted(set(range(now.robot.n)) - set(effect.acts_on(now.robot, joint)))
@@ -109,8 +111,8 @@ def test_the_grid_lies_within_the_bounds(effect, seen):
         assert len(bounds) == len(effect.shapes)
         for point in effect.grid(now, joint):
             assert len(point) == len(effect.shapes)
-            for value, (lower, upper), shape in zip(point, bounds, effect.shapes, strict=True):
-                assert value in shape.choices or lower <= value <= upper
+            for k, (value, (lower, upper), shape) in enumerate(zip(point, bounds, effect.shapes, strict=True)):
+                assert value in effect.choices(now.robot, k) or lower <= value <= upper
                 assert shape.lower <= value <= shape.upper
 
 
