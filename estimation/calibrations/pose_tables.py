@@ -277,6 +277,8 @@ class _Reader:
             rows=int(along),
             spacing=spacing,
             intrinsics=self.how.intrinsics,
+            distortion=self.how.distortion or (0.0, 0.0, 0.0, 0.0, 0.0),
+            fit=self.how.fit_camera,
             on_flange=self.how.camera_on_flange,
         )
         names = self._counted(["u", "v"])

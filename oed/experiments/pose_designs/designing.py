@@ -101,7 +101,7 @@ def design_poses(
     """Chooses poses that determine geometric errors best, and an order of moves that is free of collisions.
 
     Candidates within limits, clear of collisions and in view are exchanged (Mitchell 1974, DETMAX; Borm and Menq 1991),
-    then each pose is moved to where the criterion is best.
+    then all poses move together by IPOPT, with exact derivatives, to where the criterion is best.
 
     Args:
         robot: the robot.
@@ -139,7 +139,17 @@ def design_poses(
         q = candidates[chosen]
         bar.update(0.4, "moving poses")
         if how.refine:
-            q = refined(information, q, judge, bounds, allowed, lambda share: bar.update(0.4 + 0.3 * share))
+            q = refined(
+                information,
+                q,
+                judge,
+                bounds,
+                allowed,
+                model=model,
+                clearance=how.clearance,
+                view=how.view,
+                progress=lambda share: bar.update(0.4 + 0.3 * share),
+            )
         bar.update(0.7, "ordering moves")
         home = _home(usable, how, allowed, candidates)
         moves, paths = Moves(usable, robot.period), Paths(model, how.clearance / 2.0, bounds, how.seed)

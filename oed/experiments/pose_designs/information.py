@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
+import casadi
 import numpy as np
 from numpy.typing import NDArray
 
@@ -12,6 +13,7 @@ from robots.geometry_errors.measurements import Measurement, Setup
 from robots.geometry_errors.model import GeometryModel
 from robots.geometry_errors.poses import MeasuredPoses
 from robots.geometry_errors.reduction import reduce_columns
+from robots.geometry_errors.symbolic import SymbolicArm, symbolic_jacobian
 from robots.geometry_errors.terms import ErrorParameter, error_term
 from robots.geometry_errors.virtual import random_positions
 from robots.robot import Robot
@@ -71,6 +73,18 @@ class PoseInformation:
         """Scaled rows of poses (N, r, L)."""
         return self._scaled(self._model(q))[:, :, self.kept]
 
+    def symbolic(self) -> casadi.Function:
+        """Writes the scaled rows of a pose as an expression: q (n,) -> (r, L)."""
+        whole = symbolic_jacobian(self.robot, self.terms, self.measurement, self.setup)
+        q = casadi.SX.sym("q", self.robot.n)
+        scaled = casadi.diag(casadi.DM(1.0 / self._sigma)) @ whole(q) @ casadi.diag(casadi.DM(self._scale))
+        return casadi.Function("rows", [q], [casadi.densify(scaled[:, self.kept])])
+
+    def symbolic_flange(self) -> casadi.Function:
+        """Writes the nominal flange of a pose as an expression: q (n,) -> (4, 4)."""
+        arm = SymbolicArm(self.robot)
+        return casadi.Function("flange", [arm.q], [arm.flange])
+
     def flange(self, q: Array) -> Array:
         """Nominal flange of poses (N, 4, 4)."""
         return self.robot.chain.flange(q)
@@ -100,9 +114,8 @@ class PoseInformation:
         return float(np.sqrt(variance.mean() * self.measurement.block))
 
     def _model(self, q: Array) -> GeometryModel:
-        observed = np.zeros((len(q), len(self.measurement.columns)))
-        if self.measurement.kind == "poses":
-            observed[:, -1] = 1.0
+        # What a nominal robot shows: derivatives of turns depend on how far they are off.
+        observed = self.measurement.simulate([self.flange(q)], self.setup, {}, 0)
         return GeometryModel(
             [self.robot], self.terms, MeasuredPoses(q=q, measurement=self.measurement, observed=observed)
         )

@@ -8,7 +8,9 @@ import pytest
 from oed import PoseOptions, design_poses
 from oed.experiments.pose_designs import View, load_pose_design, observability_indices
 from oed.experiments.pose_designs.exchange import exchanged
+from oed.experiments.pose_designs.information import PoseInformation
 from oed.experiments.pose_designs.observability import pose_criterion
+from oed.experiments.pose_designs.refinement import PoseProblem, refined
 from robots import load_robot
 from robots.common.errors import InfeasibleError, InputError
 from robots.geometry_errors import Markers, random_positions
@@ -45,6 +47,35 @@ def test_exchange_improves_any_criterion(name):
 
     best = cost(exchanged(rows, 8, criterion))
     assert best <= min(cost(rng.permutation(200)[:8]) for _ in range(100))
+
+
+@pytest.mark.parametrize("name", ["d", "cond", "o3", "o4", "o5"])
+def test_refinement_has_exact_gradients(robot, name):
+    """The gradient of each criterion by all positions is that of central differences."""
+    information = PoseInformation(robot, Markers(), ("joint_zero",), {"m": 1e-4})
+    problem = PoseProblem(information, pose_criterion(name), 6)
+    z = random_positions(robot, 6, seed=2).ravel()
+    way = np.random.default_rng(0).standard_normal(z.size)
+    _, gradient = problem.surrogate(z, 8.0)
+    ahead, behind = (problem.surrogate(z + step * way, 8.0)[0] for step in (1e-5, -1e-5))
+    # The third derivative times the square of the step.
+    assert gradient @ way == pytest.approx((ahead - behind) / 2e-5, rel=1e-5, abs=1e-7)
+
+
+def test_refinement_improves_within_limits(robot):
+    """Poses that IPOPT moved are better by the criterion, within their ranges and in the cone of view."""
+    view = View(origin=(1.5, 0.0, 0.5), towards=(0.0, 0.0, 0.4), cone=0.3)
+    information = PoseInformation(robot, Markers(), ("joint_zero",), {"m": 1e-4})
+    drawn = random_positions(robot, 2000, seed=2)
+    q = drawn[view.sees(robot.chain.flange(drawn))][:6]
+    bounds = (q.min(axis=0) - 0.5, q.max(axis=0) + 0.5)
+    criterion = pose_criterion("d")
+    found = refined(information, q, criterion, bounds, lambda x: view.sees(robot.chain.flange(x)), view=view)
+    problem = PoseProblem(information, criterion, 6)
+    # Six random poses are far from the best: their determinant grows by much more than a factor of e.
+    assert problem.cost(found) < problem.cost(q) - 1.0
+    assert view.sees(robot.chain.flange(found)).all()
+    assert ((found >= bounds[0]) & (found <= bounds[1])).all()
 
 
 @pytest.mark.slow
