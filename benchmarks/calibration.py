@@ -18,6 +18,7 @@ import numpy as np
 sys.path.insert(0, str(Path(__file__).parents[1]))
 
 from benchmarks.calibration_parts import oracle
+from benchmarks.calibration_parts.pose_bounds import best_information
 from estimation.calibrations import CalibrationOptions, calibrate
 from estimation.calibrations.fit import fit_geometry, preference
 from robots import load_robot
@@ -264,7 +265,7 @@ def causes(cases: int, without: int) -> None:
 
 
 def designs(names: list[str], sets: int) -> None:
-    """Designed poses against random ones: errors of 20 against 60, and O1 against the best of many random sets."""
+    """Designed poses against random ones: errors of 20 against 60, what is possible at all, and O1."""
     from oed.experiments.pose_designs import PoseOptions, design_poses, observability_indices
     from oed.experiments.pose_designs.designing import _Allowed, _bounds, _candidates
     from oed.experiments.pose_designs.exchange import exchanged
@@ -280,7 +281,7 @@ def designs(names: list[str], sets: int) -> None:
         information = PoseInformation(robot, options.measurement, options.kinds, options.levels)
         model = options.surroundings.model(robot)
         bounds = _bounds(robot.limits, options.range_share, robot.chain.kinds)
-        pool = _candidates(bounds, _Allowed(information, options, model), 4000, 77)
+        pool = _candidates(bounds, _Allowed(information, options, model), 2000, 77)
         rows = information.rows(pool)
         rng = np.random.default_rng(1)
         best = 0.0
@@ -289,27 +290,37 @@ def designs(names: list[str], sets: int) -> None:
             values = np.linalg.eigvalsh(np.einsum("nrl,nrk->lk", own, own))
             best = max(best, observability_indices(values, 20)["O1"])
         # "By exchange alone": the best random set of 20, improved by exchange among the same poses.
-        alone = exchanged(rows[:1000], 20, pose_criterion("d"))
-        own = rows[alone]
+        own = rows[exchanged(rows[:1000], 20, pose_criterion("d"))]
         exchange = observability_indices(np.linalg.eigvalsh(np.einsum("nrl,nrk->lk", own, own)), 20)["O1"]
         elsewhere = random_positions(robot, 300, seed=5)
-        sixty = []
-        for _ in range(50):
-            own = rows[rng.permutation(len(rows))[:60]]
-            total = np.einsum("nrl,nrk->lk", own, own)
-            sixty.append(
-                (
-                    information.prediction_error(total, elsewhere),
-                    float(np.exp(np.mean(np.log(information.spread(total))))),
-                )
-            )
-        spread = float(np.exp(np.mean(np.log(design.expected))))
-        prediction, error = np.median(sixty, axis=0)
+        grams = np.swapaxes(rows, 1, 2) @ rows
+        sixty = [grams[rng.permutation(len(rows))[:60]].sum(axis=0) for _ in range(50)]
+        volume = lambda total: float(np.exp(-0.5 * np.linalg.slogdet(total)[1] / len(total)))  # noqa: E731
+        seen = information.rows(elsewhere) * information._sigma[:, None]
+        weight = np.einsum("nrl,nrk->lk", seen, seen)
+        own = information.rows(design.q)
+        total = np.einsum("nrl,nrk->lk", own, own)
         print(
             f"{name}: O1 of 20 designed {design.observability['O1']:.4g}, best of {sets} random sets {best:.4g}, "
-            f"exchange alone {exchange:.4g}; prediction error 20 designed {1e3 * design.prediction:.4f} mm, 60 random "
-            f"{1e3 * prediction:.4f} mm; geometric mean of standard errors, designed over 60 random "
-            f"{spread / error:.3f}; {took:.1f} s, success {design.success}",
+            f"exchange alone {exchange:.4g}; {took:.1f} s, success {design.success}",
+            flush=True,
+        )
+        random = np.median([volume(one) for one in sixty])
+        optimum, slack = best_information(information, pool[:400], bounds, None)
+        # log det of the true optimum is higher by L log(slack) at most.
+        print(
+            f"  mean error of the parameters (volume), over that of 60 random poses: designed "
+            f"{volume(total) / random:.3f}, best possible {volume(20.0 * optimum) / random:.3f} "
+            f"(at least {volume(20.0 * optimum) / random * np.exp(-0.5 * (slack - 1.0)):.3f})",
+            flush=True,
+        )
+        random = np.median([information.prediction_error(one, elsewhere) for one in sixty])
+        optimum, slack = best_information(information, pool[:400], bounds, weight)
+        possible = information.prediction_error(20.0 * optimum, elsewhere) / random
+        print(
+            f"  error of predicted positions, over that of 60 random poses: designed "
+            f"{information.prediction_error(total, elsewhere) / random:.3f}, best possible {possible:.3f} "
+            f"(at least {possible * np.sqrt(max(2.0 - slack, 0.0)):.3f})",
             flush=True,
         )
 

@@ -64,9 +64,13 @@ class PoseProblem:
         value, by_values = self.criterion.surrogate(values, sharpness)
         # Of G = sum J'J: dL = 2 J (V diag(g) V') : dJ.
         seed = 2.0 * rows @ ((vectors * by_values) @ vectors.T)
+        return value, self.pulled(q, seed).ravel()
+
+    def pulled(self, q: Array, seed: Array) -> Array:
+        """Turns derivatives by the rows (N, r, L) into those by the positions (N, n)."""
         # CasADi's vectors run down the columns.
-        (gradient,) = self._reverse(q, np.swapaxes(seed, 1, 2).reshape(self.count, -1))
-        return value, np.asarray(gradient, dtype=float).ravel()
+        (gradient,) = self._reverse(q, np.swapaxes(seed, 1, 2).reshape(len(q), -1))
+        return np.asarray(gradient, dtype=float).reshape(q.shape)
 
 
 def refined(
