@@ -57,13 +57,13 @@ def measured(robot, q, errors, setup, rng, noise=NOISE) -> MeasuredPoses:
     return MeasuredPoses(q=q, measurement=Markers(count=3), observed=observed, approach=approaches(q))
 
 
-def arms(draws: int, name: str, select: bool) -> None:
+def arms(draws: int, name: str, select: bool, first: int) -> None:
     """Held-out error and coverage of intervals over virtual arms."""
     robot = robot_of(name)
     arm = oracle.Arm.of(robot)
     hits = total = 0
     errors_, ratios, wrong, names = [], [], 0, set()
-    for draw in range(draws):
+    for draw in range(first, first + draws):
         rng = np.random.default_rng(draw)
         truth, setup = oracle.usual_errors(arm, rng), oracle.usual_setup(rng)
         poses = measured(robot, random_positions(robot, 40, seed=draw), truth, setup, rng)
@@ -92,9 +92,9 @@ def arms(draws: int, name: str, select: bool) -> None:
         ratios.append(errors_[-1] / NOISE)
         if (draw + 1) % 10 == 0:
             print(
-                f"{name}: {draw + 1} draws, held out {1e3 * np.median(errors_):.4f} mm per number "
+                f"{name}: draws {first} to {draw}, held out {1e3 * np.median(errors_):.4f} mm per number "
                 f"({np.median(ratios):.3f} of the noise, worst {np.max(ratios):.3f}); 95 % intervals hold "
-                f"{100 * hits / total:.1f} % of {total}; determined but not by exact poses: {wrong}",
+                f"{100 * hits / total:.1f} % of {total} ({hits}); determined but not by exact poses: {wrong}",
                 flush=True,
             )
 
@@ -240,11 +240,11 @@ def hidden(kind: str, seed: int, robots) -> tuple[object, int | None, MeasuredPo
     return robot, joint + 1 if at_joint else None, poses
 
 
-def causes(cases: int, without: int) -> None:
+def causes(cases: int, without: int, first: int) -> None:
     """Hidden causes: how often the one that is there is named, and how often one that is not."""
     robots = [robot_of(name) for name in ("ur10", "panda", "er3a")]
     named = false = 0
-    for number in range(cases + without):
+    for number in range(first, cases + without):
         kind = CAUSES[number % len(CAUSES)] if number < cases else "none"
         robot, joint, poses = hidden(kind, number, robots)
         found = calibrate(robot, poses).causes["findings"]
@@ -396,11 +396,13 @@ def main() -> None:
     one.add_argument("--draws", type=int, default=200)
     one.add_argument("--robot", default="ur10")
     one.add_argument("--select", action="store_true", help="choose the kinds by held-out poses, too")
+    one.add_argument("--first", type=int, default=0, help="number of the first draw")
     two = commands.add_parser("rank")
     two.add_argument("--urdf", nargs="*", default=[], help="FILE or FILE:joint,joint")
     three = commands.add_parser("causes")
     three.add_argument("--cases", type=int, default=60)
     three.add_argument("--without", type=int, default=20)
+    three.add_argument("--first", type=int, default=0, help="number of the first case")
     four = commands.add_parser("designs")
     four.add_argument("--robots", nargs="*", default=["ur10", "er3a", "panda", "scara"])
     four.add_argument("--sets", type=int, default=1000)
@@ -410,11 +412,11 @@ def main() -> None:
     five.add_argument("--urdf", type=Path, required=True)
     chosen = parser.parse_args()
     if chosen.command == "arms":
-        arms(chosen.draws, chosen.robot, chosen.select)
+        arms(chosen.draws, chosen.robot, chosen.select, chosen.first)
     elif chosen.command == "rank":
         rank(chosen.urdf)
     elif chosen.command == "causes":
-        causes(chosen.cases, chosen.without)
+        causes(chosen.cases, chosen.without, chosen.first)
     elif chosen.command == "designs":
         designs(chosen.robots, chosen.sets)
     elif chosen.command == "speed":
