@@ -101,6 +101,10 @@ class PoseErrors:
         after: by the fit (N,).
         held_out: by a fit to others (N,).
         used: whether the pose counted (N,).
+        session: number of each pose's session (N,); None if there is one only.
+        shift_before: mean signed error of the points by the description, by axis of the measurement (N, k); None in
+            files of earlier versions.
+        shift: the same by a fit to others (N, k).
     """
 
     line: NDArray[np.int64]
@@ -109,6 +113,9 @@ class PoseErrors:
     after: Array
     held_out: Array
     used: NDArray[np.bool_]
+    session: NDArray[np.int64] | None = None
+    shift_before: Array | None = None
+    shift: Array | None = None
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

@@ -14,7 +14,7 @@ from robots.geometry_errors.model import GeometryModel
 from robots.geometry_errors.poses import MeasuredPoses
 from robots.geometry_errors.reduction import reduce_columns
 from robots.geometry_errors.symbolic import SymbolicArm, symbolic_jacobian
-from robots.geometry_errors.terms import ErrorParameter, error_term
+from robots.geometry_errors.terms import TERMS, ErrorParameter, error_term
 from robots.geometry_errors.virtual import random_positions
 from robots.robot import Robot
 
@@ -23,8 +23,8 @@ Array = NDArray[np.float64]
 REFERENCE = 300
 """Random poses by which the errors that poses distinguish are chosen."""
 
-UNSUITED = ("backlash", "time_offset", "thermal_growth", "base_motion")
-"""Kinds that depend on more than the pose."""
+UNSUITED = ("backlash", "load_backlash", "time_offset", "thermal_growth", "base_motion")
+"""Kinds that depend on more than the pose, or jump with it."""
 
 
 class PoseInformation:
@@ -37,7 +37,7 @@ class PoseInformation:
         noise: standard deviation by unit.
 
     Raises:
-        InputError: a kind that depends on more than the pose, or that the robot's description cannot state.
+        InputError: a kind that depends on more than the pose or jumps with it, or that the robot's description cannot state.
     """
 
     def __init__(
@@ -45,7 +45,10 @@ class PoseInformation:
     ) -> None:
         unsuited = next((kind for kind in kinds if kind in UNSUITED), None)
         if unsuited is not None:
-            raise InputError(f"{unsuited} depends on more than the pose", allowed="kinds that depend on the pose alone")
+            raise InputError(
+                f"{unsuited} depends on more than the pose, or jumps with it",
+                allowed=", ".join(term.kind for term in TERMS if term.kind not in UNSUITED),
+            )
         self.robot, self.measurement = robot, measurement
         self.terms = [error_term(kind) for kind in kinds]
         self.setup: Setup = measurement.example

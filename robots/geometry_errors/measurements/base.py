@@ -76,6 +76,16 @@ class Measurement(ABC):
         points = np.isfinite(first).sum(axis=1) / self.block
         return np.asarray(np.sqrt(np.nansum(first**2, axis=1) / np.where(points > 0, points, np.nan)))
 
+    def shift(self, residual: Array) -> Array:
+        """Mean signed error of each pose's points by axis (N, block) in the first unit; NaN if none was seen.
+
+        Args:
+            residual: (N, r).
+        """
+        first = residual[:, [unit == self.unit for unit in self.units]].reshape(len(residual), -1, self.block)
+        count = np.isfinite(first).sum(axis=1)
+        return np.asarray(np.nansum(first, axis=1) / np.where(count > 0, count, np.nan))
+
     @abstractmethod
     def start(self, flanges: Sequence[Array], observed: Array) -> Setup:
         """Finds a first setup from nominal flanges.

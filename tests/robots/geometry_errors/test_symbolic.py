@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from oed.experiments.pose_designs.information import UNSUITED
 from robots import load_robot
 from robots.common.errors import InputError
 from robots.geometry_errors import (
@@ -21,9 +22,7 @@ from robots.geometry_errors import (
 )
 from robots.geometry_errors.symbolic import symbolic_jacobian
 
-STATIC = tuple(
-    term for term in TERMS if term.kind not in ("backlash", "time_offset", "thermal_growth", "base_motion")
-)
+STATIC = tuple(term for term in TERMS if term.kind not in UNSUITED)
 
 
 @pytest.mark.parametrize(
