@@ -360,14 +360,16 @@ def tiago(folder: Path, urdf: Path) -> None:
         both = {}
         for day, path in files.items():
             table = pd.read_csv(path)
+            q = table[list(RIGID)].to_numpy()
+            # Rows come in the order of time, so that each joint's last direction is known.
             both[day] = MeasuredPoses(
-                q=table[list(RIGID)].to_numpy(), measurement=Markers(count=count), observed=table[columns].to_numpy()
+                q=q, measurement=Markers(count=count), observed=table[columns].to_numpy(), approach=approaches(q)
             )
         train, check = both["30"], both["26"]
         near = np.array([np.min(np.max(np.abs(train.q - x), axis=1)) for x in check.q]) < 0.01
         low, high = train.q.min(axis=0) - 0.05, train.q.max(axis=0) + 0.05
         outside = ((check.q < low) | (check.q > high)).any(axis=1)
-        for kinds in ((), ("joint_zero",), ("joint_zero", "link_placement"), None):
+        for kinds in ((), ("joint_zero",), ("joint_zero", "backlash"), ("joint_zero", "link_placement"), None):
             found = calibrate(robot, train, options=CalibrationOptions(kinds=kinds, diagnose=False))
             terms = [error_term(kind) for kind in found.kinds]
             own = {item.name: item.value for item in found.errors}
