@@ -158,9 +158,9 @@ def find_base_parameters(
 
     A column that the ones before it span, on random states all over the robot's ranges, is regrouped into them
     (thesis section 1.3.1); the singular values must confirm the rank (section 1.3.2). Columns are measured against the
-    largest of their kind (masses, moments, inertias, ...). Where right angles are rounded to 1.57 some stand out by parts
-    in a million, and where a calibration found axes that lean by a milliradian by a thousandth: their torque is below
-    what noise and motion tell. Arms as they are designed have no column between 0.0001 and 0.03 (20 public
+    largest of their kind (masses, moments, inertias, ...). Where right angles are rounded to 1.57 some stand out by
+    parts in a million, and where a calibration found axes that lean by a milliradian by a thousandth: their torque is
+    below what noise and motion tell. Arms as they are designed have no column between 0.0001 and 0.03 (20 public
     descriptions). `BaseParameters.neglected` says how much was left out.
 
     Args:
@@ -197,8 +197,8 @@ def find_base_parameters(
         log.warning(
             (
                 "%s: axes that are nearly parallel, perpendicular or intersecting are treated as exactly so (%.1e of "
-                "the regressor is neglected). Usual causes: rounded angles in the description, such as 1.5708 for pi / 2, "
-                "and calibrated axes"
+                "the regressor is neglected). Usual causes: rounded angles in the description, such as 1.5708 for pi / "
+                "2, and calibrated axes"
             ),
             model.robot.name,
             left[of_links].max(),

@@ -54,7 +54,10 @@ def best_information(
             break
         keep = share > 1e-7
         own = problem.rows(new)
-        q, flat = np.vstack([q[keep], new]), np.vstack([flat[keep], (np.swapaxes(own, 1, 2) @ own).reshape(len(new), -1)])
+        q, flat = (
+            np.vstack([q[keep], new]),
+            np.vstack([flat[keep], (np.swapaxes(own, 1, 2) @ own).reshape(len(new), -1)]),
+        )
         share = np.concatenate([0.9 * share[keep], np.full(len(new), 0.1 / len(new))])
         share /= share.sum()
     return total, slack

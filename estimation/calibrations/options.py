@@ -24,8 +24,8 @@ class CalibrationOptions:
 
     Attributes:
         kinds: kinds of errors to fit, comma-separated: joint_zero, link_placement, gear_ratio, eccentricity,
-            joint_compliance, link_compliance, thermal_growth, backlash, load_backlash, time_offset, base_motion. Default: those that
-            held-out poses support.
+            joint_compliance, link_compliance, thermal_growth, backlash, load_backlash, time_offset, base_motion.
+            Default: those that held-out poses support.
         diagnose: look for the causes of the errors.
         seed: seed of the random numbers.
 

@@ -54,9 +54,7 @@ def repeatability(poses: MeasuredPoses, residual: Array, used: NDArray[np.bool_]
         errors = poses.measurement.error(own - np.nanmean(own, axis=0))
         square += float(np.nansum(errors**2))
         freedom += len(group) - 1
-    return Repeatability(
-        error=float(np.sqrt(square / freedom)), poses=len(groups), visits=sum(map(len, groups))
-    )
+    return Repeatability(error=float(np.sqrt(square / freedom)), poses=len(groups), visits=sum(map(len, groups)))
 
 
 def _near(q: Array) -> tuple[Array, tuple[NDArray[np.int64], NDArray[np.int64]]]:

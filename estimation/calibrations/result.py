@@ -299,6 +299,8 @@ class Calibration(Result, format="robot-oed calibration"):
         lines += [f"  not determined: {item.sentence()}" for item in open_[:6]]
         if len(open_) > 6:
             lines.append(f"  not determined: {len(open_) - 6} more in {self.FILE}")
+        if self.provenance.get("not_read"):
+            lines.append(f"  columns that were not read: {', '.join(self.provenance['not_read'])}")
         lines += [f"  {warning}" for warning in self.warnings]
         return "\n".join(lines)
 

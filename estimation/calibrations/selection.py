@@ -212,7 +212,9 @@ def _distances(linear: LinearFolds, kinds: set[str]) -> tuple[Array, Array]:
     return residual, pose_distance(residual, fit.model.poses.measurement.units, fit.weights.sigma) ** 2
 
 
-def _trial(fit: GeometryFit, terms: Sequence[ErrorTerm], before: tuple[Array, Array], after: tuple[Array, Array]) -> KindTrial:
+def _trial(
+    fit: GeometryFit, terms: Sequence[ErrorTerm], before: tuple[Array, Array], after: tuple[Array, Array]
+) -> KindTrial:
     # Poses that fit badly decide as little as they count in the fit.
     gain = fit.weights.pose * (before[1] - after[1])
     error = float(np.std(gain, ddof=1) / np.sqrt(len(gain))) if len(gain) > 1 else np.inf

@@ -105,7 +105,7 @@ def _inverse(matrix: Array) -> Array:
     """Inverse of normal equations in columns of length one; the pseudo-inverse where they are singular."""
     triangle, failed = dpotrf(matrix, lower=1, clean=1)
     if failed or np.diag(triangle).min(initial=1.0) < SINGULAR:
-        return np.linalg.pinv(matrix, hermitian=True)
+        return np.asarray(np.linalg.pinv(matrix, hermitian=True), dtype=np.float64)
     half, _ = dpotri(triangle, lower=1)
     # Only the lower half is filled; the upper one holds zeros.
     half = half + half.T

@@ -116,7 +116,9 @@ class ArmColumns:
                     moved = right_jacobian(value) @ twists if np.any(value) else twists
                     carried = adjoint(back @ frames)
                     # One product of matrices is much faster than one for each pose.
-                    own = (carried.reshape(-1, 6) @ moved[0]).reshape(rows, 6, -1) if len(moved) == 1 else carried @ moved
+                    own = (
+                        (carried.reshape(-1, 6) @ moved[0]).reshape(rows, 6, -1) if len(moved) == 1 else carried @ moved
+                    )
                     # A parameter may move several joints.
                     result[:, :, numbers] += own
         return flange, result

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Any
 
 import casadi
 import numpy as np
@@ -63,7 +64,7 @@ class SymbolicArm:
         arm = flange[:3, 3] - frame[:3, 3]
         return casadi.vertcat(flange[:3, :3].T @ (shift + casadi.cross(turn, arm)), flange[:3, :3].T @ turn)
 
-    def _loads(self) -> NDArray[np.object_]:
+    def _loads(self) -> NDArray[Any]:
         """Force and moment of gravity about each joint in the axes of its frame (1, n, 6), as `gravity_loads`."""
         known, gravity = np.asarray(self.robot.inertia), casadi.SX(np.asarray(self.robot.chain.gravity))
         mass, moment, rows = 0.0, casadi.SX(3, 1), []
@@ -105,7 +106,8 @@ def symbolic_jacobian(
     return casadi.Function("rows", [arm.q], [casadi.densify(rows)], ["q"], ["jacobian"])
 
 
-def _elements(matrix: casadi.SX) -> NDArray[np.object_]:
+def _elements(matrix: casadi.SX) -> NDArray[Any]:
+    """Expressions as objects, with which numpy calculates as with numbers."""
     rows, columns = matrix.shape
     return np.array([[matrix[i, j] for j in range(columns)] for i in range(rows)], dtype=object)
 

@@ -37,7 +37,8 @@ class PoseInformation:
         noise: standard deviation by unit.
 
     Raises:
-        InputError: a kind that depends on more than the pose or jumps with it, or that the robot's description cannot state.
+        InputError: a kind that depends on more than the pose or jumps with it, or that the robot's description cannot
+            state.
     """
 
     def __init__(

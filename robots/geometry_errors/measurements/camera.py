@@ -118,7 +118,9 @@ class CameraBoard(Measurement):
         own: dict[str, Unknown] = {}
         if self.fit != "known":
             value = np.array(self.intrinsics, dtype=float)
-            own["camera_px"] = Unknown(kind="number", value=value, labels=("fx", "fy", "cx", "cy"), unit="px", scale=1.0)
+            own["camera_px"] = Unknown(
+                kind="number", value=value, labels=("fx", "fy", "cx", "cy"), unit="px", scale=1.0
+            )
         if self.fit == "distortion":
             value = np.array(self.distortion, dtype=float)
             own["lens"] = Unknown(kind="number", value=value, labels=LENS, unit="", scale=0.01)
@@ -205,7 +207,7 @@ class CameraBoard(Measurement):
         bent = (pixels[known] - [cx, cy]) / [fx, fy]
         image = bent.copy()
         for _ in range(UNDISTORTIONS):
-            image += bent - np.column_stack(_distorted(*image.T, self.distortion))
+            image += bent - np.column_stack(_distorted(image[:, 0], image[:, 1], self.distortion))
         x, y = self.corners[known, 0], self.corners[known, 1]
         one, zero = np.ones_like(x), np.zeros_like(x)
         upper = np.column_stack([x, y, one, zero, zero, zero, -image[:, 0] * x, -image[:, 0] * y, -image[:, 0]])
@@ -233,11 +235,13 @@ def _distorted(x: Any, y: Any, lens: Sequence[Any]) -> tuple[Any, Any]:
     square = x * x + y * y
     radial = 1.0 + square * (k1 + square * (k2 + square * k3))
     across = 2.0 * x * y
-    return x * radial + p1 * across + p2 * (square + 2.0 * x * x), y * radial + p1 * (square + 2.0 * y * y) + p2 * across
+    return x * radial + p1 * across + p2 * (square + 2.0 * x * x), y * radial + p1 * (
+        square + 2.0 * y * y
+    ) + p2 * across
 
 
 def _bent(x: Array, y: Array, lens: Array) -> tuple[Array, Array, Array]:
-    """Directions that a lens shows (..., 2), and their derivatives by the direction (..., 2, 2) and the lens (..., 2, 5)."""
+    """Directions that a lens shows (..., 2), and derivatives by the direction (..., 2, 2) and the lens (..., 2, 5)."""
     k1, k2, p1, p2, k3 = lens
     square = x * x + y * y
     radial = 1.0 + square * (k1 + square * (k2 + square * k3))
@@ -250,7 +254,7 @@ def _bent(x: Array, y: Array, lens: Array) -> tuple[Array, Array, Array]:
     first = [x * square, x * square**2, 2.0 * x * y, square + 2.0 * x * x, x * square**3]
     second = [y * square, y * square**2, square + 2.0 * y * y, 2.0 * x * y, y * square**3]
     by_lens = np.stack([np.stack(first, axis=-1), np.stack(second, axis=-1)], axis=-2)
-    return np.stack(_distorted(x, y, lens), axis=-1), by_place, by_lens
+    return np.stack(_distorted(x, y, lens.tolist()), axis=-1), by_place, by_lens
 
 
 def _inverse(pose: casadi.SX) -> casadi.SX:

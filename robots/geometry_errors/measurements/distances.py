@@ -91,9 +91,7 @@ class Distances(Measurement):
         flange, parts = moved
         place = flange[:3, :3] @ parts["tool"] + flange[:3, 3]
         zeros = [parts[f"offset_{k + 1}"] if self.offset else casadi.SX(0.0) for k in range(self.count)]
-        return casadi.vertcat(
-            *(casadi.norm_2(place - parts[f"anchor_{k + 1}"]) + zero for k, zero in enumerate(zeros))
-        )
+        return casadi.vertcat(*(casadi.norm_2(place - parts[f"anchor_{k + 1}"]) + zero for k, zero in enumerate(zeros)))
 
     def simulate(self, flanges: Sequence[Array], setup: Setup, noise: Mapping[str, float], seed: int) -> Array:
         """Gives distances (N, count) [m]."""

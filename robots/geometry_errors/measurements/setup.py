@@ -96,6 +96,5 @@ def moved_setup(setup: Setup, step: Array) -> Setup:
 def known_setup(setup: Setup, values: Mapping[str, Array]) -> Setup:
     """Gives a setup in which some parts are known and stay as they are."""
     return {
-        name: replace(part, value=values[name], known=True) if name in values else part
-        for name, part in setup.items()
+        name: replace(part, value=values[name], known=True) if name in values else part for name, part in setup.items()
     }

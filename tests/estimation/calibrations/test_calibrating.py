@@ -13,7 +13,15 @@ from estimation import calibrate, load_calibration
 from estimation.calibrations import CalibrationOptions
 from estimation.calibrations.selection import select_kinds
 from robots.common.errors import InputError, NotIdentifiableError
-from robots.geometry_errors import CameraBoard, Distances, Inclinometer, Markers, error_term, random_positions, simulate_poses
+from robots.geometry_errors import (
+    CameraBoard,
+    Distances,
+    Inclinometer,
+    Markers,
+    error_term,
+    random_positions,
+    simulate_poses,
+)
 from tests.estimation.calibrations.conftest import NOISE, measured
 
 FIXED = CalibrationOptions(kinds=("joint_zero", "link_placement"), diagnose=False)
@@ -224,9 +232,7 @@ def test_a_camera_is_calibrated_with_the_robot(ur10):
         drawn = random_positions(ur10, 4000, seed=int(rng.integers(1 << 30)))
         seen = np.isfinite(simulate_poses(ur10, drawn, true, {}, setup=setup).observed).all(axis=1)
         q += list(drawn[seen])
-    poses = simulate_poses(
-        ur10, np.array(q[:40]), true, {"zero_3": 0.004}, setup=setup, noise={"px": 0.2}, seed=3
-    )
+    poses = simulate_poses(ur10, np.array(q[:40]), true, {"zero_3": 0.004}, setup=setup, noise={"px": 0.2}, seed=3)
     fitted = CameraBoard(intrinsics=(1000.0, 1000.0, 640.0, 480.0), fit="distortion")
     options = CalibrationOptions(kinds=("joint_zero",), diagnose=False)
     found = {p.name: p for p in calibrate(ur10, replace(poses, measurement=fitted), options=options).parameters}

@@ -61,7 +61,7 @@ def test_smooth_errors_of_no_known_cause_are_unexplained(robots):
 
 
 def test_backlash_by_load_is_told_from_backlash_by_approach():
-    """A gap that gravity closes on one side is named, and fitted to its size; the direction of approach is not blamed."""
+    """A gap that gravity closes on one side is named with its size; the direction of approach is not blamed."""
     robot = load_robot("ur10")
     arm, rng = oracle.Arm.of(robot), np.random.default_rng(3)
     q = random_positions(robot, 60, seed=4)

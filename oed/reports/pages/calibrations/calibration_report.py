@@ -116,7 +116,9 @@ def _session_picture(calibration: Calibration) -> Iterator[Picture]:
             own = [values[np.isfinite(values)] for values in own]
             mean = np.array([values.mean() if len(values) else np.nan for values in own])
             # Two standard errors of the mean.
-            error = np.array([2.0 * values.std(ddof=1) / np.sqrt(len(values)) if len(values) > 1 else 0.0 for values in own])
+            error = np.array(
+                [2.0 * values.std(ddof=1) / np.sqrt(len(values)) if len(values) > 1 else 0.0 for values in own]
+            )
             series.append(Series(x=numbers.astype(float), y=mean, error=error, name=name, kind="markers", role=role))
         label = f"mean error [{unit}]"
         panels.append(Panel(title=title, x_label="session", y_label=label, series=tuple(series)))
