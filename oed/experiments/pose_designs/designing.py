@@ -136,7 +136,7 @@ def design_poses(
         bar.update(0.1, "exchanging poses")
         rows = information.rows(candidates)
         chosen = exchanged(rows, count, judge)
-        q = candidates[chosen]
+        q, before = candidates[chosen], np.einsum("nrl,nrk->lk", rows[chosen], rows[chosen])
         bar.update(0.4, "moving poses")
         if how.refine:
             q = refined(
@@ -181,6 +181,7 @@ def design_poses(
         parameters=information.parameters,
         eigenvalues=np.linalg.eigvalsh(total),
         random_eigenvalues=np.linalg.eigvalsh(np.einsum("nrl,nrk->lk", some, some)),
+        exchanged_eigenvalues=np.linalg.eigvalsh(before),
         expected=information.spread(total),
         prediction=information.prediction_error(total, elsewhere),
         unit=how.measurement.unit,
