@@ -241,7 +241,8 @@ def _search(state: _State, reduction: Reduction, sizes: Mapping[str, float], use
 def _solved(matrix: Array, right: Array) -> Array:
     """Solves normal equations; what they do not determine stays where it is."""
     values, vectors = np.linalg.eigh(matrix)
-    inverse = np.where(values > np.finfo(float).eps * values[-1], 1.0 / np.maximum(values, np.finfo(float).tiny), 0.0)
+    least = np.finfo(float).eps * values.max(initial=0.0)
+    inverse = np.where(values > least, 1.0 / np.maximum(values, np.finfo(float).tiny), 0.0)
     return np.asarray(vectors @ (inverse * (vectors.T @ right)))
 
 

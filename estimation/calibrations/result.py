@@ -292,6 +292,8 @@ class Calibration(Result, format="robot-oed calibration"):
         lines += [f"    {item.name:22} {item.text}" for item in ranked[:12]]
         if len(ranked) > 12:
             lines.append(f"    and {len(ranked) - 12} more in {self.FILE}")
+        optics = [item for item in self.parameters if item.kind == "setup" and item.unit not in ("m", "rad")]
+        lines += [f"    {item.name:22} {item.text}" for item in optics]
         for cause in self.causes.get("findings", ()):
             lines.append(f"  cause: {cause['sentence']}")
         lines += [f"  outlier: pose {o.pose} (line {o.line}) is off by {self.shown(o.error)}" for o in self.outliers]

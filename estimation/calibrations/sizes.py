@@ -103,6 +103,8 @@ def estimate_sizes(
 
 def _inverse(matrix: Array) -> Array:
     """Inverse of normal equations in columns of length one; the pseudo-inverse where they are singular."""
+    if not matrix.size:
+        return matrix
     triangle, failed = dpotrf(matrix, lower=1, clean=1)
     if failed or np.diag(triangle).min(initial=1.0) < SINGULAR:
         return np.asarray(np.linalg.pinv(matrix, hermitian=True), dtype=np.float64)

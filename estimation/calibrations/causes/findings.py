@@ -91,8 +91,9 @@ class CauseFinding(Record):
         if len(self.parameters) == 1:
             item = self.parameters[0]
             unit, factor = item["shown"]
-            low, high = (two_digits(factor * x) for x in item["ci95"])
-            return f"{two_digits(factor * item['value'])} ({low} to {high}) {unit}"
+            # Intervals are often narrower than two digits tell.
+            value, low, high = (f"{float(f'{factor * x:.3g}'):g}" for x in (item["value"], *item["ci95"]))
+            return f"{value} ({low} to {high}) {unit}"
         shown = {item["unit"]: item["shown"] for item in self.parameters}
         parts = [f"{two_digits(shown[unit][1] * square**0.5)} {shown[unit][0]}" for unit, square in by_unit.items()]
         return " and ".join(parts)
