@@ -258,10 +258,7 @@ def causes(cases: int, without: int, first: int) -> None:
             f"{'' if not extra else '  FALSE'}",
             flush=True,
         )
-    print(
-        f"named {named} of {cases} ({100 * named / max(cases, 1):.0f} %); named but not there: {false} in "
-        f"{cases + without} cases"
-    )
+    print(f"named {named} of {max(cases - first, 0)}; named but not there: {false} in {cases + without - first} cases")
 
 
 def designs(names: list[str], sets: int) -> None:

@@ -212,7 +212,7 @@ class _Allowed:
         self._information, self._how, self._model = information, how, model
 
     def __call__(self, q: Array) -> NDArray[np.bool_]:
-        ok = np.ones(len(q), dtype=bool)
+        ok = self._information.seen(q)
         if self._how.view is not None:
             ok &= self._how.view.sees(self._information.flange(q))
         if self._model is not None and self._model.pairs:

@@ -93,6 +93,10 @@ class PoseInformation:
         """Nominal flange of poses (N, 4, 4)."""
         return self.robot.chain.flange(q)
 
+    def seen(self, q: Array) -> NDArray[np.bool_]:
+        """Says at which poses a nominal robot shows something to the instrument (N,)."""
+        return np.isfinite(self.measurement.simulate([self.flange(q)], self.setup, {}, 0)).any(axis=1)
+
     def spread(self, information: Array) -> Array:
         """Standard errors of the parameters in SI units (L,), NaN without information.
 

@@ -112,9 +112,7 @@ class PoseDesign(Planned, format="robot-oed pose design", tool=True):
             "by exchange alone": self.exchanged_eigenvalues,
             "random": self.random_eigenvalues,
         }
-        return {
-            name: observability_indices(values, len(self.q)) for name, values in sets.items() if values is not None
-        }
+        return {name: observability_indices(values, len(self.q)) for name, values in sets.items() if values is not None}
 
     @property
     def stated_parameters(self) -> list[dict[str, Any]]:

@@ -13,7 +13,7 @@ from oed.experiments.pose_designs.observability import pose_criterion
 from oed.experiments.pose_designs.refinement import PoseProblem, refined
 from robots import load_robot
 from robots.common.errors import InfeasibleError, InputError
-from robots.geometry_errors import Markers, random_positions
+from robots.geometry_errors import CameraBoard, Markers, random_positions
 
 
 @pytest.fixture(scope="module")
@@ -60,6 +60,19 @@ def test_refinement_has_exact_gradients(robot, name):
     ahead, behind = (problem.surrogate(z + step * way, 8.0)[0] for step in (1e-5, -1e-5))
     # The third derivative times the square of the step.
     assert gradient @ way == pytest.approx((ahead - behind) / 2e-5, rel=1e-5, abs=1e-7)
+
+
+def test_only_poses_that_show_the_board_are_designed(robot):
+    """A pose at which a camera has the board out of its image informs of nothing, and is no candidate."""
+    camera = CameraBoard(rows=2, across=2)
+    information = PoseInformation(robot, camera, ("joint_zero",), {"px": 0.2})
+    q = random_positions(robot, 3000, seed=2)
+    seen = information.seen(q)
+    assert 0 < seen.sum() < len(q)
+    # The board's first corner lies ahead of the camera, and within the image, by plain projection.
+    corner = np.linalg.inv(robot.chain.flange(q[seen])) @ np.array([0.5, 0.0, 0.0, 1.0])
+    pixels = 1000.0 * corner[:, :2] / corner[:, 2:3] + (640.0, 480.0)
+    assert ((pixels >= 0.0) & (pixels <= (1280.0, 960.0)) & (corner[:, 2:3] > 0.0)).all()
 
 
 def test_refinement_improves_within_limits(robot):
