@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from oed.criteria import Criterion
 from oed.experiments.assembly import rest_pose
 from oed.experiments.checks import usable_limits, velocity_share
 from oed.experiments.pose_designs.exchange import exchanged
@@ -32,6 +33,7 @@ from robots.signals import Motion
 Array = NDArray[np.float64]
 
 CANDIDATES = 1000
+AGAIN = 1  # exchanges after poses have moved
 DRAWS = 60  # times so many poses are drawn before the limits in space are called too tight
 REPAIRS = 4  # times an order is sought anew without a move that was found to collide
 NOISE = {"m": 1e-4, "rad": 1e-4, "px": 0.2}
@@ -139,17 +141,7 @@ def design_poses(
         q, before = candidates[chosen], np.einsum("nrl,nrk->lk", rows[chosen], rows[chosen])
         bar.update(0.4, "moving poses")
         if how.refine:
-            q = refined(
-                information,
-                q,
-                judge,
-                bounds,
-                allowed,
-                model=model,
-                clearance=how.clearance,
-                view=how.view,
-                progress=lambda share: bar.update(0.4 + 0.3 * share),
-            )
+            q = _moved(information, q, judge, bounds, allowed, model, how, candidates, bar)
         bar.update(0.7, "ordering moves")
         home = _home(usable, how, allowed, candidates)
         moves, paths = Moves(usable, robot.period), Paths(model, how.clearance / 2.0, bounds, how.seed)
@@ -248,6 +240,41 @@ def _candidates(bounds: tuple[Array, Array], allowed: _Allowed, count: int, seed
             remedy="widen the cone of view, lower --clearance, or state other surroundings (--floor, --no-floor)",
         )
     return np.concatenate(found)[:count]
+
+
+def _moved(
+    information: PoseInformation,
+    q: Array,
+    judge: Criterion,
+    bounds: tuple[Array, Array],
+    allowed: _Allowed,
+    model: CollisionModel | None,
+    how: PoseOptions,
+    candidates: Array,
+    bar: Progress,
+) -> Array:
+    """Moves poses to where the criterion is best, exchanges those that are now superfluous, and moves them again."""
+    for round_ in range(1 + AGAIN):
+        done = 0.4 + 0.3 * round_ / (1 + AGAIN)
+        q = refined(
+            information,
+            q,
+            judge,
+            bounds,
+            allowed,
+            model=model,
+            clearance=how.clearance,
+            view=how.view,
+            progress=lambda share, done=done: bar.update(done + 0.3 * share / (1 + AGAIN)),  # type: ignore[misc]
+        )
+        if round_ == AGAIN:
+            break
+        pool, own = np.vstack([candidates, q]), range(len(candidates), len(candidates) + len(q))
+        chosen = exchanged(information.rows(pool), len(q), judge, start=list(own))
+        if set(chosen) <= set(own):
+            break
+        q = pool[chosen]
+    return q
 
 
 def _replaced(q: Array, lost: tuple[int, ...], home: Array, candidates: Array, rows: Array, paths: Paths) -> Array:
