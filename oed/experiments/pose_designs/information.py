@@ -95,7 +95,7 @@ class PoseInformation:
 
     def seen(self, q: Array) -> NDArray[np.bool_]:
         """Says at which poses a nominal robot shows something to the instrument (N,)."""
-        return np.isfinite(self.measurement.simulate([self.flange(q)], self.setup, {}, 0)).any(axis=1)
+        return np.asarray(np.isfinite(self.measurement.simulate([self.flange(q)], self.setup, {}, 0)).any(axis=1))
 
     def spread(self, information: Array) -> Array:
         """Standard errors of the parameters in SI units (L,), NaN without information.
