@@ -186,3 +186,17 @@ def test_recordings_of_motion_capture_are_refused(robot, tmp_path, start, system
     path.write_text(f"{start}\n\n,Type,Rigid Body\n")
     with pytest.raises(OedError, match=f"{system}.*average the frames"):
         read_poses(path, robot)
+
+
+@pytest.mark.parametrize(
+    ("known", "message"),
+    [
+        ({"tracker": np.zeros(3)}, "tracker is known as a point; allowed: tracker=X,Y,Z,ROLL,PITCH,YAW"),
+        ({"marker_1": np.eye(4)}, "marker_1 is known as a pose; allowed: marker_1=X,Y,Z"),
+        ({"lens": np.zeros(3)}, "no 'lens'; allowed: tracker, marker_1"),
+    ],
+)
+def test_known_parts_of_another_kind_are_refused(robot, tmp_path, known, message):
+    """A pose that is known as a point, a point that is known as a pose, and a part that there is not."""
+    with pytest.raises(OedError, match=message):
+        read(robot, tmp_path, columns(robot, Markers()), known=known)
