@@ -18,6 +18,7 @@ import numpy as np
 sys.path.insert(0, str(Path(__file__).parents[1]))
 
 from benchmarks.calibration_parts import oracle
+from benchmarks.calibration_parts.pose_bounds import best_information
 from estimation.calibrations import CalibrationOptions, calibrate
 from estimation.calibrations.fit import fit_geometry, preference
 from robots import load_robot
@@ -56,13 +57,13 @@ def measured(robot, q, errors, setup, rng, noise=NOISE) -> MeasuredPoses:
     return MeasuredPoses(q=q, measurement=Markers(count=3), observed=observed, approach=approaches(q))
 
 
-def arms(draws: int, name: str, select: bool) -> None:
+def arms(draws: int, name: str, select: bool, first: int) -> None:
     """Held-out error and coverage of intervals over virtual arms."""
     robot = robot_of(name)
     arm = oracle.Arm.of(robot)
     hits = total = 0
     errors_, ratios, wrong, names = [], [], 0, set()
-    for draw in range(draws):
+    for draw in range(first, first + draws):
         rng = np.random.default_rng(draw)
         truth, setup = oracle.usual_errors(arm, rng), oracle.usual_setup(rng)
         poses = measured(robot, random_positions(robot, 40, seed=draw), truth, setup, rng)
@@ -91,9 +92,9 @@ def arms(draws: int, name: str, select: bool) -> None:
         ratios.append(errors_[-1] / NOISE)
         if (draw + 1) % 10 == 0:
             print(
-                f"{name}: {draw + 1} draws, held out {1e3 * np.median(errors_):.4f} mm per number "
+                f"{name}: draws {first} to {draw}, held out {1e3 * np.median(errors_):.4f} mm per number "
                 f"({np.median(ratios):.3f} of the noise, worst {np.max(ratios):.3f}); 95 % intervals hold "
-                f"{100 * hits / total:.1f} % of {total}; determined but not by exact poses: {wrong}",
+                f"{100 * hits / total:.1f} % of {total} ({hits}); determined but not by exact poses: {wrong}",
                 flush=True,
             )
 
@@ -239,11 +240,11 @@ def hidden(kind: str, seed: int, robots) -> tuple[object, int | None, MeasuredPo
     return robot, joint + 1 if at_joint else None, poses
 
 
-def causes(cases: int, without: int) -> None:
+def causes(cases: int, without: int, first: int) -> None:
     """Hidden causes: how often the one that is there is named, and how often one that is not."""
     robots = [robot_of(name) for name in ("ur10", "panda", "er3a")]
     named = false = 0
-    for number in range(cases + without):
+    for number in range(first, cases + without):
         kind = CAUSES[number % len(CAUSES)] if number < cases else "none"
         robot, joint, poses = hidden(kind, number, robots)
         found = calibrate(robot, poses).causes["findings"]
@@ -257,14 +258,11 @@ def causes(cases: int, without: int) -> None:
             f"{'' if not extra else '  FALSE'}",
             flush=True,
         )
-    print(
-        f"named {named} of {cases} ({100 * named / max(cases, 1):.0f} %); named but not there: {false} in "
-        f"{cases + without} cases"
-    )
+    print(f"named {named} of {max(cases - first, 0)}; named but not there: {false} in {cases + without - first} cases")
 
 
 def designs(names: list[str], sets: int) -> None:
-    """Designed poses against random ones: errors of 20 against 60, and O1 against the best of many random sets."""
+    """Designed poses against random ones: errors of 20 against 60, what is possible at all, and O1."""
     from oed.experiments.pose_designs import PoseOptions, design_poses, observability_indices
     from oed.experiments.pose_designs.designing import _Allowed, _bounds, _candidates
     from oed.experiments.pose_designs.exchange import exchanged
@@ -280,7 +278,7 @@ def designs(names: list[str], sets: int) -> None:
         information = PoseInformation(robot, options.measurement, options.kinds, options.levels)
         model = options.surroundings.model(robot)
         bounds = _bounds(robot.limits, options.range_share, robot.chain.kinds)
-        pool = _candidates(bounds, _Allowed(information, options, model), 4000, 77)
+        pool = _candidates(bounds, _Allowed(information, options, model), 2000, 77)
         rows = information.rows(pool)
         rng = np.random.default_rng(1)
         best = 0.0
@@ -289,27 +287,37 @@ def designs(names: list[str], sets: int) -> None:
             values = np.linalg.eigvalsh(np.einsum("nrl,nrk->lk", own, own))
             best = max(best, observability_indices(values, 20)["O1"])
         # "By exchange alone": the best random set of 20, improved by exchange among the same poses.
-        alone = exchanged(rows[:1000], 20, pose_criterion("d"))
-        own = rows[alone]
+        own = rows[exchanged(rows[:1000], 20, pose_criterion("d"))]
         exchange = observability_indices(np.linalg.eigvalsh(np.einsum("nrl,nrk->lk", own, own)), 20)["O1"]
         elsewhere = random_positions(robot, 300, seed=5)
-        sixty = []
-        for _ in range(50):
-            own = rows[rng.permutation(len(rows))[:60]]
-            total = np.einsum("nrl,nrk->lk", own, own)
-            sixty.append(
-                (
-                    information.prediction_error(total, elsewhere),
-                    float(np.exp(np.mean(np.log(information.spread(total))))),
-                )
-            )
-        spread = float(np.exp(np.mean(np.log(design.expected))))
-        prediction, error = np.median(sixty, axis=0)
+        grams = np.swapaxes(rows, 1, 2) @ rows
+        sixty = [grams[rng.permutation(len(rows))[:60]].sum(axis=0) for _ in range(50)]
+        volume = lambda total: float(np.exp(-0.5 * np.linalg.slogdet(total)[1] / len(total)))  # noqa: E731
+        seen = information.rows(elsewhere) * information._sigma[:, None]
+        weight = np.einsum("nrl,nrk->lk", seen, seen)
+        own = information.rows(design.q)
+        total = np.einsum("nrl,nrk->lk", own, own)
         print(
             f"{name}: O1 of 20 designed {design.observability['O1']:.4g}, best of {sets} random sets {best:.4g}, "
-            f"exchange alone {exchange:.4g}; prediction error 20 designed {1e3 * design.prediction:.4f} mm, 60 random "
-            f"{1e3 * prediction:.4f} mm; geometric mean of standard errors, designed over 60 random "
-            f"{spread / error:.3f}; {took:.1f} s, success {design.success}",
+            f"exchange alone {exchange:.4g}; {took:.1f} s, success {design.success}",
+            flush=True,
+        )
+        random = np.median([volume(one) for one in sixty])
+        optimum, slack = best_information(information, pool[:400], bounds, None)
+        # log det of the true optimum is higher by L log(slack) at most.
+        print(
+            f"  mean error of the parameters (volume), over that of 60 random poses: designed "
+            f"{volume(total) / random:.3f}, best possible {volume(20.0 * optimum) / random:.3f} "
+            f"(at least {volume(20.0 * optimum) / random * np.exp(-0.5 * (slack - 1.0)):.3f})",
+            flush=True,
+        )
+        random = np.median([information.prediction_error(one, elsewhere) for one in sixty])
+        optimum, slack = best_information(information, pool[:400], bounds, weight)
+        possible = information.prediction_error(20.0 * optimum, elsewhere) / random
+        print(
+            f"  error of predicted positions, over that of 60 random poses: designed "
+            f"{information.prediction_error(total, elsewhere) / random:.3f}, best possible {possible:.3f} "
+            f"(at least {possible * np.sqrt(max(2.0 - slack, 0.0)):.3f})",
             flush=True,
         )
 
@@ -349,14 +357,16 @@ def tiago(folder: Path, urdf: Path) -> None:
         both = {}
         for day, path in files.items():
             table = pd.read_csv(path)
+            q = table[list(RIGID)].to_numpy()
+            # Rows come in the order of time, so that each joint's last direction is known.
             both[day] = MeasuredPoses(
-                q=table[list(RIGID)].to_numpy(), measurement=Markers(count=count), observed=table[columns].to_numpy()
+                q=q, measurement=Markers(count=count), observed=table[columns].to_numpy(), approach=approaches(q)
             )
         train, check = both["30"], both["26"]
         near = np.array([np.min(np.max(np.abs(train.q - x), axis=1)) for x in check.q]) < 0.01
         low, high = train.q.min(axis=0) - 0.05, train.q.max(axis=0) + 0.05
         outside = ((check.q < low) | (check.q > high)).any(axis=1)
-        for kinds in ((), ("joint_zero",), ("joint_zero", "link_placement"), None):
+        for kinds in ((), ("joint_zero",), ("joint_zero", "backlash"), ("joint_zero", "link_placement"), None):
             found = calibrate(robot, train, options=CalibrationOptions(kinds=kinds, diagnose=False))
             terms = [error_term(kind) for kind in found.kinds]
             own = {item.name: item.value for item in found.errors}
@@ -385,11 +395,13 @@ def main() -> None:
     one.add_argument("--draws", type=int, default=200)
     one.add_argument("--robot", default="ur10")
     one.add_argument("--select", action="store_true", help="choose the kinds by held-out poses, too")
+    one.add_argument("--first", type=int, default=0, help="number of the first draw")
     two = commands.add_parser("rank")
     two.add_argument("--urdf", nargs="*", default=[], help="FILE or FILE:joint,joint")
     three = commands.add_parser("causes")
     three.add_argument("--cases", type=int, default=60)
     three.add_argument("--without", type=int, default=20)
+    three.add_argument("--first", type=int, default=0, help="number of the first case")
     four = commands.add_parser("designs")
     four.add_argument("--robots", nargs="*", default=["ur10", "er3a", "panda", "scara"])
     four.add_argument("--sets", type=int, default=1000)
@@ -399,11 +411,11 @@ def main() -> None:
     five.add_argument("--urdf", type=Path, required=True)
     chosen = parser.parse_args()
     if chosen.command == "arms":
-        arms(chosen.draws, chosen.robot, chosen.select)
+        arms(chosen.draws, chosen.robot, chosen.select, chosen.first)
     elif chosen.command == "rank":
         rank(chosen.urdf)
     elif chosen.command == "causes":
-        causes(chosen.cases, chosen.without)
+        causes(chosen.cases, chosen.without, chosen.first)
     elif chosen.command == "designs":
         designs(chosen.robots, chosen.sets)
     elif chosen.command == "speed":

@@ -73,8 +73,14 @@ def scaled_rows(
     """Gives the rows (R, P) and targets (R,) of least squares; what was not measured is left out."""
     factor = weights.rows(model.poses.measurement.units)
     seen = np.isfinite(found.residual) & (factor > 0.0)
-    matrix = found.jacobian[seen] * factor[seen][:, None]
-    return matrix if columns is None else matrix[:, list(columns)], found.residual[seen] * factor[seen]
+    jacobian = found.jacobian if columns is None else found.jacobian[:, :, list(columns)]
+    return jacobian[seen] * factor[seen][:, None], _scaled(found.residual, weights, model)
+
+
+def _scaled(residual: Array, weights: Weights, model: GeometryModel) -> Array:
+    factor = weights.rows(model.poses.measurement.units)
+    seen = np.isfinite(residual) & (factor > 0.0)
+    return np.asarray(residual[seen] * factor[seen])
 
 
 def preference(parameters: Sequence[ErrorParameter]) -> list[list[int]]:
@@ -206,24 +212,23 @@ def _search(state: _State, reduction: Reduction, sizes: Mapping[str, float], use
         matrix, target = scaled_rows(found, weights, model, kept)
         now = _State(model, values, setup, found, weights)
         inverse, value = _prior(now, kept, sizes)
-        matrix = np.vstack([matrix * scale[kept], np.diag(inverse)])
-        target = np.concatenate([target, -inverse * value])
-        lengths, cost, rows = np.linalg.norm(matrix, axis=0), float(target @ target), len(target)
-        # A triangle has the same normal equations, and few rows.
-        both = np.asarray(np.linalg.qr(np.column_stack([matrix, target]), mode="r"))
-        triangle, aim = both[:, :-1], both[:, -1]
+        # Normal equations in columns of length one: a step that rounding makes inexact is mended by the next.
+        matrix = matrix * scale[kept]
+        lengths = np.sqrt(np.sum(matrix**2, axis=0) + inverse**2)
+        lengths = np.maximum(lengths, np.finfo(float).tiny)
+        gram = (matrix.T @ matrix + np.diag(inverse**2)) / np.outer(lengths, lengths)
+        aim = (matrix.T @ target - inverse**2 * value) / lengths
+        cost, rows = float(target @ target) + float(np.sum((inverse * value) ** 2)), len(target)
         moved = False
         while damping < DAMPED:
-            system = np.vstack([triangle, np.sqrt(damping) * np.diag(lengths)])
-            step = np.linalg.lstsq(system, np.concatenate([aim, np.zeros(len(kept))]), rcond=None)[0]
+            step = _solved(gram + damping * np.eye(len(kept)), aim) / lengths
             whole = np.zeros(len(scale))
             whole[kept] = step * scale[kept]
             tried = values + whole[:errors], moved_setup(setup, whole[errors:])
-            new = model.evaluate(*tried)
-            _, remaining = scaled_rows(replace(new, jacobian=new.jacobian[:, :, :0]), weights, model)
+            remaining = _scaled(model.residual(*tried), weights, model)
             left = float(remaining @ remaining) + float(np.sum((inverse * (value + step)) ** 2))
-            if len(remaining) + len(kept) == rows and left <= cost:
-                values, setup, found = *tried, new
+            if len(remaining) == rows and left <= cost:
+                values, setup, found = *tried, model.evaluate(*tried)
                 damping, moved = max(damping * GAIN, 1e-12), True
                 break
             damping *= LOSS
@@ -231,6 +236,14 @@ def _search(state: _State, reduction: Reduction, sizes: Mapping[str, float], use
             break
         damping = min(damping, 1.0)
     return _State(model, values, setup, found, weights)
+
+
+def _solved(matrix: Array, right: Array) -> Array:
+    """Solves normal equations; what they do not determine stays where it is."""
+    values, vectors = np.linalg.eigh(matrix)
+    least = np.finfo(float).eps * values.max(initial=0.0)
+    inverse = np.where(values > least, 1.0 / np.maximum(values, np.finfo(float).tiny), 0.0)
+    return np.asarray(vectors @ (inverse * (vectors.T @ right)))
 
 
 def _sizes(state: _State, reduction: Reduction, sizes: Mapping[str, float]) -> dict[str, float]:
@@ -262,9 +275,10 @@ def _spread(
         matrix, _ = scaled_rows(state.found, weights, state.model, kept)
         matrix = np.vstack([matrix * scale, np.diag(inverse)])
         lengths = np.maximum(np.linalg.norm(matrix, axis=0), np.finfo(float).tiny)
-        basis, triangle = np.linalg.qr(matrix / lengths)
+        triangle = np.asarray(np.linalg.qr(matrix / lengths, mode="r"))
         seen = np.isfinite(residual) & (weights.rows(units) > 0.0)
-        hat[seen] = np.sum(basis[: int(seen.sum())] ** 2, axis=1)
+        basis = (matrix[: int(seen.sum())] / lengths) @ np.linalg.inv(triangle)
+        hat[seen] = np.sum(basis**2, axis=1)
         before = dict(weights.sigma)
         weights = replace(weights, sigma=least_squares_sigma(shared, hat, units, used))
         if all(abs(np.log(weights.sigma[unit] / before[unit])) < 1e-3 for unit in before):

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -24,8 +24,8 @@ class CalibrationOptions:
 
     Attributes:
         kinds: kinds of errors to fit, comma-separated: joint_zero, link_placement, gear_ratio, eccentricity,
-            joint_compliance, link_compliance, thermal_growth, backlash, time_offset, base_motion. Default: those that
-            held-out poses support.
+            joint_compliance, link_compliance, thermal_growth, backlash, load_backlash, time_offset, base_motion.
+            Default: those that held-out poses support.
         diagnose: look for the causes of the errors.
         seed: seed of the random numbers.
 
@@ -77,6 +77,23 @@ def read_camera(option: str, text: str) -> tuple[float, float, float, float]:
     return fx, fy, cx, cy
 
 
+def read_lens(option: str, text: str) -> tuple[float, float, float, float, float]:
+    """Reads the four or five numbers of a lens.
+
+    Args:
+        option: for the message.
+        text: as typed.
+
+    Raises:
+        InputError: something else.
+    """
+    values = numbers(option, text)
+    if len(values) not in (4, 5):
+        raise InputError(f"{option} {text}", allowed="K1,K2,P1,P2 or K1,K2,P1,P2,K3, as OpenCV has them")
+    k1, k2, p1, p2, k3 = (*values, 0.0)[:5]
+    return k1, k2, p1, p2, k3
+
+
 def read_part(option: str, text: str) -> tuple[str, ArrayLike]:
     """Reads a known part of the setup: its name, and a point (3,) or a pose (4, 4).
 
@@ -108,7 +125,9 @@ class TableOptions:
             names, unless the order is wxyz: then the file has them swapped.
         offset: distances: estimate the zero of the instrument, too (draw wires).
         board: camera: corners across, corners along, spacing [m] of the board.
-        intrinsics: camera: FX,FY,CX,CY [px], without distortion.
+        intrinsics: camera: FX,FY,CX,CY [px].
+        distortion: camera: K1,K2,P1,P2[,K3] of its lens, as OpenCV has them.
+        fit_camera: camera: what is fitted of it beside its place: known (nothing), intrinsics, or distortion (both).
         camera_on_flange: whether the camera is on the flange, and the board stands.
         known: a part of the setup that is known, as NAME=X,Y,Z[,ROLL,PITCH,YAW] [m, rad]: tracker (the pose of the base
             in the tracker's frame), tool, marker_1. Repeatable.
@@ -124,12 +143,17 @@ class TableOptions:
     offset: bool = False
     board: Annotated[tuple[int, int, float] | None, Option(reads=read_board)] = None
     intrinsics: Annotated[tuple[float, float, float, float] | None, Option(reads=read_camera, name="camera")] = None
+    distortion: Annotated[tuple[float, float, float, float, float] | None, Option(reads=read_lens)] = None
+    fit_camera: str = "known"
     camera_on_flange: Annotated[bool, Option(hidden=True)] = True
     known: Annotated[Mapping[str, Any], Option(reads=read_part, several=True)] = field(default_factory=dict)
     temperature: float | None = None
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "known", dict(self.known))
-        for name, allowed in (("lengths", LENGTHS), ("angles", ANGLES), ("quaternion", ORDERS)):
+        from robots.geometry_errors.measurements.camera import FITS
+
+        allowed_: dict[str, Iterable[str]] = {"lengths": LENGTHS, "angles": ANGLES, "quaternion": ORDERS}
+        for name, allowed in (allowed_ | {"fit_camera": FITS}).items():
             if getattr(self, name) not in allowed:
                 raise InputError(f"{name} {getattr(self, name)!r}", allowed=" or ".join(allowed))

@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from os import PathLike
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
+from estimation.calibrations.column_names import column_names, refuse_recordings
 from estimation.calibrations.options import ANGLES, LENGTHS, TableOptions
 from robots.common.errors import InputError
 from robots.common.files import sha256
@@ -53,7 +55,8 @@ def read_poses(
 
     Columns: ``q1..qn`` or the joints' names; what was measured (see the documentation); optionally ``t`` [s],
     ``session``, ``temp`` [degC], ``dq1..dqn``, and ``approach1..n`` (1 or -1). An empty cell was not measured. Without
-    columns of approach, the direction is that from the row before: poses are taken to be visited in order.
+    columns of approach, the direction is that from the row before: poses are taken to be visited in order. Names as
+    trackers and controllers write them are read, too (`column_names`), and units in the header or in a name.
 
     Args:
         path: the file.
@@ -70,6 +73,7 @@ def read_poses(
     """
     how = options or TableOptions()
     robots = [robot] if isinstance(robot, Robot) else list(robot)
+    refuse_recordings(Path(path))
     table = read_table(path)
     reader = _Reader(table, how)
     q = reader.joints(robots[0])
@@ -93,11 +97,17 @@ def read_poses(
             if how.temperature is None
             else np.full(len(q), how.temperature)
         ),
-        velocity=None if velocity is None else velocity * reader.turn(robots[0]),
+        velocity=None if velocity is None else velocity * reader.speed(robots[0]),
         approach=approaches(q) if approach is None else np.sign(approach),
         known={name: np.asarray(value, dtype=float) for name, value in how.known.items()},
         line=np.array([table.line(k) for k in range(len(q))], dtype=np.int64),
-        source={"file": str(path), "sha256": sha256(path), "lengths": how.lengths, "angles": how.angles},
+        source={
+            "file": str(path),
+            "sha256": sha256(path),
+            "lengths": how.lengths,
+            "angles": how.angles,
+            "not_read": [name for name in table.names if name not in reader.used],
+        },
     )
     poses = poses.part(~empty)
     if checked:
@@ -112,7 +122,10 @@ class _Reader:
 
     def __init__(self, table: Table, how: TableOptions) -> None:
         self.table, self.how = table, how
-        self.names = {name.strip().lower(): name for name in table.names}
+        self.names, stated = column_names(table.names)
+        # A unit in the header of the file is one of its column; one in a name is part of it.
+        self.units = {plain: table.units.get(name) or stated[plain] for plain, name in self.names.items()}
+        self.used: set[str] = set()
 
     def has(self, *names: str) -> bool:
         return all(name.lower() in self.names for name in names)
@@ -122,6 +135,7 @@ class _Reader:
         columns = []
         for name in names:
             stored = self.names[name.lower()]
+            self.used.add(stored)
             if self.table.is_text(stored):
                 raise InputError("is text", file=self.table.path, column=stored, allowed="numbers")
             values = np.asarray(self.table.columns[stored], dtype=float)
@@ -141,8 +155,34 @@ class _Reader:
     def optional(self, names: Sequence[str]) -> Array | None:
         return self.numbers(names) if self.has(*names) else None
 
-    def turn(self, robot: Robot) -> Array:
+    def lengths(self, names: Sequence[str]) -> Array:
+        """Columns of lengths (N, K) [m]; an empty cell was not measured."""
+        return self.numbers(names, empty=True) * self.factors(names, LENGTHS, self.how.lengths)
+
+    def factors(self, names: Sequence[str], units: Mapping[str, float], default: str) -> Array:
+        """Factors of columns to SI (K,), by their own units or the stated one."""
+        found = []
+        for name in names:
+            unit = self.units.get(name.lower()) or default
+            if unit not in units:
+                column, allowed = self.names[name.lower()], " or ".join(units)
+                raise InputError(f"unit {unit!r}", file=self.table.path, column=column, allowed=allowed)
+            found.append(units[unit])
+        return np.array(found)
+
+    def turn(self, robot: Robot, names: Sequence[str]) -> Array:
         """Factors of joint positions to SI (n,)."""
+        return np.concatenate(
+            [
+                self.factors([name], LENGTHS, self.how.lengths)
+                if kind == "prismatic"
+                else self.factors([name], ANGLES, self.how.angles)
+                for name, kind in zip(names, robot.chain.kinds, strict=True)
+            ]
+        )
+
+    def speed(self, robot: Robot) -> Array:
+        """Factors of joint velocities to SI (n,), in the units of the positions."""
         units = (self.how.lengths, self.how.angles)
         return np.array([LENGTHS[units[0]] if kind == "prismatic" else ANGLES[units[1]] for kind in robot.chain.kinds])
 
@@ -166,7 +206,7 @@ class _Reader:
                 column=more,
                 remedy="choose another robot or its joints (--robot, --joints)",
             )
-        return self.numbers(names) * self.turn(robot)
+        return self.numbers(names) * self.turn(robot, names)
 
     def session(self) -> NDArray[np.int64] | None:
         if not self.has("session"):
@@ -179,17 +219,18 @@ class _Reader:
 
     def measured(self, robots: Sequence[Robot]) -> tuple[Measurement, Array, Array | None]:
         """The kind of measurement, its numbers in SI units, and the positions of a second arm."""
-        length, angle = LENGTHS[self.how.lengths], ANGLES[self.how.angles]
         if len(robots) == 2:
             names = [f"other{i + 1}" for i in range(robots[1].n)]
             if not self.has(*names):
                 raise InputError(f"no columns other1 to other{robots[1].n} of the second arm", file=self.table.path)
             rows = len(self.table)
-            return HeldPart(), np.zeros((rows, 0)), self.numbers(names) * self.turn(robots[1])
+            return HeldPart(), np.zeros((rows, 0)), self.numbers(names) * self.turn(robots[1], names)
         if self.has("u1", "v1"):
             return self._camera()
         if self.has("roll", "pitch"):
-            return Inclinometer(), angle * self.numbers(["roll", "pitch"], empty=True), None
+            tilts = ["roll", "pitch"]
+            factors = self.factors(tilts, ANGLES, self.how.angles)
+            return Inclinometer(), self.numbers(tilts, empty=True) * factors, None
         if self.has("plane") or self.has("point"):
             name = "plane" if self.has("plane") else "point"
             kind: type[Planes] | type[Points] = Planes if name == "plane" else Points
@@ -201,14 +242,14 @@ class _Reader:
             return kind(count=int(numbers.max())), numbers, None
         if self.has("d") or self.has("d1"):
             names = ["d"] if self.has("d") else self._counted(["d"])
-            return Distances(count=len(names), offset=self.how.offset), length * self.numbers(names, empty=True), None
+            return Distances(count=len(names), offset=self.how.offset), self.lengths(names), None
         if self.has("x", "y", "z"):
-            place = length * self.numbers(["x", "y", "z"], empty=True)
+            place = self.lengths(["x", "y", "z"])
             turn = self._turn()
             return (Markers(count=1), place, None) if turn is None else (BodyPoses(), np.hstack([place, turn]), None)
         if self.has("x1", "y1", "z1"):
             names = self._counted(["x", "y", "z"])
-            return Markers(count=len(names) // 3), length * self.numbers(names, empty=True), None
+            return Markers(count=len(names) // 3), self.lengths(names), None
         raise InputError("no column of a measurement", file=self.table.path, allowed=SHOWN, remedy="rename the columns")
 
     def _counted(self, stems: Sequence[str]) -> list[str]:
@@ -277,6 +318,8 @@ class _Reader:
             rows=int(along),
             spacing=spacing,
             intrinsics=self.how.intrinsics,
+            distortion=self.how.distortion or (0.0, 0.0, 0.0, 0.0, 0.0),
+            fit=self.how.fit_camera,
             on_flange=self.how.camera_on_flange,
         )
         names = self._counted(["u", "v"])

@@ -6,6 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
+from scipy.spatial import KDTree
 
 from robots.geometry_errors.poses import MeasuredPoses
 
@@ -40,22 +43,23 @@ def repeatability(poses: MeasuredPoses, residual: Array, used: NDArray[np.bool_]
         residual: (N, r).
         used: which count (N,).
     """
-    groups: list[list[int]] = []
-    for row in np.flatnonzero(used):
-        near = next((g for g in groups if np.abs(poses.q[g[0]] - poses.q[row]).max() < SAME), None)
-        if near is None:
-            groups.append([int(row)])
-        else:
-            near.append(int(row))
-    again = [group for group in groups if len(group) > 1]
-    if not again:
+    rows = np.flatnonzero(used)
+    numbers = connected_components(coo_array(_near(poses.q[rows])), directed=False)[1]
+    groups = [rows[numbers == number] for number in np.flatnonzero(np.bincount(numbers) > 1)]
+    if not groups:
         return None
     square, freedom = 0.0, 0
-    for group in again:
+    for group in groups:
         own = residual[group]
         errors = poses.measurement.error(own - np.nanmean(own, axis=0))
         square += float(np.nansum(errors**2))
         freedom += len(group) - 1
-    return Repeatability(
-        error=float(np.sqrt(square / freedom)), poses=len(again), visits=sum(len(group) for group in again)
-    )
+    return Repeatability(error=float(np.sqrt(square / freedom)), poses=len(groups), visits=sum(map(len, groups)))
+
+
+def _near(q: Array) -> tuple[Array, tuple[NDArray[np.int64], NDArray[np.int64]]]:
+    """Pairs of poses that are one, each pose with itself too, as entries of a matrix."""
+    pairs = KDTree(q).query_pairs(SAME, p=np.inf, output_type="ndarray")
+    itself = np.arange(len(q))
+    first, second = (np.concatenate([itself, pairs[:, side]]) for side in (0, 1))
+    return np.ones(len(first)), (first, second)

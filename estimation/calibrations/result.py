@@ -100,6 +100,10 @@ class PoseErrors:
         after: by the fit (N,).
         held_out: by a fit to others (N,).
         used: whether the pose counted (N,).
+        session: number of each pose's session (N,); None if there is one only.
+        shift_before: mean signed error of the points by the description, by axis of the measurement (N, k); None in
+            files of earlier versions.
+        shift: the same by a fit to others (N, k).
     """
 
     line: NDArray[np.int64]
@@ -108,6 +112,9 @@ class PoseErrors:
     after: Array
     held_out: Array
     used: NDArray[np.bool_]
+    session: NDArray[np.int64] | None = None
+    shift_before: Array | None = None
+    shift: Array | None = None
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -284,6 +291,8 @@ class Calibration(Result, format="robot-oed calibration"):
         lines += [f"    {item.name:22} {item.text}" for item in ranked[:12]]
         if len(ranked) > 12:
             lines.append(f"    and {len(ranked) - 12} more in {self.FILE}")
+        optics = [item for item in self.parameters if item.kind == "setup" and item.unit not in ("m", "rad")]
+        lines += [f"    {item.name:22} {item.text}" for item in optics]
         for cause in self.causes.get("findings", ()):
             lines.append(f"  cause: {cause['sentence']}")
         lines += [f"  outlier: pose {o.pose} (line {o.line}) is off by {self.shown(o.error)}" for o in self.outliers]
@@ -291,6 +300,8 @@ class Calibration(Result, format="robot-oed calibration"):
         lines += [f"  not determined: {item.sentence()}" for item in open_[:6]]
         if len(open_) > 6:
             lines.append(f"  not determined: {len(open_) - 6} more in {self.FILE}")
+        if self.provenance.get("not_read"):
+            lines.append(f"  columns that were not read: {', '.join(self.provenance['not_read'])}")
         lines += [f"  {warning}" for warning in self.warnings]
         return "\n".join(lines)
 

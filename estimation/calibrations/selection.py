@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from itertools import combinations
 
 import numpy as np
 from numpy.typing import NDArray
@@ -114,6 +115,8 @@ def select_kinds(
 ) -> tuple[tuple[ErrorTerm, ...], tuple[KindTrial, ...]]:
     """Adds kinds of errors one by one, each time the one that lowers the error of held-out poses most.
 
+    Where none does, two are tried together.
+
     Args:
         robots: one per arm.
         terms: that may be added.
@@ -134,23 +137,31 @@ def select_kinds(
         kinds = {term.kind for term in chosen}
         linear = LinearFolds(fit, folds)
         before = _distances(linear, kinds)
-        tried = []
-        for term in usable:
-            if term.kind in kinds:
-                continue
-            after = _distances(linear, kinds | {term.kind, *term.includes})
-            tried.append((term, _trial(fit, term, before, after)))
-        if not tried:
+        open_ = [term for term in usable if term.kind not in kinds]
+        if not open_:
             return _ordered(terms, chosen), tuple(trials)
-        better = [pair for pair in tried if pair[1].added]
+
+        def tried(new: Sequence[ErrorTerm]) -> tuple[Sequence[ErrorTerm], KindTrial]:
+            return new, _trial(fit, new, before, _distances(linear, _with(kinds, new)))  # noqa: B023
+
+        found = [tried((term,)) for term in open_]
+        rest = [trial for _, trial in found]
+        # Two may be needed where neither helps by itself: links that bend stand elsewhere, too.
+        if not any(trial.added for trial in rest):
+            found = [tried(pair) for pair in combinations(open_, 2)]
+        better = [item for item in found if item[1].added]
         if not better:
-            rest = [trial for _, trial in tried]
             return _ordered(terms, chosen), (*trials, *rest)
         # Of kinds that explain the same, the first in order counts.
         lowest = min(trial.with_it for _, trial in better)
-        term, best = next(pair for pair in better if pair[1].with_it <= (1.0 + RELEVANT) * lowest)
-        chosen += [other for other in terms if other.kind in {term.kind, *term.includes} and other not in chosen]
-        trials.append(best)
+        new, best = next(item for item in better if item[1].with_it <= (1.0 + RELEVANT) * lowest)
+        chosen += [term for term in terms if term.kind in _with(set(), new) and term not in chosen]
+        trials += [replace(best, kind=term.kind) for term in new]
+
+
+def _with(kinds: set[str], terms: Sequence[ErrorTerm]) -> set[str]:
+    """Kinds, and those of some terms with all that they contain."""
+    return kinds.union(*({term.kind, *term.includes} for term in terms))
 
 
 def held_out_errors(fit: GeometryFit, *, seed: int = 0) -> HeldOut:
@@ -201,7 +212,9 @@ def _distances(linear: LinearFolds, kinds: set[str]) -> tuple[Array, Array]:
     return residual, pose_distance(residual, fit.model.poses.measurement.units, fit.weights.sigma) ** 2
 
 
-def _trial(fit: GeometryFit, term: ErrorTerm, before: tuple[Array, Array], after: tuple[Array, Array]) -> KindTrial:
+def _trial(
+    fit: GeometryFit, terms: Sequence[ErrorTerm], before: tuple[Array, Array], after: tuple[Array, Array]
+) -> KindTrial:
     # Poses that fit badly decide as little as they count in the fit.
     gain = fit.weights.pose * (before[1] - after[1])
     error = float(np.std(gain, ddof=1) / np.sqrt(len(gain))) if len(gain) > 1 else np.inf
@@ -210,7 +223,8 @@ def _trial(fit: GeometryFit, term: ErrorTerm, before: tuple[Array, Array], after
     weight = fit.weights.pose / fit.weights.pose.sum()
     rms = [float(np.sqrt(np.nansum(weight * measure(residual) ** 2))) for residual in (before[0], after[0])]
     enough = float(np.mean(gain)) > RELEVANT * float(np.mean(fit.weights.pose * before[1]))
-    return KindTrial(kind=term.kind, without=rms[0], with_it=rms[1], clear=clear, added=clear > CLEAR and enough)
+    kind = " and ".join(term.kind for term in terms)
+    return KindTrial(kind=kind, without=rms[0], with_it=rms[1], clear=clear, added=clear > CLEAR and enough)
 
 
 def _ordered(terms: Sequence[ErrorTerm], chosen: Sequence[ErrorTerm]) -> tuple[ErrorTerm, ...]:

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.linalg.lapack import dpotrf, dpotri
 
 Array = NDArray[np.float64]
 
@@ -13,6 +14,7 @@ LARGEST, SMALLEST = 30.0, 1e-3
 """Bounds of the size of a kind, in the usual sizes of its parameters: 150 mrad and 5 urad of joint zeros."""
 
 QUIETEST = 1e-6  # variance of rows in standard deviations of the noise; less is rounding of exact poses
+SINGULAR = 1e-6  # smallest new length of a column of length one, below which equations are singular
 ITERATIONS = 40
 CONVERGED = 0.01
 
@@ -81,8 +83,7 @@ def estimate_sizes(
     for _ in range(ITERATIONS):
         prior = np.where(free, 1.0 / sizes[kinds] ** 2, 0.0) if len(sizes) else np.zeros(len(kinds))
         scale = np.sqrt(np.maximum(np.diag(normal.gram) / noise + prior, np.finfo(float).tiny))
-        inverse = np.linalg.pinv((normal.gram / noise + np.diag(prior)) / np.outer(scale, scale), hermitian=True)
-        inverse = inverse / np.outer(scale, scale)
+        inverse = _inverse((normal.gram / noise + np.diag(prior)) / np.outer(scale, scale)) / np.outer(scale, scale)
         x = inverse @ normal.right / noise
         determined = np.where(free, 1.0 - prior * np.diag(inverse), 1.0)
         before = sizes.copy(), noise
@@ -98,6 +99,20 @@ def estimate_sizes(
         if change < CONVERGED:
             break
     return sizes, noise, x
+
+
+def _inverse(matrix: Array) -> Array:
+    """Inverse of normal equations in columns of length one; the pseudo-inverse where they are singular."""
+    if not matrix.size:
+        return matrix
+    triangle, failed = dpotrf(matrix, lower=1, clean=1)
+    if failed or np.diag(triangle).min(initial=1.0) < SINGULAR:
+        return np.asarray(np.linalg.pinv(matrix, hermitian=True), dtype=np.float64)
+    half, _ = dpotri(triangle, lower=1)
+    # Only the lower half is filled; the upper one holds zeros.
+    half = half + half.T
+    np.fill_diagonal(half, half.diagonal() / 2.0)
+    return np.asarray(half)
 
 
 def kind_numbers(kinds: list[str], names: list[str]) -> NDArray[np.int64]:

@@ -12,6 +12,7 @@ from robots.common.errors import InputError
 from robots.common.options import Option, Seed, names, numbers, point
 
 if TYPE_CHECKING:
+    import casadi
     import numpy as np
     from numpy.typing import ArrayLike, NDArray
 
@@ -96,6 +97,25 @@ class View:
             axis = np.asarray(self.axis) / np.linalg.norm(self.axis)
             seen &= np.sum((flange[:, :3, :3] @ axis) * -way, axis=1) >= np.cos(self.facing)
         return seen
+
+    def expression(self, flange: casadi.SX) -> casadi.SX:
+        """Writes what is not negative where the markers are seen.
+
+        Args:
+            flange: pose of the flange in the base frame (4, 4).
+        """
+        import casadi
+        import numpy as np
+
+        way, rows = flange[:3, 3] - casadi.SX(np.asarray(self.origin)), []
+        distance = casadi.sqrt(casadi.dot(way, way) + 1e-12)
+        if self.towards is not None:
+            direction = np.asarray(self.towards) - np.asarray(self.origin)
+            rows.append(casadi.dot(way, direction / np.linalg.norm(direction)) - np.cos(self.cone) * distance)
+        if self.axis is not None:
+            axis = flange[:3, :3] @ (np.asarray(self.axis) / np.linalg.norm(self.axis))
+            rows.append(casadi.dot(axis, -way) - np.cos(self.facing) * distance)
+        return casadi.vertcat(*rows) if rows else casadi.SX(0, 1)
 
     def settings(self) -> dict[str, object]:
         """Writes it as plain data."""

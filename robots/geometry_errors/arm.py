@@ -105,7 +105,8 @@ class ArmColumns:
             (N, 4, 4), and (N, 6, P) in the axes of the flange.
         """
         flange, after_fixed, after_varying, fixed, varying = self._walk(values)
-        result = np.zeros((self.state.rows, 6, self.count))
+        rows, back = self.state.rows, inverse(flange)
+        result = np.zeros((rows, 6, self.count))
         for i in range(self.robot.n):
             for (numbers, twists), frames, value in (
                 (self._fixed[i], after_fixed[i], fixed[i]),
@@ -113,8 +114,13 @@ class ArmColumns:
             ):
                 if numbers:
                     moved = right_jacobian(value) @ twists if np.any(value) else twists
+                    carried = adjoint(back @ frames)
+                    # One product of matrices is much faster than one for each pose.
+                    own = (
+                        (carried.reshape(-1, 6) @ moved[0]).reshape(rows, 6, -1) if len(moved) == 1 else carried @ moved
+                    )
                     # A parameter may move several joints.
-                    result[:, :, numbers] += adjoint(inverse(flange) @ frames) @ moved
+                    result[:, :, numbers] += own
         return flange, result
 
     def _walk(self, values: Array) -> tuple[Array, list[Array], list[Array], list[Array], list[Array]]:

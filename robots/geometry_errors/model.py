@@ -86,12 +86,19 @@ class GeometryModel:
         """Finds a first setup with nominal arms.
 
         Raises:
-            InputError: a known part that the measurement has not.
+            InputError: a known part that the measurement has not, or that is of another kind.
         """
         found = self.poses.measurement.start(self.flanges(np.zeros(len(self.errors))), self.poses.observed)
         unknown = next((name for name in self.poses.known if name not in found), None)
         if unknown is not None:
             raise InputError(f"{self.poses.measurement.title} have no {unknown!r}", allowed=", ".join(found))
+        for name, value in self.poses.known.items():
+            if np.shape(value) != found[name].value.shape:
+                given = {(3,): "a point", (4, 4): "a pose"}.get(np.shape(value), f"numbers of shape {np.shape(value)}")
+                wanted = {"pose": f"{name}=X,Y,Z,ROLL,PITCH,YAW", "point": f"{name}=X,Y,Z"}
+                raise InputError(
+                    f"{name} is known as {given}", allowed=wanted.get(found[name].kind, "it is always estimated")
+                )
         return known_setup(found, self.poses.known)
 
     def evaluate(self, values: Array, setup: Setup) -> Prediction:

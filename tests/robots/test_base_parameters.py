@@ -258,7 +258,10 @@ def test_nearly_right_angles_are_no_failure(size, catalogue_robot, states, caplo
     model = default_model(replace(robot, chain=Chain(tuple(joints))))
     with caplog.at_level(logging.WARNING):
         base = find_base_parameters(model)
-    assert 70 <= base.size <= 73  # 64 and six offsets; a leaning first axis shows mPx_1, mPy_1 and Im_2 too
+    # 64 and six offsets, those of the robot as it was designed, for what calibrations find. An axis that leans by
+    # 10 mrad shows mPx_1, mPy_1 and Im_2 too.
+    nominal = find_base_parameters(default_model(robot))
+    assert (base.names == nominal.names) if size <= 1e-3 else (70 <= base.size <= 73)
     assert ("rounded angles in the description" in caplog.text) == (base.neglected > 1e-9)
     assert find_base_parameters(model, seed=3).size == base.size
     state, pi = states(robot, 50), np.abs(model.nominal)

@@ -22,6 +22,7 @@ CAUSES = {
     "link_compliance": "compliance",
     "thermal_growth": "thermal_growth",
     "backlash": "backlash",
+    "load_backlash": "load_backlash",
     "time_offset": "time_offset",
 }
 """Cause by kind of geometric errors."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -96,15 +96,31 @@ class _Search:
     def __init__(self, model: GeometryModel, found: Prediction, weights: Weights, options: Sequence[Candidate]) -> None:
         self.model, self.found, self.weights = model, found, weights
         errors = len(model.errors)
-        self.base, self.target = scaled_rows(found, weights, model, range(errors, found.jacobian.shape[2]))
+        base, target = scaled_rows(found, weights, model, range(errors, found.jacobian.shape[2]))
         self.options = list(options)
-        self.columns = [self._rows(option.columns) * option.scale for option in self.options]
-        self.rows = len(self.target)
+        columns = np.hstack([base, *(self._rows(option.columns) * option.scale for option in self.options)])
+        self.rows, self._measured = len(target), (columns, target)
+        # A triangle has the same inner products, and fewer rows.
+        triangle = np.asarray(np.linalg.qr(np.column_stack([columns, target]), mode="r"))
+        self.base, self.target = triangle[:, : base.shape[1]], triangle[:, -1]
+        sizes = [len(option.parameters) for option in self.options]
+        self._ends = base.shape[1] + np.cumsum([0, *sizes])
+        self._whole = triangle
+        self._causes = len({option.key for option in self.options})
 
     def _rows(self, columns: Array) -> Array:
         factor = self.weights.rows(self.model.poses.measurement.units)
         seen = np.isfinite(self.found.residual) & (factor > 0.0)
         return np.asarray(columns[seen] * factor[seen][:, None])
+
+    def _places(self, numbers: Sequence[int]) -> NDArray[np.int64]:
+        """Places of the columns of some causes."""
+        blocks = [np.arange(self._ends[k], self._ends[k + 1]) for k in numbers]
+        return np.concatenate([np.zeros(0, dtype=np.int64), *blocks])
+
+    def _columns(self, numbers: Sequence[int]) -> Array:
+        """Columns of some causes, side by side, in the triangle."""
+        return np.asarray(self._whole[:, self._places(numbers)])
 
     def run(self) -> list[int]:
         """Numbers of the causes that are named, in the order in which they were added."""
@@ -129,7 +145,7 @@ class _Search:
         return kept
 
     def _basis(self, chosen: Sequence[int]) -> Array:
-        return _orthonormal(np.hstack([self.base, *(self.columns[k] for k in chosen)]))
+        return _orthonormal(np.hstack([self.base, self._columns(chosen)]))
 
     def _scores(self, chosen: Sequence[int], only: Sequence[int] | None = None) -> dict[int, tuple[float, float]]:
         """Gain in evidence, and p-value, of each cause beside those chosen."""
@@ -137,30 +153,40 @@ class _Search:
         left = self.target - basis @ (basis.T @ self.target)
         square, free = float(left @ left), self.rows - basis.shape[1]
         taken = {self.options[k].key for k in chosen}
+        numbers = [
+            k
+            for k in (range(len(self.options)) if only is None else only)
+            if only is not None or self.options[k].key not in taken
+        ]
         result = {}
-        for k, columns in enumerate(self.columns):
-            if (only is not None and k not in only) or (only is None and self.options[k].key in taken):
+        for k, size, gain in self._gains(numbers, basis, left):
+            if free - size < 1:
                 continue
-            new = columns - basis @ (basis.T @ columns)
-            own = _orthonormal(new, np.linalg.norm(columns, axis=0))
-            size = own.shape[1]
-            if size == 0 or free - size < 1:
-                continue
-            gain = float(np.sum((own.T @ left) ** 2))
             rest = max(square - gain, 1e-12 * square)
             tries = self.options[k].tries
             score = 0.5 * self.rows * np.log(square / rest) - 0.5 * size * np.log(self.rows) - np.log(tries)
-            result[k] = (float(score), _p_value(gain, rest, size, free - size, tries * self._causes()))
+            result[k] = (float(score), _p_value(gain, rest, size, free - size, tries * self._causes))
         return result
 
-    def _causes(self) -> int:
-        return len({option.key for option in self.options})
+    def _gains(self, numbers: Sequence[int], basis: Array, left: Array) -> Iterator[tuple[int, int, float]]:
+        """Number of directions that each cause brings beside a basis, and the square that they take of what is left."""
+        for size in sorted({len(self.options[k].parameters) for k in numbers}):
+            same = [k for k in numbers if len(self.options[k].parameters) == size]
+            columns = self._columns(same)
+            lengths = np.linalg.norm(columns, axis=0)
+            new = (columns - basis @ (basis.T @ columns)) / np.where(lengths > 0.0, lengths, 1.0)
+            blocks = new.reshape(len(new), len(same), size).transpose(1, 0, 2)
+            values, vectors = np.linalg.eigh(np.swapaxes(blocks, 1, 2) @ blocks)
+            along = np.einsum("kji,kj->ki", vectors, (new.T @ left).reshape(len(same), size))
+            open_ = values > size * NEW**2
+            gains = np.sum(np.where(open_, along**2 / np.where(open_, values, 1.0), 0.0), axis=1)
+            yield from ((k, int(o.sum()), float(g)) for k, o, g in zip(same, open_, gains, strict=True) if o.any())
 
     def findings(self, chosen: list[int]) -> list[CauseFinding]:
         """Values with intervals of the causes that were named."""
         if not chosen:
             return []
-        columns = np.hstack([self.base, *(self.columns[k] for k in chosen)])
+        columns = np.hstack([self.base, self._columns(chosen)])
         lengths = np.maximum(np.linalg.norm(columns, axis=0), np.finfo(float).tiny)
         inverse = np.linalg.pinv(columns / lengths, rcond=1e-8)
         value = inverse @ self.target / lengths
@@ -233,8 +259,9 @@ class _Search:
 
         Poses are alike in their joint positions, or in the place of the flange: the lower probability counts twice.
         """
-        basis = self._basis(chosen)
-        left = self.target - basis @ (basis.T @ self.target)
+        columns, target = self._measured
+        basis = _orthonormal(np.hstack([columns[:, : self._ends[0]], columns[:, self._places(chosen)]]))
+        left = target - basis @ (basis.T @ target)
         whole = np.zeros(self.found.residual.shape)
         factor = self.weights.rows(self.model.poses.measurement.units)
         whole[np.isfinite(self.found.residual) & (factor > 0.0)] = left
@@ -276,9 +303,9 @@ def _p_value(gain: float, rest: float, size: int, free: int, tries: int) -> floa
     return min(1.0, tries * float(fdtrc(size, free, (gain / size) / (rest / free))))
 
 
-def _orthonormal(columns: Array, lengths: Array | None = None) -> Array:
-    """Basis of the columns' space (R, k), columns that are rounding beside their former lengths left out."""
-    size = np.linalg.norm(columns, axis=0) if lengths is None else lengths
+def _orthonormal(columns: Array) -> Array:
+    """Basis of the columns' space (R, k), directions that are rounding left out."""
+    size = np.linalg.norm(columns, axis=0)
     scaled = columns / np.where(size > 0.0, size, 1.0)
     left, values, _ = np.linalg.svd(scaled, full_matrices=False)
     return np.asarray(left[:, values > NEW * max(float(np.sqrt(scaled.shape[1])), 1.0)])

@@ -16,6 +16,7 @@ ACTIONS = {
     "compliance": "Compensate it in the controller where loads differ, or calibrate with the load of the task.",
     "thermal_growth": "Let the arm warm up, or compensate by its temperature.",
     "backlash": "Approach poses from one side; have the gear checked.",
+    "load_backlash": "Have the gear checked; poses where gravity pulls to one side are not affected.",
     "time_offset": "Measure at rest, or correct the clock of the tracker.",
     "loose_marker": "Fasten the marker and measure again; poses from there on are of another marker.",
     "moved_base": "Fasten base and tracker; calibrate each part of the poses for itself.",
@@ -74,6 +75,7 @@ class CauseFinding(Record):
             "compliance": f"joint {self.joint} or its link gives way under its load, {self._size()}",
             "thermal_growth": f"the link before joint {self.joint} grows with temperature, {self._size()}",
             "backlash": f"backlash{where} of {self._size()}: the error depends on the direction of approach",
+            "load_backlash": f"backlash{where} of {self._size()}: the joint lies on the side to which gravity pulls",
             "time_offset": f"the clocks of tracker and robot differ by {self._size()}",
             "loose_marker": f"marker {self.marker} moved by {self._size()}{since}",
             "moved_base": f"the base or the tracker moved by {self._size()}{since}",
@@ -89,8 +91,9 @@ class CauseFinding(Record):
         if len(self.parameters) == 1:
             item = self.parameters[0]
             unit, factor = item["shown"]
-            low, high = (two_digits(factor * x) for x in item["ci95"])
-            return f"{two_digits(factor * item['value'])} ({low} to {high}) {unit}"
+            # Intervals are often narrower than two digits tell.
+            value, low, high = (f"{float(f'{factor * x:.3g}'):g}" for x in (item["value"], *item["ci95"]))
+            return f"{value} ({low} to {high}) {unit}"
         shown = {item["unit"]: item["shown"] for item in self.parameters}
         parts = [f"{two_digits(shown[unit][1] * square**0.5)} {shown[unit][0]}" for unit, square in by_unit.items()]
         return " and ".join(parts)

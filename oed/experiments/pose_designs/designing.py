@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from oed.criteria import Criterion
 from oed.experiments.assembly import rest_pose
 from oed.experiments.checks import usable_limits, velocity_share
 from oed.experiments.pose_designs.exchange import exchanged
@@ -30,6 +31,7 @@ from robots.signals import Motion
 Array = NDArray[np.float64]
 
 CANDIDATES = 1000
+AGAIN = 1  # exchanges after poses have moved
 DRAWS = 60  # times so many poses are drawn before the limits in space are called too tight
 REPAIRS = 4  # times an order is sought anew without a move that was found to collide
 
@@ -46,7 +48,7 @@ def design_poses(
     """Chooses poses that determine geometric errors best, and an order of moves that is free of collisions.
 
     Candidates within limits, clear of collisions and in view are exchanged (Mitchell 1974, DETMAX; Borm and Menq 1991),
-    then each pose is moved to where the criterion is best.
+    then all poses move together by IPOPT, with exact derivatives, to where the criterion is best.
 
     Args:
         robot: the robot.
@@ -81,10 +83,10 @@ def design_poses(
         bar.update(0.1, "exchanging poses")
         rows = information.rows(candidates)
         chosen = exchanged(rows, count, judge)
-        q = candidates[chosen]
+        q, before = candidates[chosen], np.einsum("nrl,nrk->lk", rows[chosen], rows[chosen])
         bar.update(0.4, "moving poses")
         if how.refine:
-            q = refined(information, q, judge, bounds, allowed, lambda share: bar.update(0.4 + 0.3 * share))
+            q = _moved(information, q, judge, bounds, allowed, model, how, candidates, bar)
         bar.update(0.7, "ordering moves")
         home = _home(usable, how, allowed, candidates)
         moves, paths = Moves(usable, robot.period), Paths(model, how.clearance / 2.0, bounds, how.seed)
@@ -116,6 +118,7 @@ def design_poses(
         parameters=information.parameters,
         eigenvalues=np.linalg.eigvalsh(total),
         random_eigenvalues=np.linalg.eigvalsh(np.einsum("nrl,nrk->lk", some, some)),
+        exchanged_eigenvalues=np.linalg.eigvalsh(before),
         expected=information.spread(total),
         prediction=information.prediction_error(total, elsewhere),
         unit=how.measurement.unit,
@@ -146,7 +149,7 @@ class _Allowed:
         self._information, self._how, self._model = information, how, model
 
     def __call__(self, q: Array) -> NDArray[np.bool_]:
-        ok = np.ones(len(q), dtype=bool)
+        ok = self._information.seen(q)
         if self._how.view is not None:
             ok &= self._how.view.sees(self._information.flange(q))
         if self._model is not None and self._model.pairs:
@@ -182,6 +185,41 @@ def _candidates(bounds: tuple[Array, Array], allowed: _Allowed, count: int, seed
             remedy="widen the cone of view, lower --clearance, or state other surroundings (--floor, --no-floor)",
         )
     return np.concatenate(found)[:count]
+
+
+def _moved(
+    information: PoseInformation,
+    q: Array,
+    judge: Criterion,
+    bounds: tuple[Array, Array],
+    allowed: _Allowed,
+    model: CollisionModel | None,
+    how: PoseOptions,
+    candidates: Array,
+    bar: Progress,
+) -> Array:
+    """Moves poses to where the criterion is best, exchanges those that are now superfluous, and moves them again."""
+    for round_ in range(1 + AGAIN):
+        done = 0.4 + 0.3 * round_ / (1 + AGAIN)
+        q = refined(
+            information,
+            q,
+            judge,
+            bounds,
+            allowed,
+            model=model,
+            clearance=how.clearance,
+            view=how.view,
+            progress=lambda share, done=done: bar.update(done + 0.3 * share / (1 + AGAIN)),  # type: ignore[misc]
+        )
+        if round_ == AGAIN:
+            break
+        pool, own = np.vstack([candidates, q]), range(len(candidates), len(candidates) + len(q))
+        chosen = exchanged(information.rows(pool), len(q), judge, start=list(own))
+        if set(chosen) <= set(own):
+            break
+        q = pool[chosen]
+    return q
 
 
 def _replaced(q: Array, lost: tuple[int, ...], home: Array, candidates: Array, rows: Array, paths: Paths) -> Array:

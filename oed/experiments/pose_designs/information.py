@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
+import casadi
 import numpy as np
 from numpy.typing import NDArray
 
@@ -12,7 +13,8 @@ from robots.geometry_errors.measurements import Measurement, Setup
 from robots.geometry_errors.model import GeometryModel
 from robots.geometry_errors.poses import MeasuredPoses
 from robots.geometry_errors.reduction import reduce_columns
-from robots.geometry_errors.terms import ErrorParameter, error_term
+from robots.geometry_errors.symbolic import SymbolicArm, symbolic_jacobian
+from robots.geometry_errors.terms import TERMS, ErrorParameter, error_term
 from robots.geometry_errors.virtual import random_positions
 from robots.robot import Robot
 
@@ -21,8 +23,8 @@ Array = NDArray[np.float64]
 REFERENCE = 300
 """Random poses by which the errors that poses distinguish are chosen."""
 
-UNSUITED = ("backlash", "time_offset", "thermal_growth", "base_motion")
-"""Kinds that depend on more than the pose."""
+UNSUITED = ("backlash", "load_backlash", "time_offset", "thermal_growth", "base_motion")
+"""Kinds that depend on more than the pose, or jump with it."""
 
 
 class PoseInformation:
@@ -35,7 +37,8 @@ class PoseInformation:
         noise: standard deviation by unit.
 
     Raises:
-        InputError: a kind that depends on more than the pose, or that the robot's description cannot state.
+        InputError: a kind that depends on more than the pose or jumps with it, or that the robot's description cannot
+            state.
     """
 
     def __init__(
@@ -43,7 +46,10 @@ class PoseInformation:
     ) -> None:
         unsuited = next((kind for kind in kinds if kind in UNSUITED), None)
         if unsuited is not None:
-            raise InputError(f"{unsuited} depends on more than the pose", allowed="kinds that depend on the pose alone")
+            raise InputError(
+                f"{unsuited} depends on more than the pose, or jumps with it",
+                allowed=", ".join(term.kind for term in TERMS if term.kind not in UNSUITED),
+            )
         self.robot, self.measurement = robot, measurement
         self.terms = [error_term(kind) for kind in kinds]
         self.setup: Setup = measurement.example
@@ -71,9 +77,25 @@ class PoseInformation:
         """Scaled rows of poses (N, r, L)."""
         return self._scaled(self._model(q))[:, :, self.kept]
 
+    def symbolic(self) -> casadi.Function:
+        """Writes the scaled rows of a pose as an expression: q (n,) -> (r, L)."""
+        whole = symbolic_jacobian(self.robot, self.terms, self.measurement, self.setup)
+        q = casadi.SX.sym("q", self.robot.n)
+        scaled = casadi.diag(casadi.DM(1.0 / self._sigma)) @ whole(q) @ casadi.diag(casadi.DM(self._scale))
+        return casadi.Function("rows", [q], [casadi.densify(scaled[:, self.kept])])
+
+    def symbolic_flange(self) -> casadi.Function:
+        """Writes the nominal flange of a pose as an expression: q (n,) -> (4, 4)."""
+        arm = SymbolicArm(self.robot)
+        return casadi.Function("flange", [arm.q], [arm.flange])
+
     def flange(self, q: Array) -> Array:
         """Nominal flange of poses (N, 4, 4)."""
         return self.robot.chain.flange(q)
+
+    def seen(self, q: Array) -> NDArray[np.bool_]:
+        """Says at which poses a nominal robot shows something to the instrument (N,)."""
+        return np.asarray(np.isfinite(self.measurement.simulate([self.flange(q)], self.setup, {}, 0)).any(axis=1))
 
     def spread(self, information: Array) -> Array:
         """Standard errors of the parameters in SI units (L,), NaN without information.
@@ -100,9 +122,8 @@ class PoseInformation:
         return float(np.sqrt(variance.mean() * self.measurement.block))
 
     def _model(self, q: Array) -> GeometryModel:
-        observed = np.zeros((len(q), len(self.measurement.columns)))
-        if self.measurement.kind == "poses":
-            observed[:, -1] = 1.0
+        # What a nominal robot shows: derivatives of turns depend on how far they are off.
+        observed = self.measurement.simulate([self.flange(q)], self.setup, {}, 0)
         return GeometryModel(
             [self.robot], self.terms, MeasuredPoses(q=q, measurement=self.measurement, observed=observed)
         )

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from oed.criteria import CRITERIA, Criterion
 from oed.criteria import criterion as choose_criterion
-from oed.criteria.base import floored
+from oed.criteria.base import floored, soft_maximum
 from robots.common.errors import InputError
 
 Array = NDArray[np.float64]
@@ -42,13 +42,20 @@ class _NoiseAmplification(Criterion):
     name = "o4"
     label = "O4"
     larger_is_better = True
+    stages = (16.0, 64.0)
+    finish = (256.0,)
 
     def value(self, eigenvalues: Array) -> float:
         floor = floored(eigenvalues)
         return float(floor[0] / np.sqrt(floor[-1]))
 
     def surrogate(self, eigenvalues: Array, sharpness: float) -> tuple[float, Array]:
-        raise NotImplementedError("poses are exchanged and refined without a stand-in")
+        """Bounds -log O4 from above."""
+        floor = floored(eigenvalues)
+        logs = np.log(floor)
+        top, by_top = soft_maximum(logs, sharpness)
+        bottom, by_bottom = soft_maximum(-logs, sharpness)
+        return top / 2.0 + bottom, (by_top / 2.0 - by_bottom) / floor
 
 
 class _InverseSum(Criterion):
@@ -62,7 +69,10 @@ class _InverseSum(Criterion):
         return float(1.0 / np.sum(1.0 / np.sqrt(floored(eigenvalues))))
 
     def surrogate(self, eigenvalues: Array, sharpness: float) -> tuple[float, Array]:
-        raise NotImplementedError("poses are exchanged and refined without a stand-in")
+        """Gives -log O5."""
+        floor = floored(eigenvalues)
+        inverse = 1.0 / np.sqrt(floor)
+        return float(np.log(inverse.sum())), -0.5 * inverse / floor / inverse.sum()
 
 
 def pose_criterion(name: str) -> Criterion:

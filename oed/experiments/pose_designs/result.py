@@ -45,6 +45,7 @@ class PoseDesign(Planned, format="robot-oed pose design", tool=True):
         parameters: that the poses determine.
         eigenvalues: of the scaled information, ascending (L,).
         random_eigenvalues: of as many random poses, to compare with (L,).
+        exchanged_eigenvalues: of the poses before they were refined (L,); None in files of earlier versions.
         expected: standard errors of the parameters (L,), in SI units.
         prediction: expected error of predicted measurements elsewhere, in `unit`.
         unit: of the measurement.
@@ -62,6 +63,7 @@ class PoseDesign(Planned, format="robot-oed pose design", tool=True):
         "random_observability",
         "eigenvalues",
         "random_eigenvalues",
+        "exchanged_eigenvalues",
         "parameters=stated_parameters",
         "prediction",
         "unit",
@@ -87,6 +89,7 @@ class PoseDesign(Planned, format="robot-oed pose design", tool=True):
     left_out: int
     freedom: Mapping[str, Any] | None
     settings: Mapping[str, Any]
+    exchanged_eigenvalues: Array | None = None
 
     def __repr__(self) -> str:
         return f"PoseDesign({self.robot.name!r}, {len(self.q)} poses, O1 {self.observability['O1']:.3g})"
@@ -100,6 +103,16 @@ class PoseDesign(Planned, format="robot-oed pose design", tool=True):
     def random_observability(self) -> dict[str, float]:
         """The indices of as many random poses."""
         return observability_indices(self.random_eigenvalues, len(self.q))
+
+    @property
+    def compared(self) -> dict[str, dict[str, float]]:
+        """The indices of the poses, of those before the refinement, and of random ones, by what they are of."""
+        sets = {
+            "designed": self.eigenvalues,
+            "by exchange alone": self.exchanged_eigenvalues,
+            "random": self.random_eigenvalues,
+        }
+        return {name: observability_indices(values, len(self.q)) for name, values in sets.items() if values is not None}
 
     @property
     def stated_parameters(self) -> list[dict[str, Any]]:
@@ -142,13 +155,16 @@ class PoseDesign(Planned, format="robot-oed pose design", tool=True):
 
     def summary(self) -> str:
         """Says how good the poses are, what errors to expect, and whether the moves are free."""
-        own, other = self.observability, self.random_observability
+        sets = self.compared
         unit, factor = SHOWN[self.unit]
         lines = [
             f"{self.robot.name}: {len(self.q)} poses for a calibration of {len(self.parameters)} parameters, "
             f"{self.motion.duration:.0f} s of motion",
-            f"  {'observability':16} {'designed':>10} {'random':>10}",
-            *(f"  {name:16} {own[name]:10.3g} {other[name]:10.3g}" for name in own),
+            "  " + "".join([f"{'observability':16}", *(f" {name:>17}" for name in sets)]),
+            *(
+                "  " + "".join([f"{name:16}", *(f" {own[name]:17.3g}" for own in sets.values())])
+                for name in self.observability
+            ),
             f"  expected error of predicted measurements elsewhere: {factor * self.prediction:.3g} {unit}",
             "  expected standard errors, largest of each kind:",
         ]

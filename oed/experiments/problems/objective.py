@@ -5,21 +5,32 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from typing import Protocol
 
 import casadi
 import numpy as np
 from numpy.typing import NDArray
 
-from oed.experiments.problems.problem import FourierProblem
 from oed.experiments.problems.trap import Trap
 
 Array = NDArray[np.float64]
 
 
+class Smooth(Protocol):
+    """A problem with a smooth stand-in for its criterion."""
+
+    @property
+    def size(self) -> int:
+        """Number of variables."""
+
+    def surrogate(self, z: Array, sharpness: float) -> tuple[float, Array]:
+        """Gives the stand-in and its gradient (size,)."""
+
+
 class Objective(casadi.Callback):
     """The smooth stand-in as a CasADi function; value and gradient are computed together and remembered."""
 
-    def __init__(self, problem: FourierProblem, trap: Trap) -> None:
+    def __init__(self, problem: Smooth, trap: Trap) -> None:
         casadi.Callback.__init__(self)
         self.problem, self.sharpness, self.evaluations = problem, 1.0, 0
         self._trap = trap

@@ -7,6 +7,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import ClassVar
 
+import casadi
 import numpy as np
 from numpy.typing import NDArray
 
@@ -15,6 +16,9 @@ from robots.geometry_errors.measurements.setup import Setup
 from robots.geometry_errors.twists import cross_matrix
 
 Array = NDArray[np.float64]
+
+Scene = tuple[casadi.SX, Mapping[str, casadi.SX]]
+"""Pose of the flange (4, 4), and the parts of the setup by name, as expressions."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -72,6 +76,16 @@ class Measurement(ABC):
         points = np.isfinite(first).sum(axis=1) / self.block
         return np.asarray(np.sqrt(np.nansum(first**2, axis=1) / np.where(points > 0, points, np.nan)))
 
+    def shift(self, residual: Array) -> Array:
+        """Mean signed error of each pose's points by axis (N, block) in the first unit; NaN if none was seen.
+
+        Args:
+            residual: (N, r).
+        """
+        first = residual[:, [unit == self.unit for unit in self.units]].reshape(len(residual), -1, self.block)
+        count = np.isfinite(first).sum(axis=1)
+        return np.asarray(np.nansum(first, axis=1) / np.where(count > 0, count, np.nan))
+
     @abstractmethod
     def start(self, flanges: Sequence[Array], observed: Array) -> Setup:
         """Finds a first setup from nominal flanges.
@@ -90,6 +104,18 @@ class Measurement(ABC):
             observed: what was measured (N, c).
             setup: where instruments and markers are.
         """
+
+    def expression(self, moved: Scene, nominal: Scene) -> casadi.SX:
+        """Writes what is measured (r,); its derivatives count where the moved scene is the nominal one.
+
+        Args:
+            moved: scene with small steps.
+            nominal: the same without.
+
+        Raises:
+            InputError: a measurement for which no poses are designed.
+        """
+        raise InputError(f"no poses are designed for {self.title}", remedy="choose another kind of measurement")
 
     def simulate(self, flanges: Sequence[Array], setup: Setup, noise: Mapping[str, float], seed: int) -> Array:
         """Measures flanges (N, c).

@@ -5,10 +5,17 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
+import casadi
 import numpy as np
 from numpy.typing import NDArray
 
-from robots.geometry_errors.measurements.base import Evaluation, Measurement, point_by_twist, setup_jacobian
+from robots.geometry_errors.measurements.base import (
+    Evaluation,
+    Measurement,
+    Scene,
+    point_by_twist,
+    setup_jacobian,
+)
 from robots.geometry_errors.measurements.setup import Setup, Unknown
 
 Array = NDArray[np.float64]
@@ -78,6 +85,13 @@ class Distances(Measurement):
         return Evaluation(
             residual=residual, by_flange=(by_flange,), by_setup=setup_jacobian(setup, parts, rows, self.count)
         )
+
+    def expression(self, moved: Scene, nominal: Scene) -> casadi.SX:
+        """Writes the distances; the instrument's zero adds to them."""
+        flange, parts = moved
+        place = flange[:3, :3] @ parts["tool"] + flange[:3, 3]
+        zeros = [parts[f"offset_{k + 1}"] if self.offset else casadi.SX(0.0) for k in range(self.count)]
+        return casadi.vertcat(*(casadi.norm_2(place - parts[f"anchor_{k + 1}"]) + zero for k, zero in enumerate(zeros)))
 
     def simulate(self, flanges: Sequence[Array], setup: Setup, noise: Mapping[str, float], seed: int) -> Array:
         """Gives distances (N, count) [m]."""

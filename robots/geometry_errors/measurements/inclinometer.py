@@ -5,10 +5,11 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
+import casadi
 import numpy as np
 from numpy.typing import NDArray
 
-from robots.geometry_errors.measurements.base import Evaluation, Measurement, setup_jacobian
+from robots.geometry_errors.measurements.base import Evaluation, Measurement, Scene, setup_jacobian
 from robots.geometry_errors.measurements.setup import Setup, Unknown, tangents
 from robots.geometry_errors.twists import cross_matrix
 
@@ -74,6 +75,13 @@ class Inclinometer(Measurement):
         }
         difference = (observed - predicted + np.pi) % (2.0 * np.pi) - np.pi
         return Evaluation(residual=difference, by_flange=(by_flange,), by_setup=setup_jacobian(setup, parts, rows, 2))
+
+    def expression(self, moved: Scene, nominal: Scene) -> casadi.SX:
+        """Writes roll and pitch."""
+        flange, parts = moved
+        sensed = parts["sensor"].T @ flange[:3, :3].T @ parts["up"]
+        across = casadi.sqrt(sensed[1] ** 2 + sensed[2] ** 2)
+        return casadi.vertcat(casadi.atan2(sensed[1], sensed[2]), casadi.atan2(-sensed[0], across))
 
     def simulate(self, flanges: Sequence[Array], setup: Setup, noise: Mapping[str, float], seed: int) -> Array:
         """Gives roll and pitch (N, 2) [rad]."""

@@ -5,12 +5,14 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
+import casadi
 import numpy as np
 from numpy.typing import NDArray
 
 from robots.geometry_errors.measurements.base import (
     Evaluation,
     Measurement,
+    Scene,
     point_by_twist,
     registration,
     setup_jacobian,
@@ -77,6 +79,12 @@ class Markers(Measurement):
             parts[name] = np.zeros((rows, size, 3))
             parts[name][:, block] = turn
         return Evaluation(residual=residual, by_flange=(by_flange,), by_setup=setup_jacobian(setup, parts, rows, size))
+
+    def expression(self, moved: Scene, nominal: Scene) -> casadi.SX:
+        """Writes the positions in the tracker's frame."""
+        flange, parts = moved
+        seen = parts["tracker"] @ flange
+        return casadi.vertcat(*(seen[:3, :3] @ parts[f"marker_{k + 1}"] + seen[:3, 3] for k in range(self.count)))
 
     def simulate(self, flanges: Sequence[Array], setup: Setup, noise: Mapping[str, float], seed: int) -> Array:
         """Gives positions (N, 3 count) [m]."""

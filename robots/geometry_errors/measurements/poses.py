@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
+import casadi
 import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
@@ -12,6 +13,7 @@ from scipy.spatial.transform import Rotation
 from robots.geometry_errors.measurements.base import (
     Evaluation,
     Measurement,
+    Scene,
     point_by_twist,
     registration,
     setup_jacobian,
@@ -72,6 +74,11 @@ class BodyPoses(Measurement):
         by_tool[:, 3:, 3:] = log
         parts = {"tracker": by_tracker, "tool": by_tool}
         return Evaluation(residual=residual, by_flange=(by_flange,), by_setup=setup_jacobian(setup, parts, rows, 6))
+
+    def expression(self, moved: Scene, nominal: Scene) -> casadi.SX:
+        """Writes the position, and the turn from the nominal pose."""
+        pose, before = (parts["tracker"] @ flange @ parts["tool"] for flange, parts in (moved, nominal))
+        return casadi.vertcat(pose[:3, 3], casadi.inv_skew(before[:3, :3].T @ pose[:3, :3]))
 
     def simulate(self, flanges: Sequence[Array], setup: Setup, noise: Mapping[str, float], seed: int) -> Array:
         """Gives positions and quaternions (N, 7)."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
@@ -19,22 +19,28 @@ AXES = ("x", "y", "z", "rx", "ry", "rz")
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Unknown:
-    """A pose, rotation, direction or point.
+    """A pose, rotation, direction, point, or numbers.
 
     Attributes:
-        kind: "pose" (4, 4), "rotation" (3, 3), "direction" (3,) of unit length, or "point" (3,), or "number" (1,).
+        kind: "pose" (4, 4), "rotation" (3, 3), "direction" (3,) of unit length, "point" (3,), or "number" (k,).
         value: the estimate [m].
         known: whether it is not estimated.
+        labels: what each of several numbers is called.
+        unit: of numbers.
+        scale: usual size of a change of numbers.
     """
 
     kind: Literal["pose", "rotation", "direction", "point", "number"]
     value: Array
     known: bool = False
+    labels: tuple[str, ...] = ()
+    unit: str = "m"
+    scale: float = 1e-3
 
     @property
     def size(self) -> int:
         """Number of parameters."""
-        return {"pose": 6, "rotation": 3, "direction": 2, "point": 3, "number": 1}[self.kind]
+        return {"pose": 6, "rotation": 3, "direction": 2, "point": 3, "number": self.value.size}[self.kind]
 
     def moved(self, step: Array) -> Unknown:
         """Gives it after a step of its parameters, which start at zero again."""
@@ -47,7 +53,7 @@ class Unknown:
             value = value / np.linalg.norm(value)
         else:
             value = self.value + step
-        return Unknown(kind=self.kind, value=value, known=self.known)
+        return replace(self, value=value)
 
     def parameters(self, name: str) -> tuple[ErrorParameter, ...]:
         """Lists its parameters."""
@@ -57,7 +63,8 @@ class Unknown:
                 for axis in AXES[: self.size]
             )
         if self.kind == "number":
-            return (parameter(name, "setup", None, "m", 1e-3),)
+            names = [f"{name}_{label}" for label in self.labels] or [name]
+            return tuple(parameter(own, "setup", None, self.unit, self.scale) for own in names)
         return tuple(parameter(f"{name}_{AXES[3 + k]}", "setup", None, "rad", 1e-3) for k in range(self.size))
 
 
@@ -89,6 +96,5 @@ def moved_setup(setup: Setup, step: Array) -> Setup:
 def known_setup(setup: Setup, values: Mapping[str, Array]) -> Setup:
     """Gives a setup in which some parts are known and stay as they are."""
     return {
-        name: Unknown(kind=part.kind, value=values[name], known=True) if name in values else part
-        for name, part in setup.items()
+        name: replace(part, value=values[name], known=True) if name in values else part for name, part in setup.items()
     }

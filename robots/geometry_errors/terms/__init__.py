@@ -12,6 +12,7 @@ from robots.geometry_errors.terms.joint_compliance import JointCompliance
 from robots.geometry_errors.terms.joint_zero import JointZero
 from robots.geometry_errors.terms.link_compliance import LinkCompliance
 from robots.geometry_errors.terms.link_placement import LinkPlacement
+from robots.geometry_errors.terms.load_backlash import LoadBacklash
 from robots.geometry_errors.terms.thermal_growth import ThermalGrowth
 from robots.geometry_errors.terms.time_offset import TimeOffset
 
@@ -24,6 +25,7 @@ TERMS: tuple[ErrorTerm, ...] = (
     LinkCompliance(),
     ThermalGrowth(),
     Backlash(),
+    LoadBacklash(),
     TimeOffset(),
     BaseMotion(),
 )

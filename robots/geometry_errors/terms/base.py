@@ -89,7 +89,8 @@ def along_axis(robot: Robot, joint: int, displacement: Array) -> Array:
         displacement: (N,) [rad or m].
     """
     axis, prismatic = robot.chain.joints[joint].axis, robot.chain.kinds[joint] == "prismatic"
-    twist = np.zeros((len(displacement), 6))
+    # Expressions are objects to numpy.
+    twist = np.zeros((len(displacement), 6), dtype=displacement.dtype)
     twist[:, slice(0, 3) if prismatic else slice(3, 6)] = displacement[:, None] * axis
     return twist
 

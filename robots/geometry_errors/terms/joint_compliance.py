@@ -44,5 +44,7 @@ def axis_loads(robot: Robot, state: ArmState) -> Array:
         for i, joint in enumerate(robot.chain.joints)
     ]
     torque = np.column_stack(parts)
+    if torque.dtype == object:
+        return torque  # Expressions have no size.
     torque[:, np.abs(torque).max(axis=0, initial=0.0) < NEGLIGIBLE * np.abs(state.load).max(initial=0.0)] = 0.0
     return torque

@@ -150,3 +150,53 @@ def test_names_and_joints_are_checked(robot, tmp_path):
         TableOptions(lengths="cm")
     with pytest.raises(OedError, match="corners"):
         CameraBoard(rows=1)
+
+
+@pytest.mark.parametrize("joints", ["J{} [deg]", "A{} (deg)", "joint_{} [degrees]", "Axis {} [°]"])
+def test_names_and_units_of_trackers_and_controllers_are_read(robot, tmp_path, joints):
+    """Joints as controllers call them and positions as trackers do, with units in the names, are read in SI."""
+    table = columns(robot, BodyPoses())
+    renamed = {joints.format(i + 1): np.rad2deg(table[f"q{i + 1}"]) for i in range(6)}
+    renamed |= {f"Position {axis.upper()} [mm]": 1e3 * table[axis] for axis in "xyz"}
+    renamed |= {f"Rotation {axis.upper()}": table[f"q{axis}"] for axis in "xyzw"} | {"RMS": np.ones(30)}
+    poses, plain = read(robot, tmp_path, renamed), read(robot, tmp_path, table)
+    np.testing.assert_allclose(poses.q, plain.q, atol=1e-12)
+    np.testing.assert_allclose(poses.observed, plain.observed, atol=1e-12)
+    assert poses.source["not_read"] == ["RMS"]
+
+
+def test_units_in_the_header_go_before_the_options(robot, tmp_path):
+    """A unit that the file states counts, whatever the options say; one that is none is refused by its column."""
+    table = columns(robot, Markers())
+    path = tmp_path / "poses.csv"
+    write_table(path, {**table, "x": 1e3 * table["x"]}, units={"x": "mm", "y": "m", "z": "m"}, force=True)
+    poses = read_poses(path, robot, options=TableOptions(lengths="mm"))
+    np.testing.assert_allclose(poses.observed, np.column_stack([table[axis] for axis in "xyz"]), atol=1e-12)
+    write_table(path, table, units={"x": "inch"}, force=True)
+    with pytest.raises(OedError, match="column x: unit 'inch'; allowed: m or mm"):
+        read_poses(path, robot)
+
+
+@pytest.mark.parametrize(
+    ("start", "system"), [("Format Version,1.23,Take", "Motive"), ("NO_OF_FRAMES\t12", "Qualisys")]
+)
+def test_recordings_of_motion_capture_are_refused(robot, tmp_path, start, system):
+    """An export with a row for each frame says what has to be done with it."""
+    path = tmp_path / "take.csv"
+    path.write_text(f"{start}\n\n,Type,Rigid Body\n")
+    with pytest.raises(OedError, match=f"{system}.*average the frames"):
+        read_poses(path, robot)
+
+
+@pytest.mark.parametrize(
+    ("known", "message"),
+    [
+        ({"tracker": np.zeros(3)}, "tracker is known as a point; allowed: tracker=X,Y,Z,ROLL,PITCH,YAW"),
+        ({"marker_1": np.eye(4)}, "marker_1 is known as a pose; allowed: marker_1=X,Y,Z"),
+        ({"lens": np.zeros(3)}, "no 'lens'; allowed: tracker, marker_1"),
+    ],
+)
+def test_known_parts_of_another_kind_are_refused(robot, tmp_path, known, message):
+    """A pose that is known as a point, a point that is known as a pose, and a part that there is not."""
+    with pytest.raises(OedError, match=message):
+        read(robot, tmp_path, columns(robot, Markers()), known=known)

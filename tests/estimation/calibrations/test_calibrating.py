@@ -6,12 +6,22 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 from benchmarks.calibration_parts import oracle
 from estimation import calibrate, load_calibration
 from estimation.calibrations import CalibrationOptions
+from estimation.calibrations.selection import select_kinds
 from robots.common.errors import InputError, NotIdentifiableError
-from robots.geometry_errors import Distances, Inclinometer, random_positions, simulate_poses
+from robots.geometry_errors import (
+    CameraBoard,
+    Distances,
+    Inclinometer,
+    Markers,
+    error_term,
+    random_positions,
+    simulate_poses,
+)
 from tests.estimation.calibrations.conftest import NOISE, measured
 
 FIXED = CalibrationOptions(kinds=("joint_zero", "link_placement"), diagnose=False)
@@ -193,3 +203,42 @@ def test_what_cannot_be_done_is_said(ur10):
         CalibrationOptions(kinds=("friction",))
     with pytest.raises(InputError, match="joints"):
         calibrate(ur10, replace(poses, q=poses.q[:, :5]))
+
+
+def test_kinds_that_only_help_together_are_found(ur10):
+    """A gear ratio whose error a zero takes up in the middle of a narrow range: neither alone explains anything."""
+    q = random_positions(ur10, 60, seed=4)
+    middle = 1.5
+    q[:, 2] = middle + 0.1 * np.random.default_rng(4).uniform(-1.0, 1.0, 60)
+    errors = {"ratio_3": 0.02, "zero_3": -0.02 * middle}
+    poses = simulate_poses(ur10, q, Markers(count=2), errors, noise={"m": 5e-5}, seed=1)
+    terms = (error_term("joint_zero"), error_term("gear_ratio"))
+    chosen, trials = select_kinds([ur10], terms, poses)
+    assert [term.kind for term in chosen] == ["joint_zero", "gear_ratio"]
+    # Both belong to one trial; only the noise of 0.05 mm in six numbers remains.
+    assert trials[0].with_it == trials[1].with_it < 1.3 * 5e-5 * np.sqrt(3.0)
+
+
+@pytest.mark.slow
+def test_a_camera_is_calibrated_with_the_robot(ur10):
+    """Focal lengths, centre and lens of a camera on the flange are found with the zeros, from images of one board."""
+    lens = (-0.2, 0.06, 1e-3, -5e-4, 0.01)
+    true = CameraBoard(intrinsics=(1010.0, 1005.0, 650.0, 470.0), distortion=lens)
+    board = np.eye(4)
+    board[:3, :3], board[:3, 3] = Rotation.from_euler("x", np.pi).as_matrix(), (0.55, 0.1, 0.05)
+    setup = {**true.example, "board": replace(true.example["board"], value=board)}
+    q, rng = [], np.random.default_rng(2)
+    while len(q) < 40:
+        drawn = random_positions(ur10, 4000, seed=int(rng.integers(1 << 30)))
+        seen = np.isfinite(simulate_poses(ur10, drawn, true, {}, setup=setup).observed).all(axis=1)
+        q += list(drawn[seen])
+    poses = simulate_poses(ur10, np.array(q[:40]), true, {"zero_3": 0.004}, setup=setup, noise={"px": 0.2}, seed=3)
+    fitted = CameraBoard(intrinsics=(1000.0, 1000.0, 640.0, 480.0), fit="distortion")
+    options = CalibrationOptions(kinds=("joint_zero",), diagnose=False)
+    found = {p.name: p for p in calibrate(ur10, replace(poses, measurement=fitted), options=options).parameters}
+    wanted = dict(zip(("fx", "fy", "cx", "cy"), true.intrinsics, strict=True))
+    for name, value in [("zero_3", 0.004), *((f"camera_px_{k}", v) for k, v in wanted.items()), ("lens_k1", lens[0])]:
+        item = found[name]
+        # Four standard errors of a Gaussian: one in 16,000.
+        assert abs(item.value - value) < 4.0 * item.standard_error, name
+    assert found["camera_px_fx"].standard_error < 2.0

@@ -6,6 +6,8 @@ import mujoco
 import numpy as np
 import pinocchio as pin
 import pytest
+import yaml
+from scipy.spatial.transform import Rotation
 
 from benchmarks.calibration_parts import oracle
 from estimation import calibrate
@@ -62,13 +64,79 @@ def test_the_yaml_keeps_limits_and_flange(calibrated, tmp_path):
 
 
 def test_identification_takes_the_calibrated_robot(calibrated, tmp_path):
-    """The written robot is identified and designed for, as any other."""
+    """The written robot is identified and designed for with the base parameters of its design."""
     (tmp_path / "robot.urdf").write_text(calibrated_urdf(calibrated))
     from robots.base_parameters import find_base_parameters
     from robots.regressor import default_model
 
     robot = load_robot(tmp_path / "robot.urdf", unlimited=True)
-    assert find_base_parameters(default_model(robot)).size >= find_base_parameters(default_model(calibrated.robot)).size
+    found, designed = (find_base_parameters(default_model(one)) for one in (robot, calibrated.robot))
+    assert found.names == designed.names
+
+
+def turned(axis, angle):
+    """A turn about x, y or z (4, 4), in plain numpy."""
+    pose = np.eye(4)
+    pose[:3, :3] = Rotation.from_euler("xyz"[axis], angle).as_matrix()
+    return pose
+
+
+def shifted(axis, length):
+    pose = np.eye(4)
+    pose[axis, 3] = length
+    return pose
+
+
+@pytest.mark.parametrize("convention", ["modified", "standard"])
+@pytest.mark.parametrize("which", ["", "nominal_"])
+def test_dh_tables_move_the_flange_as_the_chain(calibrated, convention, which):
+    """The product of the table's own matrices, row by row as its head states them, is the flange of the robot."""
+    lines = dh_text(calibrated, convention).splitlines()
+    poses = [
+        np.array([[float(x) for x in row.split()] for row in line.split(": ")[1].split(";")])
+        for line in lines
+        if line.startswith("# f") and "calibrated" in line
+    ]
+    names, *rows = [line.split(",") for line in lines if not line.startswith("#")]
+    robot = calibrated.corrected if not which else calibrated.robot
+    q = random_positions(robot, 4, seed=5)
+    found = []
+    for x in q:
+        pose = np.eye(4)
+        for joint, cells in enumerate(rows):
+            row = dict(zip(names, cells, strict=True))
+            alpha, a, beta, d, offset = (float(row[which + n]) for n in ("alpha", "a", "beta", "d", "offset"))
+            turn = turned(2, x[joint] + offset)
+            if convention == "modified":
+                pose = pose @ turned(0, alpha) @ shifted(0, a) @ turned(1, beta) @ turn @ shifted(2, d)
+            else:
+                pose = pose @ turn @ shifted(2, d) @ shifted(0, a) @ turned(0, alpha) @ turned(1, beta)
+        found.append(pose)
+    flange = robot.chain.flange(q)
+    if which:
+        # The head has the calibrated ends: of the nominal table, the way between two poses is compared.
+        ends = [np.linalg.inv(found[0]) @ pose for pose in found]
+        own = [np.linalg.inv(flange[0]) @ pose for pose in flange]
+        # They differ by one constant turn of the flange: angles of turns are the same.
+        angles = [np.trace(pose[:3, :3]) for pose in ends], [np.trace(pose[:3, :3]) for pose in own]
+        np.testing.assert_allclose(*angles, atol=1e-7)
+    else:
+        # Numbers have nine digits.
+        np.testing.assert_allclose([poses[0] @ pose @ poses[1] for pose in found], flange, atol=2e-8)
+
+
+def test_controllers_take_the_zeros():
+    """A nominal arm in plain numpy at readings plus zeros is where an arm with those zeros was measured."""
+    robot = load_robot("ur10")
+    truth = oracle.Errors.none(6)
+    truth.zero = np.array([0.0, 4e-3, -3e-3, 2e-3, 5e-3, 0.0])
+    arm, q = oracle.Arm.of(robot), random_positions(robot, 5, seed=3)
+    options = CalibrationOptions(kinds=("joint_zero",), diagnose=False)
+    text = zeros_text(calibrate(robot, measured(robot, 40, truth, seed=1, noise=1e-7), options=options))
+    zeros = np.array([yaml.safe_load(text)["joint_zeros"][name] for name in robot.joint_names])
+    found, wanted = oracle.flange(arm, q + zeros, oracle.Errors.none(6)), oracle.flange(arm, q, truth)
+    # The zeros of the first and last joint are those of the tracker and the tool; the noise moves others by 1e-7.
+    np.testing.assert_allclose(found[:, :3, 3], wanted[:, :3, 3], atol=1e-6)
 
 
 def test_tables_state_before_and_after(calibrated):

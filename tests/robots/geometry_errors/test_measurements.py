@@ -36,6 +36,7 @@ MEASUREMENTS = (
     Points(count=2),
     CameraBoard(rows=2, across=3),
     CameraBoard(rows=2, across=3, on_flange=False),
+    CameraBoard(rows=2, across=3, distortion=(-0.2, 0.05, 1e-3, -2e-3, 0.01), fit="distortion"),
     Inclinometer(),
 )
 POSES = 12
@@ -67,7 +68,9 @@ def model_of(robot, measurement, rng):
     return model, values, moved_setup(start, 0.05 * rng.standard_normal(sum(part.size for part in start.values())))
 
 
-@pytest.mark.parametrize("measurement", MEASUREMENTS, ids=lambda m: f"{m.kind}-{getattr(m, 'on_flange', '')}")
+@pytest.mark.parametrize(
+    "measurement", MEASUREMENTS, ids=lambda m: f"{m.kind}-{getattr(m, 'on_flange', '')}-{getattr(m, 'fit', '')}"
+)
 def test_derivatives_are_those_of_the_prediction(robot, measurement):
     """The Jacobian of every kind of error and of the setup is the derivative of the prediction, by differences."""
     model, values, setup = model_of(robot, measurement, np.random.default_rng(0))

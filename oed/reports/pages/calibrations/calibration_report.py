@@ -47,7 +47,7 @@ def calibration_page(calibration: Calibration) -> Page:
                     "Each pose was predicted by a fit to others that are not alike. Outside the range of those the "
                     "error is larger.",
                 ),
-                pictures=(_pose_picture(calibration), _joint_picture(calibration)),
+                pictures=(_pose_picture(calibration), _joint_picture(calibration), *_session_picture(calibration)),
                 tables=(_level_table(calibration),),
             ),
             Section(
@@ -91,6 +91,32 @@ def _joint_picture(calibration: Calibration) -> Picture:
     labels = [f"position [{'m' if kind == 'prismatic' else 'rad'}]" for kind in calibration.robot.chain.kinds]
     panels = _error_panels(calibration, labels, calibration.poses.q)
     return Picture(name="joints", title="Error over the position of each joint", panels=panels, columns=2)
+
+
+def _session_picture(calibration: Calibration) -> Iterator[Picture]:
+    """The mean error of each session by axis: a base that moved between two shows as a step."""
+    poses, (unit, factor) = calibration.poses, SHOWN[calibration.unit]
+    if poses.session is None or poses.shift is None or poses.shift_before is None or np.ptp(poses.session) == 0:
+        return
+    numbers = np.unique(poses.session)
+    shown = (("description", poses.shift_before, "second"), ("calibrated, held out", poses.shift, "main"))
+    names = {3: ("x", "y", "z"), 2: ("first", "second"), 1: ("error",)}[poses.shift.shape[1]]
+    panels = []
+    for axis, title in enumerate(names):
+        series = []
+        for name, shift, role in shown:
+            own = [factor * shift[(poses.session == number) & poses.used, axis] for number in numbers]
+            own = [values[np.isfinite(values)] for values in own]
+            mean = np.array([values.mean() if len(values) else np.nan for values in own])
+            # Two standard errors of the mean.
+            error = np.array(
+                [2.0 * values.std(ddof=1) / np.sqrt(len(values)) if len(values) > 1 else 0.0 for values in own]
+            )
+            series.append(Series(x=numbers.astype(float), y=mean, error=error, name=name, kind="markers", role=role))
+        label = f"mean error [{unit}]"
+        panels.append(Panel(title=title, x_label="session", y_label=label, series=tuple(series)))
+    title = "Mean error of each session, by axis of the measurement"
+    yield Picture(name="sessions", title=title, panels=tuple(panels), columns=len(panels))
 
 
 def _error_panels(calibration: Calibration, labels: Sequence[str], values: Array) -> tuple[Panel, ...]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from oed.experiments.pose_designs import PoseDesign, observability_indices
+from oed.experiments.pose_designs import PoseDesign
 from oed.experiments.safety_checks.freedom import freedom_text, is_free
 from oed.reports.animations.building import animate
 from oed.reports.rendering.page import Cell, Fact, Page, Section, Table, page_of, table_of
@@ -40,6 +40,7 @@ def pose_design_page(design: PoseDesign) -> Page:
 
 
 def _picture(design: PoseDesign) -> Picture:
+    before = design.exchanged_eigenvalues
     series = tuple(
         Series(
             x=np.arange(1.0, len(values) + 1.0),
@@ -50,6 +51,7 @@ def _picture(design: PoseDesign) -> Picture:
         )
         for values, name, role in (
             (design.eigenvalues, "designed", "main"),
+            *([] if before is None else [(before, "by exchange alone", "third")]),
             (design.random_eigenvalues, "random", "second"),
         )
     )
@@ -63,9 +65,9 @@ def _picture(design: PoseDesign) -> Picture:
 
 
 def _indices(design: PoseDesign) -> Table:
-    own, other = design.observability, observability_indices(design.random_eigenvalues, len(design.q))
-    rows: list[tuple[Cell, ...]] = [(name, own[name], other[name]) for name in own]
-    return Table(headings=("index", "designed", "as many random poses"), rows=tuple(rows))
+    sets = design.compared
+    rows: list[tuple[Cell, ...]] = [(name, *(own[name] for own in sets.values())) for name in design.observability]
+    return Table(headings=("index", *sets), rows=tuple(rows), caption="Of as many poses each.")
 
 
 def _expected(design: PoseDesign) -> Table:

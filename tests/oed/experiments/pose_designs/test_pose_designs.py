@@ -8,10 +8,12 @@ import pytest
 from oed import PoseOptions, design_poses
 from oed.experiments.pose_designs import View, load_pose_design, observability_indices
 from oed.experiments.pose_designs.exchange import exchanged
+from oed.experiments.pose_designs.information import PoseInformation
 from oed.experiments.pose_designs.observability import pose_criterion
+from oed.experiments.pose_designs.refinement import PoseProblem, refined
 from robots import load_robot
 from robots.common.errors import InfeasibleError, InputError
-from robots.geometry_errors import Markers, random_positions
+from robots.geometry_errors import CameraBoard, Markers, random_positions
 
 
 @pytest.fixture(scope="module")
@@ -47,6 +49,48 @@ def test_exchange_improves_any_criterion(name):
     assert best <= min(cost(rng.permutation(200)[:8]) for _ in range(100))
 
 
+@pytest.mark.parametrize("name", ["d", "cond", "o3", "o4", "o5"])
+def test_refinement_has_exact_gradients(robot, name):
+    """The gradient of each criterion by all positions is that of central differences."""
+    information = PoseInformation(robot, Markers(), ("joint_zero",), {"m": 1e-4})
+    problem = PoseProblem(information, pose_criterion(name), 6)
+    z = random_positions(robot, 6, seed=2).ravel()
+    way = np.random.default_rng(0).standard_normal(z.size)
+    _, gradient = problem.surrogate(z, 8.0)
+    ahead, behind = (problem.surrogate(z + step * way, 8.0)[0] for step in (1e-5, -1e-5))
+    # The third derivative times the square of the step.
+    assert gradient @ way == pytest.approx((ahead - behind) / 2e-5, rel=1e-5, abs=1e-7)
+
+
+def test_only_poses_that_show_the_board_are_designed(robot):
+    """A pose at which a camera has the board out of its image informs of nothing, and is no candidate."""
+    camera = CameraBoard(rows=2, across=2)
+    information = PoseInformation(robot, camera, ("joint_zero",), {"px": 0.2})
+    q = random_positions(robot, 3000, seed=2)
+    seen = information.seen(q)
+    assert 0 < seen.sum() < len(q)
+    # The board's first corner lies ahead of the camera, and within the image, by plain projection.
+    corner = np.linalg.inv(robot.chain.flange(q[seen])) @ np.array([0.5, 0.0, 0.0, 1.0])
+    pixels = 1000.0 * corner[:, :2] / corner[:, 2:3] + (640.0, 480.0)
+    assert ((pixels >= 0.0) & (pixels <= (1280.0, 960.0)) & (corner[:, 2:3] > 0.0)).all()
+
+
+def test_refinement_improves_within_limits(robot):
+    """Poses that IPOPT moved are better by the criterion, within their ranges and in the cone of view."""
+    view = View(origin=(1.5, 0.0, 0.5), towards=(0.0, 0.0, 0.4), cone=0.3)
+    information = PoseInformation(robot, Markers(), ("joint_zero",), {"m": 1e-4})
+    drawn = random_positions(robot, 2000, seed=2)
+    q = drawn[view.sees(robot.chain.flange(drawn))][:6]
+    bounds = (q.min(axis=0) - 0.5, q.max(axis=0) + 0.5)
+    criterion = pose_criterion("d")
+    found = refined(information, q, criterion, bounds, lambda x: view.sees(robot.chain.flange(x)), view=view)
+    problem = PoseProblem(information, criterion, 6)
+    # Six random poses are far from the best: their determinant grows by much more than a factor of e.
+    assert problem.cost(found) < problem.cost(q) - 1.0
+    assert view.sees(robot.chain.flange(found)).all()
+    assert ((found >= bounds[0]) & (found <= bounds[1])).all()
+
+
 @pytest.mark.slow
 def test_poses_keep_all_limits(robot, design):
     """Poses lie within limits and in view, and the whole motion is proved free of collisions."""
@@ -77,6 +121,8 @@ def test_designed_poses_beat_random_ones(design):
     other = observability_indices(design.random_eigenvalues, len(design.q))
     assert design.observability["O1"] > 1.1 * other["O1"]
     assert np.isfinite(design.expected).all()
+    # IPOPT moves the exchanged poses to better ones.
+    assert design.observability["O1"] > design.compared["by exchange alone"]["O1"]
 
 
 @pytest.mark.slow
