@@ -36,6 +36,17 @@ def started(freedom: Freedom, values: Sequence[Array], runs: Sequence[Run]) -> t
         runs: what was recorded.
     """
     fleet = freedom.fleet
+    if any(dynamics.parted for dynamics in fleet.dynamics):
+        # Where the links are is not measured: the start is that of rigid gears.
+        rigid = fleet.rigid
+        own = tuple(p for p in freedom.free if all(p.name in rigid.drives[j].names for j in p.joints))
+        found = started(Freedom(fleet=rigid, free=own), rigid.taken(values, fleet), runs)
+        known = fleet.taken(found, rigid)
+        mine = [p for p in freedom.free if p not in own]
+        for parameter in mine:
+            for joint in parameter.joints:
+                known = fleet.changed(known, parameter.name, [joint], fleet.of(values, joint, parameter.name))
+        return known
     if any(len(dynamics.owners) for dynamics in fleet.dynamics):
         return tuple(values)
     linear = [k for k, parameter in enumerate(freedom.free) if parameter.name != "delay"]

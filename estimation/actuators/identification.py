@@ -172,15 +172,16 @@ def _result(
     logs: Sequence[Log],
     options: ActuatorOptions,
 ) -> Actuators:
+    reached = fit.freedom.fleet
     fitted_as_described = _described_errors(fleet, runs)
-    seen_as_described, after = _described_errors(fleet, seen), simulate_runs(fleet, fit.values, seen)
+    seen_as_described, after = _described_errors(fleet, seen), simulate_runs(reached, fit.values, seen)
     errors = tuple(
         MotionError(name=name, described=a, fitted=b, held_out_described=c, held_out=d)
         for name, a, b, c, d in zip(
             fleet.names, rms(fitted_as_described), fit.rms, rms(seen_as_described), rms(after), strict=True
         )
     )
-    drives = fleet.with_values(fit.values)
+    drives = reached.with_values(fit.values)
     result = Actuators(
         robot=fleet.robots[0].name,
         joints=fleet.names,
@@ -207,7 +208,8 @@ def _result(
 
 def _written_error(fleet: Fleet, fit: Fit, result: Actuators, seen: Sequence[Run]) -> float:
     """Error of the drives as simulators express them."""
-    values: tuple[Array, ...] = fit.values
+    fleet = fleet.rigid
+    values = fleet.taken(fit.values, fit.freedom.fleet)
     for joint, friction in enumerate(expressible(result).friction):
         values = fleet.changed(values, "coulomb", [joint], float(friction))
     for name, neutral in NEUTRAL.items():
@@ -242,7 +244,9 @@ def _parameters(fleet: Fleet, fit: Fit, seed: int) -> tuple[DriveValue, ...]:
                 lower=max(lower, parameter.lower),
                 upper=min(upper, parameter.upper),
                 unit=parameter.unit,
-                described=float(np.mean([fleet.drives[j].values[parameter.name] for j in parameter.joints])),
+                described=float(
+                    np.mean([fleet.drives[j].values.get(parameter.name, np.nan) for j in parameter.joints])
+                ),
                 status=status,
                 partners=tuple(_name(free[m]) for m in known.partners[k]),
             )

@@ -41,7 +41,7 @@ class DriveValue:
         lower: end of the 95 % interval.
         upper: the other end.
         unit: such as ``kg m2``.
-        described: what the description said.
+        described: what the description said; NaN where it said nothing.
         status: ``identified``, ``at its bound`` or ``not determined``.
         partners: other parameters, of which the log shows only a combination with this one.
     """

@@ -31,6 +31,8 @@ BLOCKS, EVERY = 15, 3
 """Blocks of time into which a run is divided to compare effects; one of so many is held out."""
 SAME = 1e-3
 """RMS difference of command and measurement, as a fraction of the motion, below which they are the same signal."""
+ROUNDING = 1e-9
+"""Change of a position [rad or m] up to which it is none."""
 BASE = re.compile(r"(base|root|pelvis|torso|trunk|imu)", re.IGNORECASE)
 HELD = 0.02
 """Standard deviation of a base's pose [m or rad or 1] up to which it counts as held."""
@@ -82,6 +84,14 @@ class Run:
         count = min(len(self.t), max(8, int(np.searchsorted(self.t, self.t[0] + 0.03))))
         t = self.t[:count] - self.t[0]
         return np.asarray(np.polyfit(t, self.q[:count], 2)[1])
+
+    @cached_property
+    def noise(self) -> Array:
+        """Noise of measured positions (n,): differences of the third order, or the rounding of the encoder's steps."""
+        rough = np.diff(self.q, 3, axis=0).std(axis=0) / np.sqrt(20.0)
+        changes = np.abs(np.diff(self.q, axis=0))
+        steps = np.where(changes > ROUNDING, changes, np.inf).min(axis=0)
+        return np.maximum(rough, np.where(np.isfinite(steps), steps, 0.0) / np.sqrt(12.0))
 
     @cached_property
     def counted(self) -> NDArray[np.bool_]:

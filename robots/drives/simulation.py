@@ -38,7 +38,7 @@ class Simulated:
         dq: velocities (N, n) [rad/s or m/s].
         sensitivity: derivatives of `measured` by the chosen combinations of parameters (N, n, k), if they were asked
             for.
-        residual: largest residual of the balance of torques in all steps (n,) [N m or N], if they were.
+        residual: largest residual of the balance of torques in all steps (d,) [N m or N], if they were.
     """
 
     t: Array
@@ -92,61 +92,95 @@ def simulate_drives(
     Raises:
         SolverError: the loop is not stable.
     """
-    n, s = dynamics.n, len(dynamics.owners)
-    layout = dynamics.layout
+    layout, d, shown = dynamics.layout, dynamics.masses, dynamics.shown
     edges, substeps = step_times(t, usual_step(t) if longest is None else longest)
     zero, delay = layout.of("encoder_zero"), layout.of("delay")
-    delays = np.zeros(n)
+    delays = np.zeros(dynamics.n)
     delays[layout.joints[delay]] = values[delay]
     means, slopes = command.means(edges, delays)
     h = np.diff(edges)
-    first = np.concatenate([start.measured - values[zero], start.dq, np.zeros(n + s)])
+    place, place_slopes = _placed(dynamics, start.measured - values[zero], values)
+    speed = np.concatenate([start.dq, start.dq[list(dynamics.parted)]])
+    first = np.concatenate([place, speed, np.zeros(d + len(dynamics.owners))])
     inputs = np.concatenate([h[:, None], means], axis=1)[:, None, :]
     states = dynamics.step.run(first[None], inputs, values[None])[:, 0]
     path = np.concatenate([first[None], states])
-    if not np.isfinite(path).all() or np.abs(path[:, :n]).max() > UNSTABLE:
+    if not np.isfinite(path).all() or np.abs(path[:, :d]).max() > UNSTABLE:
         raise SolverError(
             f"the simulated loop of {dynamics.robot.name} is not stable",
             remedy="check gains and delay, or start nearer to the truth",
         )
-    measured, dq = path[::substeps, :n] + values[zero], path[::substeps, n : 2 * n]
+    measured, dq = path[::substeps, shown] + values[zero], path[::substeps, d + shown]
     if directions is None:
         return Simulated(t=t, measured=measured, dq=dq)
-    sensitivity, residual = _sensitivity(dynamics, path, h, means, slopes, values, directions)
-    chosen = sensitivity[::substeps] + directions[zero]
+    sensitivity, residual = _sensitivity(
+        dynamics, path, h, means, slopes, values, directions, place_slopes @ directions
+    )
+    chosen = sensitivity[::substeps, shown] + directions[zero]
     return Simulated(t=t, measured=measured, dq=dq, sensitivity=chosen, residual=residual)
 
 
+def _placed(dynamics: DriveDynamics, q: Array, values: Array) -> tuple[Array, Array]:
+    """Coordinates (d,) at rest where the encoders show q (n,), and their derivatives by the parameters (d, P)."""
+    n, parted = dynamics.n, list(dynamics.parted)
+    slopes = np.zeros((dynamics.masses, dynamics.size))
+    slopes[dynamics.shown, dynamics.layout.of("encoder_zero")] = -1.0
+    place = np.concatenate([q, q[parted]])
+    if not parted:
+        return place, slopes
+    twist, by_p = (np.asarray(part, dtype=float) for part in dynamics.twist(q, values))
+    for k, joint in enumerate(parted):
+        by_link = dynamics.shown[joint] != joint
+        other, sign = (joint, 1.0) if by_link else (n + k, -1.0)
+        place[other] += sign * twist[k, 0]
+        slopes[other] = slopes[dynamics.shown[joint]] + sign * by_p[k]
+    return place, slopes
+
+
 def _sensitivity(
-    dynamics: DriveDynamics, path: Array, h: Array, means: Array, slopes: Array, values: Array, directions: Array
+    dynamics: DriveDynamics,
+    path: Array,
+    h: Array,
+    means: Array,
+    slopes: Array,
+    values: Array,
+    directions: Array,
+    start: Array,
 ) -> tuple[Array, Array]:
-    """Derivatives of positions (K + 1, n, k) by the implicit function theorem in each step; largest residuals (n,)."""
-    n, s, layout = dynamics.n, len(dynamics.owners), dynamics.layout
+    """Derivatives of coordinates (K + 1, d, k) by the implicit function theorem in each step; largest residuals (d,).
+
+    `start` are those at the start (d, k).
+    """
+    n, d, s, layout = dynamics.n, dynamics.masses, len(dynamics.owners), dynamics.layout
     length = h[:, None, None]
-    q, v, own = path[:-1, :n], path[:-1, n : 2 * n], path[:-1, 3 * n :]
-    velocity = (path[1:, :n] - q) / h[:, None]
+    q, v, own = path[:-1, :d], path[:-1, d : 2 * d], path[:-1, 3 * d :]
+    velocity = (path[1:, :d] - q) / h[:, None]
     middle, acceleration = q + h[:, None] / 2 * velocity, 2 * (velocity - v) / h[:, None]
-    half = (path[1:, 3 * n :] + own) / 2
+    half = (path[1:, 3 * d :] + own) / 2
     p = np.broadcast_to(values, (len(h), len(values)))
     residual, J, by_own, by_mass, *of_rates = dynamics.slopes(middle, velocity, acceleration, means, half, p)
-    Jq, Jv, Ja, Jc, Jx = (J[:, :, k * n : min((k + 1) * n, 4 * n + s)] for k in range(5))
+    ends = np.cumsum([d, d, d, n])
+    Jq, Jv, Ja, Jc, Jx = np.split(J, ends, axis=2)
     # Columns by the directions: those of a joint's own parameters, of its command by the delay, and of masses.
-    by_p = np.zeros((len(h), n, directions.shape[1]))
+    by_p = np.zeros((len(h), d, directions.shape[1]))
     mass, delay = layout.of("mass_factor"), layout.of("delay")
     for joint in range(n):
         mine = layout.of_joints[joint]
         by_p[:, joint] = by_own[:, 0, mine] @ directions[mine]
+    for k, joint in enumerate(dynamics.parted):
+        mine = layout.of_joints[joint]
+        by_p[:, n + k] = by_own[:, 1, mine] @ directions[mine]
     if directions[mass].any():
         by_p += by_mass @ directions[mass]
     moved = np.zeros((len(h), n, directions.shape[1]))
     moved[:, layout.joints[delay]] = slopes[:, layout.joints[delay], None] * directions[delay]
     by_p += Jc @ moved
-    size = 2 * n + s
+    size = 2 * d + s
     A, B = np.zeros((len(h), size, size)), np.zeros((len(h), size, directions.shape[1]))
     by_z, by_q, by_v = Jq * length / 2 + Jv + 2 / length * Ja, Jq, -2 / length * Ja
     if s:
-        R, Rp = of_rates[0], _rate_columns(dynamics, of_rates[1], directions) + of_rates[0][:, :, 3 * n : 4 * n] @ moved
-        Rq, Rv, Rx = R[:, :, :n], R[:, :, n : 2 * n], R[:, :, 4 * n :]
+        Rq, Rv, _, Rc, Rx = np.split(of_rates[0], ends, axis=2)
+        Rp = _rate_columns(dynamics, of_rates[1], directions) + Rc @ moved
         # The state in the middle of a step: half = own + h / 2 rate(half), to be solved for its change.
         solved = np.linalg.inv(np.eye(s) - length / 2 * Rx)
         to_z, to_q, to_p = (solved @ (length / 2 * part) for part in (Rq * length / 2 + Rv, Rq, Rp))
@@ -154,19 +188,19 @@ def _sensitivity(
         by_x = Jx @ solved
     inverse = -np.linalg.inv(by_z)
     zq, zv, zp = inverse @ by_q, inverse @ by_v, inverse @ by_p
-    eye = np.eye(n)
-    A[:, :n, :n], A[:, :n, n : 2 * n], B[:, :n] = eye + length * zq, length * zv, length * zp
-    A[:, n : 2 * n, :n], A[:, n : 2 * n, n : 2 * n], B[:, n : 2 * n] = 2 * zq, 2 * zv - eye, 2 * zp
+    eye = np.eye(d)
+    A[:, :d, :d], A[:, :d, d : 2 * d], B[:, :d] = eye + length * zq, length * zv, length * zp
+    A[:, d : 2 * d, :d], A[:, d : 2 * d, d : 2 * d], B[:, d : 2 * d] = 2 * zq, 2 * zv - eye, 2 * zp
     if s:
         zx = inverse @ by_x
-        A[:, :n, 2 * n :], A[:, n : 2 * n, 2 * n :] = length * zx, 2 * zx
-        A[:, 2 * n :, :n] = 2 * (to_z @ zq + to_q)
-        A[:, 2 * n :, n : 2 * n] = 2 * to_z @ zv
-        A[:, 2 * n :, 2 * n :] = 2 * (to_z @ zx + solved) - np.eye(s)
-        B[:, 2 * n :] = 2 * (to_z @ zp + to_p)
+        A[:, :d, 2 * d :], A[:, d : 2 * d, 2 * d :] = length * zx, 2 * zx
+        A[:, 2 * d :, :d] = 2 * (to_z @ zq + to_q)
+        A[:, 2 * d :, d : 2 * d] = 2 * to_z @ zv
+        A[:, 2 * d :, 2 * d :] = 2 * (to_z @ zx + solved) - np.eye(s)
+        B[:, 2 * d :] = 2 * (to_z @ zp + to_p)
     first = np.zeros((size, directions.shape[1]))
-    first[:n] = -directions[layout.of("encoder_zero")]
-    return _recursion(A, B, first)[:, :n], np.abs(residual[:, :, 0]).max(axis=0)
+    first[:d] = start
+    return _recursion(A, B, first)[:, :d], np.abs(residual[:, :, 0]).max(axis=0)
 
 
 def _rate_columns(dynamics: DriveDynamics, by_p: Array, directions: Array) -> Array:

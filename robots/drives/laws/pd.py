@@ -28,4 +28,4 @@ class PdLaw(Member):
         """Builds the torque of a position command."""
         error, band = signal - now.measured, values["dead_band"]
         outside = error - casadi.fmax(casadi.fmin(error, band), -band)
-        return values["kp"] * outside - values["kd"] * now.dq
+        return values["kp"] * outside - values["kd"] * now.measured_rate
