@@ -40,8 +40,7 @@ def started(freedom: Freedom, values: Sequence[Array], runs: Sequence[Run]) -> t
         # Where the links are is not measured: the start is that of rigid gears.
         rigid = fleet.rigid
         own = tuple(p for p in freedom.free if all(p.name in rigid.drives[j].names for j in p.joints))
-        found = started(Freedom(fleet=rigid, free=own), rigid.taken(values, fleet), runs)
-        known = fleet.taken(found, rigid)
+        known = fleet.taken(started(Freedom(fleet=rigid, free=own), rigid.taken(values, fleet), runs), rigid)
         mine = [p for p in freedom.free if p not in own]
         for parameter in mine:
             for joint in parameter.joints:
@@ -103,9 +102,12 @@ def _balance(
         means = low_pass(run.of(columns).means(edges, delays)[0], period, cutoff)
         own = q[:, columns] - p[layout.of("encoder_zero")]
         signals = [signal[rows] for signal in (own, dq[:, columns], ddq[:, columns], means)]
-        count = len(signals[0])
+        count, full, base = len(signals[0]), p, np.zeros((len(signals[0]), 0))
+        if run.situations:
+            around = run.situations[chain]
+            full, base = np.concatenate([p, around.body]), around.at(run.t[rows])
         residual, _, by_own, by_mass, *_ = dynamics.slopes(
-            *signals, np.zeros((count, 0)), np.broadcast_to(p, (count, len(p)))
+            *signals, np.zeros((count, 0)), np.broadcast_to(full, (count, len(full))), base
         )
         mass = layout.of("mass_factor")
         for joint in range(len(columns)):

@@ -35,7 +35,7 @@ class Fit:
         values: all parameters, chain by chain.
         theta: the free ones, scaled (K,).
         errors: of the simulated motion, with derivatives.
-        weights: of the joints (n,) [1/rad2 or 1/m2].
+        weights: of the joints (n,) [1/rad2 or 1/m2]; with currents, then of these (2 n,).
         cost: the weighted sum of squares.
         settled: whether the last steps changed nothing.
         start: the scaled values that the prior is about (K,).
@@ -79,7 +79,7 @@ def fit_drives(
         runs: what was recorded.
         options: settings.
         progress: receives each step.
-        weights: of the joints (n,) [1/rad2 or 1/m2] in the first round; by default alike.
+        weights: of the joints (n,) [1/rad2 or 1/m2], and of currents, in the first round; by default alike.
 
     Raises:
         SolverError: the loop is not stable at the start.
@@ -89,7 +89,8 @@ def fit_drives(
     prior = theta.copy()
     errors = linearised_runs(freedom, freedom.values(theta, start), runs)
     if weights is None:
-        weights = np.full(freedom.fleet.n, float(np.mean(np.maximum(rms(errors), FLOOR) ** 2)) ** -1)
+        kinds = np.split(np.maximum(rms(errors), FLOOR) ** 2, range(freedom.fleet.n, len(rms(errors)), freedom.fleet.n))
+        weights = np.concatenate([np.full(freedom.fleet.n, float(np.mean(kind)) ** -1) for kind in kinds])
     settled = False
     for round_ in range(chosen.rounds):
         theta, errors, settled = _descend(freedom, start, theta, prior, errors, weights, runs, chosen, progress)

@@ -49,10 +49,16 @@ class Fleet:
         robots: the chains.
         drives: of all joints, in the order of the chains.
         dynamics: of the chains, where they are known: they are compiled.
+        situated: whether runs have bases or payloads of their own.
     """
 
     def __init__(
-        self, robots: Sequence[Robot], drives: Sequence[Drive], dynamics: Sequence[DriveDynamics] | None = None
+        self,
+        robots: Sequence[Robot],
+        drives: Sequence[Drive],
+        dynamics: Sequence[DriveDynamics] | None = None,
+        *,
+        situated: bool = False,
     ) -> None:
         self.robots, self.drives = tuple(robots), tuple(drives)
         ends = np.cumsum([robot.n for robot in robots])
@@ -62,7 +68,7 @@ class Fleet:
         self.dynamics = tuple(
             dynamics
             or (
-                DriveDynamics(robot, [drives[j] for j in columns])
+                DriveDynamics(robot, [drives[j] for j in columns], situated=situated)
                 for robot, columns in zip(robots, self.columns, strict=True)
             )
         )
@@ -73,6 +79,11 @@ class Fleet:
     def n(self) -> int:
         """Number of joints."""
         return len(self.drives)
+
+    @property
+    def situated(self) -> bool:
+        """Whether runs have bases or payloads of their own."""
+        return self.dynamics[0].situated
 
     @property
     def values(self) -> tuple[Array, ...]:
@@ -106,7 +117,9 @@ class Fleet:
         for chain, columns in enumerate(self.columns):
             own = [drives[j] for j in columns]
             same = all(new.members == self.drives[j].members for new, j in zip(own, columns, strict=True))
-            dynamics.append(self.dynamics[chain] if same else DriveDynamics(self.robots[chain], own))
+            dynamics.append(
+                self.dynamics[chain] if same else DriveDynamics(self.robots[chain], own, situated=self.situated)
+            )
         return Fleet(self.robots, drives, dynamics)
 
     def with_gear(self, joint: int, gear: ElasticGear | None) -> Fleet:

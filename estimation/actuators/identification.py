@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from estimation.actuators.base_motion import is_situated, with_base
 from estimation.actuators.equation_error import started
 from estimation.actuators.exports.expressible import expressible
 from estimation.actuators.fitting import Fit, fit_drives
@@ -22,6 +23,7 @@ from estimation.actuators.freedom import (
 from estimation.actuators.options import ActuatorOptions
 from estimation.actuators.result import Actuators, DriveValue, MotionError, Trace
 from estimation.actuators.runs import Run, runs_of
+from estimation.actuators.scale import scale_notes, with_constants, with_currents
 from estimation.actuators.search import LoopFinding, search_effects
 from estimation.actuators.simulated_error import Errors, prepare, rms, simulate_runs
 from estimation.actuators.uncertainty import intervals, uncertainty_of
@@ -76,7 +78,8 @@ def identify_actuators(
 
     Args:
         robots: the robot, or its chains from a base that is held, see `robots.drives.branches.load_branches`.
-        logs: with commands, of all joints in the order of the chains.
+        logs: with commands, of all joints in the order of the chains. Currents, known payloads, and a base that moves
+            or stands otherwise than described count.
         drives: what is known of the joints' drives, see `robots.drives.described_drives`.
         held_out: logs that nothing is fitted to. Without them the last part of each run is held out.
         options: settings.
@@ -96,25 +99,33 @@ def identify_actuators(
     chains = [robots] if isinstance(robots, Robot) else list(robots)
     given = [logs] if isinstance(logs, Log) else list(logs)
     outside = [held_out] if isinstance(held_out, Log) else list(held_out)
-    fleet = Fleet(chains, drives)
+    given, outside = [with_base(log) for log in given], [with_base(log) for log in outside]
+    fleet = Fleet(chains, drives, situated=any(is_situated(log) for log in [*given, *outside]))
     runs, notes = runs_of(given, fleet)
     other, more = runs_of(outside, fleet) if outside else ((), ())
+    other = tuple(replace(run, current=None) for run in other)
     freedom = _freedom(fleet, chosen)
     bar.start("fitting the drives", None)
     prepare(fleet)
     begun, ended = zip(*(run.cut(TRAINED) for run in runs), strict=True)
     fitted_runs, text = (runs, "held-out logs") if outside else (begun, f"the last {1 - TRAINED:.0%} of each run")
-    seen: Sequence[Run] = other if outside else ended
-    start = _start(freedom, fitted_runs, bar)
+    seen: Sequence[Run] = other if outside else [replace(run, current=None) for run in ended]
+    fitted_runs, said = with_currents(fitted_runs, fleet)
+    plain = [replace(run, current=None) for run in fitted_runs]
+    start = _start(freedom, plain, bar)
     findings: tuple[LoopFinding, ...] = ()
     if chosen.effects:
-        trained, validated = zip(*(run.blocks() for run in fitted_runs), strict=True)
+        trained, validated = zip(*(run.blocks() for run in plain), strict=True)
         first = fit_drives(freedom, start, trained, replace(chosen.fit, settled=ROUGH), bar)
         freedom, start, findings = search_effects(first, trained, validated, bar)
+    if fitted_runs[0].current is not None:
+        # Torques are simulated along a motion that is right already.
+        start = fit_drives(freedom, start, plain, replace(chosen.fit, settled=ROUGH), bar).values
+        freedom, start = with_constants(freedom, start, fitted_runs)
     fit = fit_drives(freedom, start, fitted_runs, chosen.fit, bar)
     bar.finish()
-    notes = (*notes, *more, *_scale_notes(fleet, freedom), *_fit_notes(fit))
-    return _result(fleet, fit, fitted_runs, seen, findings, notes, text, given, chosen)
+    notes = (*notes, *more, *said, *scale_notes(fit, fleet, start, fitted_runs), *_fit_notes(fit))
+    return _result(fleet, fit, plain, seen, findings, notes, text, given, chosen)
 
 
 def _freedom(fleet: Fleet, options: ActuatorOptions) -> Freedom:
@@ -146,17 +157,6 @@ def _start(freedom: Freedom, runs: Sequence[Run], progress: Progress) -> tuple[A
     return best[1]
 
 
-def _scale_notes(fleet: Fleet, freedom: Freedom) -> list[str]:
-    free = {parameter.name for parameter in freedom.free}
-    if free & {"kp", "kv", "kr"}:
-        return [
-            "no torque, no gains: the masses of the description set the scale of all torques, gains and inertias; if "
-            "they are wrong by a factor, these are wrong by the same factor"
-        ]
-    del fleet
-    return ["no torque was logged: the stated gains set the scale of friction and inertia"]
-
-
 def _fit_notes(fit: Fit) -> list[str]:
     return [] if fit.settled else ["the fit had not settled after the allowed iterations: allow more"]
 
@@ -178,7 +178,7 @@ def _result(
     errors = tuple(
         MotionError(name=name, described=a, fitted=b, held_out_described=c, held_out=d)
         for name, a, b, c, d in zip(
-            fleet.names, rms(fitted_as_described), fit.rms, rms(seen_as_described), rms(after), strict=True
+            fleet.names, rms(fitted_as_described), fit.rms[: fleet.n], rms(seen_as_described), rms(after), strict=True
         )
     )
     drives = reached.with_values(fit.values)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -10,10 +9,10 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from estimation.actuators.base_motion import situation_of
 from estimation.actuators.freedom import Fleet
-from estimation.logs.formats import read_foreign
 from robots.common.errors import InputError, NotIdentifiableError
-from robots.drives import HeldCommand
+from robots.drives import HeldCommand, Situation
 from robots.drives.simulation import usual_step
 from robots.signals import Log
 
@@ -33,9 +32,6 @@ SAME = 1e-3
 """RMS difference of command and measurement, as a fraction of the motion, below which they are the same signal."""
 ROUNDING = 1e-9
 """Change of a position [rad or m] up to which it is none."""
-BASE = re.compile(r"(base|root|pelvis|torso|trunk|imu)", re.IGNORECASE)
-HELD = 0.02
-"""Standard deviation of a base's pose [m or rad or 1] up to which it counts as held."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -51,6 +47,8 @@ class Run:
         steps: resolution of each joint's command (n,) [rad or m].
         mask: samples that count (N,); None for all.
         coarseness: of the simulation's steps, in usual ones.
+        situations: of the chains: bases and payloads; empty where all are as described.
+        current: of the motors (N, n) [A, or another unit]; None without.
     """
 
     name: str
@@ -61,6 +59,8 @@ class Run:
     steps: Array
     mask: NDArray[np.bool_] | None = None
     coarseness: float = 1.0
+    situations: tuple[Situation, ...] = ()
+    current: Array | None = None
 
     @cached_property
     def _held(self) -> dict[bytes, HeldCommand]:
@@ -101,12 +101,28 @@ class Run:
 
     def joints(self, columns: NDArray[np.intp]) -> Run:
         """Gives some of the joints."""
-        return replace(self, q=self.q[:, columns], command=self.command[:, columns], steps=self.steps[columns])
+        return replace(
+            self,
+            q=self.q[:, columns],
+            command=self.command[:, columns],
+            steps=self.steps[columns],
+            current=None if self.current is None else self.current[:, columns],
+        )
+
+    def chain(self, number: int, columns: NDArray[np.intp]) -> Run:
+        """Gives one chain with its joints."""
+        return replace(self.joints(columns), situations=self.situations[number : number + 1])
+
+    def rows(self, part: slice) -> Run:
+        """Gives some of the samples."""
+        return replace(
+            self, t=self.t[part], q=self.q[part], current=None if self.current is None else self.current[part]
+        )
 
     def cut(self, share: float) -> tuple[Run, Run]:
         """Cuts the run at a share of its time."""
         at = int(np.searchsorted(self.t, self.t[0] + share * (self.t[-1] - self.t[0])))
-        return replace(self, t=self.t[:at], q=self.q[:at]), replace(self, t=self.t[at:], q=self.q[at:])
+        return self.rows(slice(None, at)), self.rows(slice(at, None))
 
     def blocks(self) -> tuple[Run, Run]:
         """Gives the run twice: with the samples of most blocks of time, and with those of the others.
@@ -130,7 +146,7 @@ def runs_of(logs: Sequence[Log], fleet: Fleet) -> tuple[tuple[Run, ...], tuple[s
         The runs, and what a reader should know of them.
 
     Raises:
-        InputError: no command, a command that is the measurement, other units, a slow log, or a base that moves.
+        InputError: no command, a command that is the measurement, other units, or a slow log.
         NotIdentifiableError: a command that does not change, or no run that is long enough.
     """
     runs: list[Run] = []
@@ -139,6 +155,7 @@ def runs_of(logs: Sequence[Log], fleet: Fleet) -> tuple[tuple[Run, ...], tuple[s
     for log in logs:
         notes += _check(log, fleet)
         assert log.command is not None
+        around = tuple(situation_of(log, robot) for robot in fleet.robots) if fleet.situated else ()
         edges = np.flatnonzero(np.diff(log.t) > GAP * np.median(np.diff(log.t))) + 1
         for part in np.split(np.arange(len(log.t)), edges):
             if len(part) >= SHORTEST:
@@ -150,6 +167,8 @@ def runs_of(logs: Sequence[Log], fleet: Fleet) -> tuple[tuple[Run, ...], tuple[s
                         log_t=log.t,
                         command=log.command,
                         steps=steps,
+                        situations=around,
+                        current=None if log.current is None else log.current[part],
                     )
                 )
     if not runs:
@@ -211,7 +230,6 @@ def _check(log: Log, fleet: Fleet) -> list[str]:
     notes += [
         f"{log.name}: {fleet.names[moving[k]]} follows its command without an error" for k in np.flatnonzero(same)
     ]
-    _check_base(log, file)
     return notes
 
 
@@ -254,23 +272,3 @@ def _check_units(log: Log, fleet: Fleet, joint: int, file: str | None) -> None:
             allowed=f"{limits.lower[own]:.3g} to {limits.upper[own]:.3g} rad, as its description says",
             remedy="they look like degrees or encoder ticks: state the unit, or a scale in a mapping (--mapping)",
         )
-
-
-def _check_base(log: Log, file: str | None) -> None:
-    """Refuses a log whose own columns show that the base moved."""
-    ignored = [name for name in log.metadata.get("ignored_columns", ()) if BASE.search(name)]
-    if not ignored or file is None:
-        return
-    try:
-        table = read_foreign(file, lambda name: name in ignored)
-    except InputError:
-        return
-    for name, values in table.columns.items():
-        if not table.is_text(name) and float(np.nanstd(values)) > HELD:
-            raise InputError(
-                f"the base moves (standard deviation {np.nanstd(values):.2g})",
-                file=file,
-                column=name,
-                allowed="a base that is held",
-                remedy="hang or clamp the robot; contacts with the ground are not part of the model",
-            )

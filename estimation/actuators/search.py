@@ -101,8 +101,8 @@ def search_effects(
         part, own, found = _search_chain(
             fit.freedom.part(chain),
             (fit.values[chain],),
-            [run.joints(columns) for run in runs],
-            [run.joints(columns) for run in held_out],
+            [run.chain(chain, columns) for run in runs],
+            [run.chain(chain, columns) for run in held_out],
             fit.weights[columns],
             progress,
         )

@@ -69,7 +69,7 @@ def _part(part: Errors) -> Part:
     assert part.jacobian is not None
     jacobian = part.jacobian
     used = [np.flatnonzero(jacobian[:, j].any(axis=0)) for j in range(jacobian.shape[1])]
-    mask = np.broadcast_to(part.run.counted[:, None], part.run.q.shape).astype(float)
+    mask = np.broadcast_to(part.run.counted[:, None], part.error.shape).astype(float)
     return Part(
         rows=len(jacobian),
         regressor=lambda start, stop: jacobian[start:stop],

@@ -13,7 +13,7 @@ from robots.drives.elastic_gear import ElasticGear
 from robots.drives.gear import Armature, EndStop, Friction, LoadFriction, Offset, PositionFriction, StribeckFriction
 from robots.drives.laws import LAWS, CascadeLaw, PdLaw, ServoLaw, VelocityLaw
 from robots.drives.motor import MotorLimit
-from robots.drives.simulation import Simulated, Start, simulate_drives
+from robots.drives.simulation import Simulated, Situation, Start, simulate_drives
 
 __all__ = [
     "Armature",
@@ -38,6 +38,7 @@ __all__ = [
     "PositionFriction",
     "ServoLaw",
     "Simulated",
+    "Situation",
     "Start",
     "StribeckFriction",
     "VelocityLaw",

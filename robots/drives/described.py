@@ -25,7 +25,7 @@ GAINS = ("kp", "kd", "kr", "kv", "ki", "dead_band")
 """Keys of a gains file that are parameters of a law, if it has them."""
 OF_GEAR = ("stiffness", "gear_damping", "backlash")
 """Those of an elastic gear. Joints for which none is stated have a rigid one."""
-PARAMETERS = (*GAINS, "armature", "viscous", "coulomb", "torque_limit", "delay", *OF_GEAR)
+PARAMETERS = (*GAINS, "armature", "viscous", "coulomb", "torque_limit", "delay", "torque_constant", *OF_GEAR)
 """Keys of a gains file that are parameters of every joint."""
 
 
@@ -59,6 +59,7 @@ class GainsFile(Config):
         viscous: viscous friction [N m s/rad], to start from.
         coulomb: Coulomb friction [N m], to start from.
         delay: of the command [s], to start from.
+        torque_constant: torque at the joint per unit of a logged current [N m/A], such as N m per percent of a load.
         stiffness: of an elastic gear [N m/rad]; joints without it have a rigid one.
         gear_damping: damping of an elastic gear [N m s/rad].
         backlash: width of the gap of an elastic gear [rad].
@@ -79,6 +80,7 @@ class GainsFile(Config):
     viscous: Numbers | None = None
     coulomb: Numbers | None = None
     delay: float | None = None
+    torque_constant: Numbers | None = None
     stiffness: Numbers | None = None
     gear_damping: Numbers | None = None
     backlash: Numbers | None = None
@@ -118,11 +120,14 @@ def described_drives(robots: Sequence[Robot], gains: str | PathLike[str] | None 
     for robot in robots:
         for j in range(robot.n):
             friction, limit = robot.friction[j], float(robot.limits.torque[j])
+            constant = float(np.asarray(robot.torque_constant)[j])
             stated[at] = {
                 "armature": float(robot.rotor_inertia[j]),
                 "viscous": float(friction[1]),
                 "coulomb": float(friction[0]),
-            } | ({"torque_limit": limit} if np.isfinite(limit) and limit > 0 else {})
+            }
+            stated[at] |= {"torque_limit": limit} if np.isfinite(limit) and limit > 0 else {}
+            stated[at] |= {"torque_constant": constant} if np.isfinite(constant) and constant > 0 else {}
             at += 1
     if gains is None:
         return _from_mjcf(robots, names, stated)

@@ -28,8 +28,10 @@ from robots.drives.motor import MotorLimit
 ENCODER = (
     DriveParameter(name="encoder_zero", unit="rad", lower=-0.3, upper=0.3, size=1e-2),
     DriveParameter(name="mass_factor", unit="1", default=1.0, lower=0.2, upper=5.0, size=0.1),
+    DriveParameter(name="torque_constant", unit="N m/A", upper=1e6),
 )
-"""What every joint has beside its drive: the encoder's reading at zero, and what scales the inertia of its link."""
+"""What every joint has beside its drive: the encoder's reading at zero, what scales the inertia of its link, and the
+motor's torque at the joint per unit of a logged current; 0 where it is not known."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -127,7 +129,7 @@ class Drive:
 
     def torques(
         self, command: casadi.SX, motor: Instant, link: Instant, values: Values
-    ) -> tuple[list[casadi.SX], casadi.SX, list[casadi.SX]]:
+    ) -> tuple[list[casadi.SX], casadi.SX, list[casadi.SX], casadi.SX]:
         """Builds what the drive does.
 
         Args:
@@ -138,9 +140,9 @@ class Drive:
 
         Returns:
             The torque on the link without dry friction; with an elastic gear that on the motor, less what the gear
-            takes, and that on the link. Then the size of dry friction, and the rates of the states.
+            takes, and that on the link. Then the size of dry friction, the rates of the states, and the motor's torque.
         """
-        signal, dry, rates = command, casadi.SX(0), dict[str, casadi.SX]()
+        signal, dry, rates, effort = command, casadi.SX(0), dict[str, casadi.SX](), casadi.SX(0)
         torques, now = list[casadi.SX](), motor
         for member in self.members:
             rates |= member.rates(signal, now, values)
@@ -149,5 +151,7 @@ class Drive:
                 torques.append(signal - sent)
                 now = link
             signal = sent
+            if isinstance(member, MotorLimit):
+                effort = signal
             dry = dry + member.dry(now, values)
-        return [*torques, signal], dry, [rates[name] for name in self.states]
+        return [*torques, signal], dry, [rates[name] for name in self.states], effort
