@@ -9,6 +9,7 @@ from typing import Any
 
 from estimation.actuators.result import actuators_of
 from estimation.calibrations.result import SHOWN, Calibration
+from estimation.comparisons import DriveComparison
 from estimation.diagnosis.results.standing import standing_of, standing_verdict
 from estimation.payloads.body import body_from_dict
 from estimation.payloads.result import PayloadEstimate
@@ -225,6 +226,12 @@ def _drives(data: Data) -> Reading:
     return _said("drives", result, data, {"error [mrad]": 1e3 * result.held_out_error, **figures})
 
 
+def _drive_comparison(data: Data) -> Reading:
+    result = DriveComparison.from_dict(data)
+    figures = {"runs": len(result.runs), "significant differences": len(result.different)}
+    return _said("comparison of drives", result, data, figures)
+
+
 def _calibration(data: Data) -> Reading:
     result = Calibration.from_dict(data, robot=None, corrected=None)
     unit, factor = SHOWN[result.unit]
@@ -317,6 +324,7 @@ BY_FORMAT: dict[str, Callable[[Data], Reading]] = {
     "robot-oed fleet": _fleet,
     "robot-oed comparison": _comparison,
     "robot-oed actuators": _drives,
+    "robot-oed drive comparison": _drive_comparison,
     "robot-oed drive design": _drive_design,
     "robot-oed payload": _payload,
     "robot-oed calibration": _calibration,

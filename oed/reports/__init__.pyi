@@ -10,6 +10,10 @@ from oed.reports.pages.campaign_report import campaign_page as campaign_page
 from oed.reports.pages.campaign_report import save_campaign_report as save_campaign_report
 from oed.reports.pages.comparisons.comparison_report import comparison_page as comparison_page
 from oed.reports.pages.comparisons.comparison_report import save_comparison_report as save_comparison_report
+from oed.reports.pages.comparisons.drive_comparison_report import drive_comparison_page as drive_comparison_page
+from oed.reports.pages.comparisons.drive_comparison_report import (
+    save_drive_comparison_report as save_drive_comparison_report,
+)
 from oed.reports.pages.design_report import design_page as design_page
 from oed.reports.pages.design_report import save_design_report as save_design_report
 from oed.reports.pages.diagnosis_limits import limits_page as limits_page

@@ -16,7 +16,7 @@ from estimation.actuators import ActuatorOptions, identify_actuators
 from estimation.actuators.base_motion import POSE, base_motion
 from estimation.logs import read_log
 from robots.common.errors import InputError
-from robots.drives import Drive, load_branches
+from robots.drives import Drive
 from robots.signals import Log
 from robots.terms.situations.flange_body import point_mass
 from tests.estimation.actuators.conftest import LEG, Played
@@ -54,9 +54,7 @@ def rolled(text: str, t: Array, command: Array, delay: float) -> tuple[Array, Ar
 
 def heavier(payload: float = 0.0) -> str:
     """The plant: masses larger than described, and a point mass on the last link."""
-    bodies = tuple(
-        replace(b, mass=HEAVIER * b.mass, inertia=tuple(HEAVIER * x for x in b.inertia)) for b in LEG.bodies
-    )
+    bodies = tuple(replace(b, mass=HEAVIER * b.mass, inertia=tuple(HEAVIER * x for x in b.inertia)) for b in LEG.bodies)
     text = mjcf(replace(LEG, bodies=bodies), random_truth(LEG, np.random.default_rng(5)))
     if not payload:
         return text
@@ -142,9 +140,7 @@ def test_a_base_that_moves_is_followed(leg: Played, tmp_path: Path) -> None:
     for j, joint in enumerate(result.joints):
         assert result.value("armature", joint).value == pytest.approx(truth.armature[j], rel=0.03)
         assert result.value("coulomb", joint).value == pytest.approx(truth.coulomb[j], rel=0.05)
-    held = identify_actuators(
-        leg.chains, Log(t=t, q=q, command=command, name="run"), leg.drives, options=NO_EFFECTS
-    )
+    held = identify_actuators(leg.chains, Log(t=t, q=q, command=command, name="run"), leg.drives, options=NO_EFFECTS)
     assert held.held_out_error > 5 * result.held_out_error
 
 
