@@ -15,6 +15,8 @@ Array = NDArray[np.float64]
 
 SOFTER = (2.0, 5.0, 15.0, 50.0)
 """Stiffnesses of a gear from which a search begins, in position gains of the law."""
+LIGHTEST = 1e-4
+"""Least inertia of a rotor [kg m2] that counts."""
 FLANK, GAPS = 15.0, (0.005, 0.015, 0.045)
 """Stiffness of the flanks, and gaps [rad] likewise."""
 
@@ -84,16 +86,21 @@ def _stops(seen: Seen) -> list[dict[str, float]]:
     return found
 
 
+def _critical(seen: Seen, stiffness: float) -> float:
+    """Damping [N m s/rad] by which a rotor on a spring does not swing, within a factor of two."""
+    return float(np.sqrt(stiffness * max(seen.values["armature"], LIGHTEST)))
+
+
 def _springs(seen: Seen) -> list[dict[str, float]]:
     """Gears so many times as stiff as the law, with a twentieth to a fifth of critical damping of the rotor."""
     stiff = [factor * _gain(seen) for factor in SOFTER if _gain(seen) > 0]
-    return [{"stiffness": k, "gear_damping": 0.2 * np.sqrt(k * seen.values["armature"])} for k in stiff]
+    return [{"stiffness": k, "gear_damping": 0.2 * _critical(seen, k)} for k in stiff]
 
 
 def _gaps(seen: Seen) -> list[dict[str, float]]:
     """Gaps between flanks that are stiff beside the law."""
     stiff = FLANK * _gain(seen)
-    damping = 0.1 * np.sqrt(stiff * seen.values["armature"])
+    damping = 0.1 * _critical(seen, stiff)
     return [{"backlash": gap, "stiffness": stiff, "gear_damping": damping} for gap in GAPS if stiff > 0]
 
 

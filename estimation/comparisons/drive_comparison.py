@@ -251,10 +251,13 @@ class DriveComparison(Result, format="robot-oed drive comparison"):
 
         rows = []
         for item in self.differences:
-            own = {f"value, {run.label}": value for run, value in zip(self.runs, item.values, strict=True)}
-            own |= {f"error, {run.label}": error for run, error in zip(self.runs, item.errors, strict=True)}
-            tested = {"adjusted_p": item.adjusted, "differs": item.differs, "common": item.common}
-            rows.append({"parameter": item.parameter, "group": item.group, "unit": item.unit} | own | tested)
+            own: dict[str, object] = {
+                f"value, {run.label}": value for run, value in zip(self.runs, item.values, strict=True)
+            }
+            own.update({f"error, {run.label}": error for run, error in zip(self.runs, item.errors, strict=True)})
+            tested: dict[str, object] = {"adjusted_p": item.adjusted, "differs": item.differs, "common": item.common}
+            named: dict[str, object] = {"parameter": item.parameter, "group": item.group, "unit": item.unit}
+            rows.append(named | own | tested)
         return pd.DataFrame(rows)
 
     def plot(self, ax: Axes | None = None) -> Axes:
@@ -390,7 +393,9 @@ def _shared(found: Sequence[DriveDifference], runs: int, alpha: float) -> Iterat
             continue
         for run in range(1, runs):
             logs = np.array([np.log(item.values[run] / item.values[0]) for item in own])
-            errors = np.array([np.hypot(*(item.errors[k] / item.values[k] for k in (0, run))) for item in own])
+            errors = np.array(
+                [np.hypot(item.errors[0] / item.values[0], item.errors[run] / item.values[run]) for item in own]
+            )
             deviation = np.hypot(logs.std(ddof=1), np.sqrt(np.mean(errors**2))) / np.sqrt(len(own))
             alike = np.abs(np.sign(logs).sum()) == len(logs) and logs.std(ddof=1) < abs(logs.mean())
             if alike and abs(logs.mean()) > chi2.ppf(1 - alpha, 1) ** 0.5 * deviation:

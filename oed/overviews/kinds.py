@@ -7,6 +7,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
+from estimation.actuators import LoopDiagnosis
 from estimation.actuators.result import actuators_of
 from estimation.calibrations.result import SHOWN, Calibration
 from estimation.comparisons import DriveComparison
@@ -226,6 +227,13 @@ def _drives(data: Data) -> Reading:
     return _said("drives", result, data, {"error [mrad]": 1e3 * result.held_out_error, **figures})
 
 
+def _loop_diagnosis(data: Data) -> Reading:
+    result = LoopDiagnosis.from_dict(data)
+    mean = sum(error.held_out for error in result.errors) / max(len(result.errors), 1)
+    figures = {"error [mrad]": 1e3 * mean, "effects": len(result.findings)}
+    return _said("diagnosis in the loop", result, data, figures)
+
+
 def _drive_comparison(data: Data) -> Reading:
     result = DriveComparison.from_dict(data)
     figures = {"runs": len(result.runs), "significant differences": len(result.different)}
@@ -324,6 +332,7 @@ BY_FORMAT: dict[str, Callable[[Data], Reading]] = {
     "robot-oed fleet": _fleet,
     "robot-oed comparison": _comparison,
     "robot-oed actuators": _drives,
+    "robot-oed loop diagnosis": _loop_diagnosis,
     "robot-oed drive comparison": _drive_comparison,
     "robot-oed drive design": _drive_design,
     "robot-oed payload": _payload,
