@@ -193,9 +193,9 @@ class DriveDynamics:
     def slopes(self) -> BatchFunction:
         """(x, dx, ddx, command, state, p, base) -> residual (d,), its derivatives by signals and by p; those of rates.
 
-        Signals are [x, dx, ddx, command, state]. The residual includes dry friction. A parameter acts on its own joint alone, except the links' mass factors; so
-        the derivatives by p are (1, P), those of motors, or (2, P), those of motors and of links behind elastic gears.
-        Those by the n mass factors are (d, n).
+        Signals are [x, dx, ddx, command, state]. The residual includes dry friction. A parameter acts on its own joint
+        alone, except the links' mass factors; so the derivatives by p are (1, P), those of motors, or (2, P), those of
+        motors and of links behind elastic gears. Those by the n mass factors are (d, n).
         """
         return batch_function(self._slopes())
 

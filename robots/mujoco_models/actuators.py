@@ -52,14 +52,14 @@ def _largest(model: Any, actuator: int) -> float:
     if model.actuator_forcelimited[actuator]:
         bounds.append(float(np.min(np.abs(model.actuator_forcerange[actuator]))))
     direct = model.actuator_gaintype[actuator] == FIXED_GAIN and model.actuator_biastype[actuator] == NO_BIAS
-    control = _control(model, actuator)
+    control = control_of(model, actuator)
     if direct and model.actuator_ctrllimited[control]:
         reach = float(np.min(np.abs(model.actuator_ctrlrange[control])))
         bounds.append(reach * abs(float(model.actuator_gainprm[actuator, 0])))
     return min(bounds)
 
 
-def _control(model: Any, actuator: int) -> int:
+def control_of(model: Any, actuator: int) -> int:
     """The number of an actuator's control input; since version 4 they are counted separately."""
     addresses = getattr(model, "actuator_ctrladr", None)
     return actuator if addresses is None else int(addresses[actuator])
