@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -141,22 +142,26 @@ def _descend(
         gram, right = normal_equations(errors, weights)
         gram[np.diag_indices(len(theta))] += PRIOR**-2
         right = right - (theta - prior) / PRIOR**2
-        before = cost
+        before, reached = cost, list[Errors]()
+        # The first step mostly succeeds, and derivatives are wanted there; others are simulated alone first.
+        evaluate = partial(linearised_runs, freedom)
         while damping < MOST:
             trial = theta + _step(gram, right, damping, lower - theta, upper - theta)
             try:
-                reached = _cost(
-                    simulate_runs(freedom.fleet, freedom.values(trial, fixed), runs), weights, trial - prior
-                )
+                reached = evaluate(freedom.values(trial, fixed), runs)
+                found = _cost(reached, weights, trial - prior)
             except SolverError:
-                reached = np.inf
-            if reached < cost:
-                theta, cost, damping = trial, reached, max(damping * SHRINKAGE, 1e-9)
+                found = np.inf
+            if found < cost:
+                theta, cost, damping = trial, found, max(damping * SHRINKAGE, 1e-9)
                 break
             damping *= GROWTH
+            evaluate = partial(simulate_runs, freedom.fleet)
         if cost >= before:
             return theta, errors, True
-        errors = linearised_runs(freedom, freedom.values(theta, fixed), runs)
+        if reached[0].jacobian is None:
+            reached = linearised_runs(freedom, freedom.values(theta, fixed), runs)
+        errors = reached
         progress.update(0.0, f"simulated error {1e3 * float(np.mean(rms(errors))):.3g} mrad")
         if before - cost < options.settled * before:
             return theta, errors, True

@@ -13,7 +13,7 @@ from estimation.actuators.effects import BY_NAME, EFFECTS, LoopEffect, Seen
 from estimation.actuators.fitting import FLOOR, Fit, FitOptions, fit_drives, normal_equations
 from estimation.actuators.freedom import Fleet, Freedom, FreeParameter, free_parameters
 from estimation.actuators.runs import Run
-from estimation.actuators.simulated_error import Errors, linearised_runs, rms, simulate_runs
+from estimation.actuators.simulated_error import CHAINS, Errors, linearised_runs, rms, simulate_runs
 from estimation.uncertainty.correlations import correlation_rows
 from robots.common.errors import SolverError
 from robots.common.progress import SILENT, Progress
@@ -28,6 +28,8 @@ TRIED = 3
 """Alternatives of a joint that are fitted in a round: those that promise most."""
 ROUNDS = 6
 """Rounds of the search on a chain: each may accept one effect per joint."""
+FAINT = 0.3
+"""Share of what an effect brought below which a promise is not tried beside it."""
 SURE = 3.0
 """Standard errors by which the logarithm of the held-out squared error must fall."""
 MEMORIES, FEWEST_BLOCKS, MOST_BLOCKS = 2, 6, 40
@@ -75,6 +77,8 @@ class _Promise:
     effect: LoopEffect
     start: dict[str, float]
     share: float
+    cost: float
+    """What it takes off the chain's weighted squared error on fitted data; infinite where nobody knows."""
 
 
 _Trial = tuple[float, _Promise, Fit, list[Errors]]
@@ -96,9 +100,10 @@ def search_effects(
     """
     fleet = fit.freedom.fleet
     freedom, values, findings = fit.freedom, list(fit.values), list[LoopFinding]()
-    parts = []
-    for chain, columns in enumerate(fleet.columns):
-        part, own, found = _search_chain(
+
+    def searched(chain: int) -> tuple[Fleet, tuple[Array, ...], list[LoopFinding]]:
+        columns = fleet.columns[chain]
+        return _search_chain(
             fit.freedom.part(chain),
             (fit.values[chain],),
             [run.chain(chain, columns) for run in runs],
@@ -106,6 +111,11 @@ def search_effects(
             fit.weights[columns],
             progress,
         )
+
+    chains = range(len(fleet.columns))
+    parts = []
+    for chain, (part, own, found) in enumerate(CHAINS.map(searched, chains)):
+        columns = fleet.columns[chain]
         values[chain] = own[0]
         parts.append(part)
         findings += [replace(finding, joint=int(columns[finding.joint - 1]) + 1) for finding in found]
@@ -140,6 +150,9 @@ def _search_chain(
         trials: list[_Trial] = []
         rivals: list[tuple[int, str, float]] = []
         for promise in promises:
+            if best is not None and promise.cost < FAINT * best[0]:
+                # An effect does not bring many times what its derivatives promise.
+                continue
             trial = _fitted(freedom, values, runs, promise, weights, geared)
             if trial is None:
                 continue
@@ -216,7 +229,15 @@ def _promises(
         changed = _with_starts(fleet, values, {key: starts[key][index] for key in neutral})
         shares = _shares_by_slopes(freedom, changed, runs, now, neutral, costs, weights)
         for (joint, name), share in shares.items():
-            found.append(_Promise(joint=joint, effect=BY_NAME[name], start=starts[joint, name][index], share=share))
+            found.append(
+                _Promise(
+                    joint=joint,
+                    effect=BY_NAME[name],
+                    start=starts[joint, name][index],
+                    share=share,
+                    cost=share * costs[joint],
+                )
+            )
     best: dict[tuple[int, str], _Promise] = {}
     for promise in found:
         key = (promise.joint, promise.effect.name)
@@ -262,7 +283,7 @@ def _bent(
                 costs.append(np.inf)
         if costs and np.isfinite(min(costs)):
             start = options[int(np.argmin(costs))]
-            found.append(_Promise(joint=joint, effect=BY_NAME[name], start=start, share=WORTH))
+            found.append(_Promise(joint=joint, effect=BY_NAME[name], start=start, share=WORTH, cost=np.inf))
     return found
 
 

@@ -15,6 +15,9 @@ from robots.drives import Start, simulate_drives
 
 Array = NDArray[np.float64]
 
+CHAINS = ThreadPoolExecutor(2, "chains")
+"""Threads in which chains are simulated: compiled steps run outside of Python."""
+
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Errors:
@@ -77,7 +80,9 @@ def _chains(
     simulated = np.empty_like(measured(run))
     count = 0 if directions is None else directions[0].shape[1]
     jacobian = np.zeros((*simulated.shape, count))
-    for chain, columns in enumerate(fleet.columns):
+
+    def fill(chain: int) -> None:
+        columns = fleet.columns[chain]
         dynamics, own = fleet.dynamics[chain], values[chain]
         used = np.zeros(0, dtype=int) if directions is None else np.flatnonzero(directions[chain].any(axis=0))
         found = simulate_drives(
@@ -96,7 +101,7 @@ def _chains(
             assert found.sensitivity is not None
             jacobian[:, columns[:, None], used] = found.sensitivity
         if found.effort is None:
-            continue
+            return
         # The current is the motor's torque over its constant, which may be free itself.
         places = dynamics.layout.of("torque_constant")
         constant, shown = own[places], fleet.n + columns
@@ -106,6 +111,12 @@ def _chains(
             jacobian[:, shown[:, None], used] = found.effort_sensitivity / constant[:, None]
             by_constant = -(found.effort / constant**2)[:, :, None] * directions[chain][places][:, used]
             jacobian[:, shown[:, None], used] += by_constant
+
+    chains = range(len(fleet.columns))
+    if len(chains) == 1:
+        fill(0)
+    else:
+        list(CHAINS.map(fill, chains))
     return simulated, jacobian
 
 

@@ -163,6 +163,7 @@ class DriveDynamics:
         return casadi.Function("balance", [x, dx, ddx, command, state, p, base], [*outputs, casadi.vertcat(*efforts)])
 
     @cached_property
+    @builds_expressions
     def twist(self) -> casadi.Function:
         """(q, p, base) -> twist of the elastic gears (m,) at rest, and its derivatives by p (m, P)."""
         q, rest = casadi.SX.sym("q", self.n), casadi.SX(self.masses, 1)

@@ -15,7 +15,7 @@ from robots.mujoco_models.files import compile_mjcf, mujoco_library
 AFFINE = 1  # mjtBias
 ROUNDING = 1e-9
 NEAR, FAR, HUGE = 1e-6, 1e9, 1e5
-"""Changes [rad or rad/s] by which MuJoCo is asked for a law, a command that saturates, and limits [N m] that are none."""
+"""Changes [rad or rad/s] by which MuJoCo is asked for a law, a command that saturates, and no limit [N m]."""
 
 
 class MjcfLaw(NamedTuple):
