@@ -12,6 +12,7 @@ from estimation.actuators.freedom import Freedom
 from estimation.actuators.runs import Run
 from estimation.preprocessing.resampling import resample
 from estimation.preprocessing.smoothing import low_pass, smooth
+from robots.drives.simulation import followed
 
 Array = NDArray[np.float64]
 
@@ -102,10 +103,9 @@ def _balance(
         means = low_pass(run.of(columns).means(edges, delays)[0], period, cutoff)
         own = q[:, columns] - p[layout.of("encoder_zero")]
         signals = [signal[rows] for signal in (own, dq[:, columns], ddq[:, columns], means)]
-        count, full, base = len(signals[0]), p, np.zeros((len(signals[0]), 0))
-        if run.situations:
-            around = run.situations[chain]
-            full, base = np.concatenate([p, around.body]), around.at(run.t[rows])
+        count, around = len(signals[0]), run.situations[chain] if run.situations else None
+        full = followed(p, around)
+        base = np.zeros((count, 0)) if around is None else around.at(run.t[rows])
         residual, _, by_own, by_mass, *_ = dynamics.slopes(
             *signals, np.zeros((count, 0)), np.broadcast_to(full, (count, len(full))), base
         )

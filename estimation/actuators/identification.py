@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from estimation.actuators.base_motion import is_situated, with_base
 from estimation.actuators.equation_error import started
 from estimation.actuators.exports.expressible import expressible
-from estimation.actuators.fitting import Fit, fit_drives
+from estimation.actuators.fitting import FINE, Fit, fit_drives, polished
 from estimation.actuators.freedom import (
     Fleet,
     Freedom,
@@ -122,7 +122,7 @@ def identify_actuators(
         # Torques are simulated along a motion that is right already.
         start = fit_drives(freedom, start, plain, replace(chosen.fit, settled=ROUGH), bar).values
         freedom, start = with_constants(freedom, start, fitted_runs)
-    fit = fit_drives(freedom, start, fitted_runs, chosen.fit, bar)
+    fit = polished(fit_drives(freedom, start, fitted_runs, chosen.fit, bar))
     bar.finish()
     notes = (*notes, *more, *said, *scale_notes(fit, fleet, start, fitted_runs), *_fit_notes(fit))
     return _result(fleet, fit, plain, seen, findings, notes, text, given, chosen)
@@ -174,7 +174,7 @@ def _result(
 ) -> Actuators:
     reached = fit.freedom.fleet
     fitted_as_described = _described_errors(fleet, runs)
-    seen_as_described, after = _described_errors(fleet, seen), simulate_runs(reached, fit.values, seen)
+    seen_as_described, after = _described_errors(fleet, seen), simulate_runs(reached, fit.values, seen, refinement=FINE)
     errors = tuple(
         MotionError(name=name, described=a, fitted=b, held_out_described=c, held_out=d)
         for name, a, b, c, d in zip(
@@ -215,7 +215,7 @@ def _written_error(fleet: Fleet, fit: Fit, result: Actuators, seen: Sequence[Run
     for name, neutral in NEUTRAL.items():
         having = [joint for joint in range(fleet.n) if name in fleet.drives[joint].names]
         values = fleet.changed(values, name, having, neutral)
-    return float(np.mean(rms(simulate_runs(fleet, values, seen))))
+    return float(np.mean(rms(simulate_runs(fleet, values, seen, refinement=FINE))))
 
 
 def _described_errors(fleet: Fleet, runs: Sequence[Run]) -> list[Errors]:

@@ -12,9 +12,12 @@ from numpy.typing import NDArray
 from estimation.actuators.freedom import Fleet, Freedom
 from estimation.actuators.runs import Run
 from robots.drives import Start, simulate_drives
+from robots.drives.simulation import WIDTH
 
 Array = NDArray[np.float64]
 
+NARROW = 1e-5
+"""Speed [rad/s or m/s] below which dry friction fades in a refined simulation."""
 CHAINS = ThreadPoolExecutor(2, "chains")
 """Threads in which chains are simulated: compiled steps run outside of Python."""
 
@@ -51,7 +54,7 @@ def simulate_runs(fleet: Fleet, values: Sequence[Array], runs: Sequence[Run], *,
         fleet: the chains.
         values: their parameters, chain by chain.
         runs: what was commanded and measured.
-        refinement: so many times shorter than usual are the steps.
+        refinement: so many times shorter than usual are the steps; above 1 dry friction fades faster, too.
 
     Raises:
         SolverError: the loop is not stable.
@@ -95,6 +98,7 @@ def _chains(
             longest=run.step / refinement,
             situation=run.situations[chain] if run.situations else None,
             efforts=run.current is not None,
+            width=WIDTH if refinement == 1 else NARROW,
         )
         simulated[:, columns] = found.measured
         if directions is not None:

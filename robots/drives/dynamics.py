@@ -64,7 +64,6 @@ class DriveDynamics:
     Args:
         robot: a chain of n joints with known masses.
         drives: of its joints (n).
-        width: speed [rad/s or m/s] below which dry friction fades.
         situated: whether base and payload of a run are inputs: a base that moves or stands otherwise than described,
             and a known body on the last link.
 
@@ -72,7 +71,7 @@ class DriveDynamics:
         InputError: another number of drives, or a robot without masses.
     """
 
-    def __init__(self, robot: Robot, drives: Sequence[Drive], width: float = 1e-4, *, situated: bool = False) -> None:
+    def __init__(self, robot: Robot, drives: Sequence[Drive], *, situated: bool = False) -> None:
         if len(drives) != robot.n:
             raise InputError(f"{len(drives)} drives of {robot.name}", allowed=f"{robot.n}, one per joint")
         if not robot.has_masses:
@@ -80,7 +79,7 @@ class DriveDynamics:
                 f"the masses of {robot.name} are not known",
                 remedy=f"without torque all values are relative to them: {MASSES_REMEDY}",
             )
-        self.robot, self.drives, self.width, self.situated = robot, tuple(drives), width, situated
+        self.robot, self.drives, self.situated = robot, tuple(drives), situated
         names = [(j, name) for j, drive in enumerate(drives) for name in drive.names]
         self.layout = Layout(np.array([j for j, _ in names], dtype=np.intp), tuple(name for _, name in names))
         self.owners = np.array([j for j, drive in enumerate(drives) for _ in drive.states], dtype=np.intp)
@@ -118,8 +117,12 @@ class DriveDynamics:
 
     @property
     def extra(self) -> tuple[int, int]:
-        """Numbers that follow the parameters, those of a body, and the commands, those of the base."""
-        return (BODY, BASE) if self.situated else (0, 0)
+        """Numbers that follow the parameters and the commands.
+
+        After the parameters a body, and the speed [rad/s or m/s] below which dry friction fades; after the commands the
+        motion of the base.
+        """
+        return (BODY + 1, BASE) if self.situated else (1, 0)
 
     @property
     def values(self) -> Array:
@@ -141,7 +144,7 @@ class DriveDynamics:
         factors = [p[self.layout.place(j, "mass_factor")] for j in range(n)]
         inertia = casadi.vertcat(*(factors[j] * casadi.DM(self.robot.inertia[j]) for j in range(n)))
         if self.situated:
-            inertia[-BODY:] += p[self.size :]
+            inertia[-BODY:] += p[self.size : -1]
         signals = x[places], dx[places], ddx[places]
         rigid = RigidBody().moving(self.robot, *signals, base if self.situated else None) @ inertia
         torques, sizes, rates, efforts = casadi.SX(d, 1), [], [], []
@@ -165,7 +168,7 @@ class DriveDynamics:
     @cached_property
     @builds_expressions
     def twist(self) -> casadi.Function:
-        """(q, p, base) -> twist of the elastic gears (m,) at rest, and its derivatives by p (m, P)."""
+        """(q, p, base) -> twist of the elastic gears (m,) at rest, and its derivatives by q (m, n) and p (m, P)."""
         q, rest = casadi.SX.sym("q", self.n), casadi.SX(self.masses, 1)
         p, base = casadi.SX.sym("p", self.size + self.extra[0]), casadi.SX.sym("base", self.extra[1])
         still = casadi.SX(self.n, 1), casadi.SX(len(self.owners), 1)
@@ -180,7 +183,8 @@ class DriveDynamics:
             own = {name: p[self.layout.place(j, name)] for name in self.drives[j].names}
             found.append(gear.twist(rigid[j], own))
         twist = casadi.vertcat(casadi.SX(0, 1), *found)
-        return casadi.Function("twist", [q, p, base], [twist, casadi.jacobian(twist, p)[:, : self.size]])
+        slopes = casadi.jacobian(twist, q), casadi.jacobian(twist, p)[:, : self.size]
+        return casadi.Function("twist", [q, p, base], [twist, *slopes])
 
     @cached_property
     def step(self) -> BatchFunction:
@@ -234,7 +238,7 @@ class DriveDynamics:
             left, size, slope = evaluate(velocity, state, inputs, p)
             for k in range(d):
                 slope[k, k] = casadi.fmin(slope[k, k], 0)
-            velocity = self._solved(heavy - slope, left, size, velocity, last=index == passes - 1)
+            velocity = self._solved(heavy - slope, left, size, velocity, p[-1], last=index == passes - 1)
         final = self.balance(x + h / 2 * velocity, velocity, 2 * (velocity - v) / h, command, own, p, base)[3]
         new = casadi.vertcat(x + h * velocity, 2 * velocity - v, 2 * (velocity - v) / h, own + h * final)
         return casadi.Function("step", [state, inputs, p], [new])
@@ -246,7 +250,14 @@ class DriveDynamics:
         return found
 
     def _solved(
-        self, matrix: casadi.SX, left: casadi.SX, dry: casadi.SX, velocity: casadi.SX, *, last: bool
+        self,
+        matrix: casadi.SX,
+        left: casadi.SX,
+        dry: casadi.SX,
+        velocity: casadi.SX,
+        width: casadi.SX,
+        *,
+        last: bool,
     ) -> casadi.SX:
         """Solves matrix (z - velocity) + dry friction of the motors = left for the velocities z (d,).
 
@@ -254,11 +265,11 @@ class DriveDynamics:
         """
         n, right = self.n, left + matrix @ velocity
         if not self.parted:
-            return dry_velocities(matrix, right, dry, velocity, self.width, last=last)
+            return dry_velocities(matrix, right, dry, velocity, width, last=last)
         inner, down, across = matrix[n:, n:], matrix[n:, :n], matrix[:n, n:]
         solved = casadi.solve(inner, casadi.horzcat(down, right[n:]))
         reduced, rest = matrix[:n, :n] - across @ solved[:, :n], right[:n] - across @ solved[:, n]
-        motors = dry_velocities(reduced, rest, dry, velocity[:n], self.width, last=last)
+        motors = dry_velocities(reduced, rest, dry, velocity[:n], width, last=last)
         return casadi.vertcat(motors, solved[:, n] - solved[:, :n] @ motors)
 
     @builds_expressions
@@ -267,7 +278,7 @@ class DriveDynamics:
         inputs = self._signals()
         torque, rigid, dry, rates, _ = self.balance(*inputs)
         residual = torque - self._on_links(rigid)
-        residual[:n] -= dry * casadi.tanh(inputs[1][:n] / self.width)
+        residual[:n] -= dry * casadi.tanh(inputs[1][:n] / inputs[5][-1])
         moving, by_p = casadi.vertcat(*inputs[:5]), casadi.jacobian(residual, inputs[5])[:, : self.size]
         sums = [casadi.sum1(by_p[:n, :]), *([casadi.sum1(by_p[n:, :])] if self.parted else [])]
         outputs = [

@@ -78,6 +78,11 @@ class Simulated:
     residual: Array | None = None
 
 
+WIDTH = 1e-4
+"""Speed [rad/s or m/s] below which dry friction fades by default: small beside a motion's, but a motion that sticks and
+slips still changes smoothly with the parameters."""
+
+
 class Steps(NamedTuple):
     """Times of a simulation: edges of the steps (K + 1,) [s], and the steps of a sample."""
 
@@ -109,6 +114,7 @@ def simulate_drives(
     longest: float | None = None,
     situation: Situation | None = None,
     efforts: bool = False,
+    width: float = WIDTH,
 ) -> Simulated:
     """Simulates a chain that follows commands.
 
@@ -122,6 +128,7 @@ def simulate_drives(
         longest: longest step [s]; by default half the log's period, and at most `LONGEST`.
         situation: of a situated chain: its base and payload; by default as described.
         efforts: whether the torques of the motors are wanted.
+        width: speed [rad/s or m/s] below which dry friction fades.
 
     Raises:
         SolverError: the loop is not stable.
@@ -132,10 +139,9 @@ def simulate_drives(
     delays = np.zeros(dynamics.n)
     delays[layout.joints[delay]] = values[delay]
     means, slopes = command.means(edges, delays)
-    h, p, base = np.diff(edges), values, np.zeros((len(edges) - 1, 0))
-    if dynamics.situated:
-        around = situation or Situation.usual(dynamics.robot)
-        p, base = np.concatenate([values, around.body]), around.at((edges[:-1] + edges[1:]) / 2)
+    h, around = np.diff(edges), (situation or Situation.usual(dynamics.robot)) if dynamics.situated else None
+    p = followed(values, around, width)
+    base = np.zeros((len(h), 0)) if around is None else around.at((edges[:-1] + edges[1:]) / 2)
     place, place_slopes = _placed(dynamics, start.measured - values[zero], p, base[0])
     speed = np.concatenate([start.dq, start.dq[list(dynamics.parted)]])
     first = np.concatenate([place, speed, np.zeros(d + len(dynamics.owners))])
@@ -175,6 +181,11 @@ def simulate_drives(
     return replace(result, **dict(zip(("effort", "effort_sensitivity"), found, strict=True)))
 
 
+def followed(values: Array, situation: Situation | None, width: float = WIDTH) -> Array:
+    """Puts behind the parameters (P,) what `DriveDynamics.extra` says."""
+    return np.concatenate([values, [] if situation is None else situation.body, [width]])
+
+
 def _at_samples(values: Array, substeps: int) -> Array:
     """Values (N, ...) at samples, from those in the middle of K steps: the mean of the two steps that meet there."""
     padded = np.concatenate([values[:1], values, values[-1:]])
@@ -199,12 +210,13 @@ def _placed(dynamics: DriveDynamics, q: Array, p: Array, base: Array) -> tuple[A
     place = np.concatenate([q, q[parted]])
     if not parted:
         return place, slopes
-    twist, by_p = (np.asarray(part, dtype=float) for part in dynamics.twist(q, p, base))
+    twist, by_q, by_p = (np.asarray(part, dtype=float) for part in dynamics.twist(q, p, base))
     for k, joint in enumerate(parted):
         by_link = dynamics.shown[joint] != joint
         other, sign = (joint, 1.0) if by_link else (n + k, -1.0)
         place[other] += sign * twist[k, 0]
-        slopes[other] = slopes[dynamics.shown[joint]] + sign * by_p[k]
+        moved = slopes[dynamics.shown]
+        slopes[other] = slopes[dynamics.shown[joint]] + sign * (by_p[k] + by_q[k] @ moved)
     return place, slopes
 
 
