@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import casadi
 
-ROUNDS, NEWTON_ROUNDS, NEWTON_STEPS = 3, 3, 5
+ROUNDS, NEWTON_ROUNDS, NEWTON_STEPS = 3, 3, 3
 """Gauss-Seidel rounds on the joints' coupled friction in each pass, those added in the last one, and the Newton steps
 of each of these."""
 
