@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import partial
 
 import numpy as np
@@ -14,6 +14,7 @@ from estimation.actuators.freedom import Freedom
 from estimation.actuators.options import FitOptions
 from estimation.actuators.runs import Run
 from estimation.actuators.simulated_error import Errors, linearised_runs, rms, simulate_runs
+from estimation.uncertainty.correlations import correlation_rows
 from robots.common.errors import SolverError
 from robots.common.progress import SILENT, Progress
 
@@ -23,8 +24,10 @@ PRIOR = 100.0
 """Standard deviation of a free parameter about its start, in its sizes: what the motion does not show stays there."""
 FIRST, GROWTH, SHRINKAGE, MOST = 1e-3, 6.0, 0.2, 1e6
 """Damping of the first step, its factors after a step that fails or succeeds, and the largest."""
-FINE, POLISHED = 2, 2
-"""Steps of the finer simulation in usual ones, and the most corrections by it."""
+FINE, POLISHED = 2, 6
+"""Steps of the finer simulation in usual ones, and the most steps of the fit with it."""
+SHARE = 0.1
+"""Decrease of the cost, in what a parameter takes off noise, at which the finer fit ends."""
 FLOOR = 1e-5
 """Least error of a joint [rad or m] in its weight: encoders are no better."""
 
@@ -42,6 +45,7 @@ class Fit:
         cost: the weighted sum of squares.
         settled: whether the last steps changed nothing.
         start: the scaled values that the prior is about (K,).
+        options: settings.
     """
 
     freedom: Freedom
@@ -52,6 +56,7 @@ class Fit:
     cost: float
     settled: bool
     start: Array
+    options: FitOptions = field(default_factory=FitOptions)
 
     @property
     def at_bound(self) -> NDArray[np.bool_]:
@@ -108,38 +113,27 @@ def fit_drives(
         cost=_cost(errors, weights, theta - prior),
         settled=settled,
         start=prior,
+        options=chosen,
     )
 
 
-def polished(fit: Fit) -> Fit:
-    """Corrects a fit for the length of its simulation's steps, and for the speed at which its dry friction fades.
-
-    The errors are those of a finer simulation, the derivatives those that the fit has (defect correction): at the end
-    the values are those of the finer simulation.
+def polished(fit: Fit, progress: Progress = SILENT) -> Fit:
+    """Continues a fit with a finer simulation, until a step brings little beside what noise makes of the cost.
 
     Args:
         fit: that has settled.
-
-    Source: Stetter 1978.
+        progress: receives each step.
     """
-    freedom, theta, best = fit.freedom, fit.theta, fit
-    gram, _ = normal_equations(fit.errors, fit.weights)
-    gram[np.diag_indices(len(theta))] += PRIOR**-2
-    lower, upper = freedom.bounds
-    least = np.inf
-    for _ in range(1 + POLISHED):
-        values = freedom.values(theta, fit.values)
-        fine = simulate_runs(freedom.fleet, values, [part.run for part in fit.errors], refinement=FINE)
-        errors = tuple(replace(a, simulated=b.simulated) for a, b in zip(fit.errors, fine, strict=True))
-        cost = _cost(errors, fit.weights, theta - fit.start)
-        if cost >= least:
-            break
-        least = cost
-        best = replace(fit, values=values, theta=theta, errors=errors, cost=cost)
-        _, right = normal_equations(errors, fit.weights)
-        right = right - (theta - fit.start) / PRIOR**2
-        theta = theta + _step(gram, right, 0.0, lower - theta, upper - theta)
-    return best
+    freedom, runs = fit.freedom, [part.run for part in fit.errors]
+    errors = linearised_runs(freedom, fit.values, runs, refinement=FINE)
+    memory = max(correlation_rows(column) for part in errors for column in part.error.T)
+    rows = sum(int(part.run.counted.sum()) for part in errors) * freedom.fleet.n
+    enough = replace(fit.options, iterations=POLISHED, settled=SHARE * memory / rows)
+    theta, errors, _ = _descend(
+        freedom, fit.values, fit.theta, fit.start, errors, fit.weights, runs, enough, progress, FINE
+    )
+    values, cost = freedom.values(theta, fit.values), _cost(errors, fit.weights, theta - fit.start)
+    return replace(fit, values=values, theta=theta, errors=tuple(errors), cost=cost)
 
 
 def normal_equations(errors: Sequence[Errors], weights: Array) -> tuple[Array, Array]:
@@ -168,6 +162,7 @@ def _descend(
     runs: Sequence[Run],
     options: FitOptions,
     progress: Progress,
+    refinement: int = 1,
 ) -> tuple[Array, list[Errors], bool]:
     lower, upper = freedom.bounds
     damping, cost = FIRST, _cost(errors, weights, theta - prior)
@@ -177,7 +172,7 @@ def _descend(
         right = right - (theta - prior) / PRIOR**2
         before, reached = cost, list[Errors]()
         # The first step mostly succeeds, and derivatives are wanted there; others are simulated alone first.
-        evaluate = partial(linearised_runs, freedom)
+        evaluate = partial(linearised_runs, freedom, refinement=refinement)
         while damping < MOST:
             trial = theta + _step(gram, right, damping, lower - theta, upper - theta)
             try:
@@ -189,11 +184,11 @@ def _descend(
                 theta, cost, damping = trial, found, max(damping * SHRINKAGE, 1e-9)
                 break
             damping *= GROWTH
-            evaluate = partial(simulate_runs, freedom.fleet)
+            evaluate = partial(simulate_runs, freedom.fleet, refinement=refinement)
         if cost >= before:
             return theta, errors, True
         if reached[0].jacobian is None:
-            reached = linearised_runs(freedom, freedom.values(theta, fixed), runs)
+            reached = linearised_runs(freedom, freedom.values(theta, fixed), runs, refinement=refinement)
         errors = reached
         progress.update(0.0, f"simulated error {1e3 * float(np.mean(rms(errors))):.3g} mrad")
         if before - cost < options.settled * before:

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from estimation.actuators.base_motion import is_situated, with_base
+from estimation.actuators.effects import BY_NAME
 from estimation.actuators.equation_error import started
 from estimation.actuators.exports.expressible import expressible
 from estimation.actuators.fitting import FINE, Fit, fit_drives, polished
@@ -122,8 +123,9 @@ def identify_actuators(
         # Torques are simulated along a motion that is right already.
         start = fit_drives(freedom, start, plain, replace(chosen.fit, settled=ROUGH), bar).values
         freedom, start = with_constants(freedom, start, fitted_runs)
-    fit = polished(fit_drives(freedom, start, fitted_runs, chosen.fit, bar))
+    fit = polished(fit_drives(freedom, start, fitted_runs, chosen.fit, bar), bar)
     bar.finish()
+    findings = tuple(finding for finding in findings if _stands(finding, fit))
     notes = (*notes, *more, *said, *scale_notes(fit, fleet, start, fitted_runs), *_fit_notes(fit))
     return _result(fleet, fit, plain, seen, findings, notes, text, given, chosen)
 
@@ -155,6 +157,14 @@ def _start(freedom: Freedom, runs: Sequence[Run], progress: Progress) -> tuple[A
     best = min(found, key=lambda item: item[0])
     progress.update(0.0, f"start: {1e3 * best[0]:.3g} mrad")
     return best[1]
+
+
+def _stands(finding: LoopFinding, fit: Fit) -> bool:
+    """Whether an effect is still there after the fit of everything: its first parameter is not zero at its bound."""
+    for parameter, bound, value in zip(fit.freedom.free, fit.at_bound, fit.theta, strict=True):
+        if parameter.name == BY_NAME[finding.effect].free[0] and finding.joint - 1 in parameter.joints:
+            return not (bound and value == 0.0)
+    return True
 
 
 def _fit_notes(fit: Fit) -> list[str]:

@@ -38,11 +38,13 @@ QUIET = 2.0
 """Error of a joint, in times of its measurement's noise, up to which nothing is looked for."""
 CLEAR = 1e-4
 """Error of a joint [rad or m] from which on an elastic gear is tried."""
+SHORTER = 0.5
+"""Steps of a simulation with an elastic gear, in usual ones: its flanks are stiff."""
 SMOOTHED = 5
 """Samples over which speeds are averaged that only start a search."""
 QUICK = FitOptions(iterations=6, rounds=1, settled=0.01)
 """Settings of the fits that compare effects."""
-FINISHED = FitOptions(iterations=15, rounds=1, settled=1e-3)
+FINISHED = FitOptions(iterations=30, rounds=1, settled=1e-4)
 """Settings of the fit with an effect that was accepted, if that had not settled."""
 
 
@@ -167,7 +169,7 @@ def _search_chain(
         _, promise, trial, seen = _plainest(best, trials, weights)
         if promise.effect.gear is not None:
             # Flanks need shorter steps.
-            runs, held_out = ([replace(run, coarseness=1.0) for run in part] for part in (runs, held_out))
+            runs, held_out = ([replace(run, coarseness=SHORTER) for run in part] for part in (runs, held_out))
         if not trial.settled or promise.effect.gear is not None:
             # What an unfinished fit leaves would look like another effect.
             trial = fit_drives(trial.freedom, trial.values, runs, FINISHED, weights=weights)

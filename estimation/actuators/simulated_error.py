@@ -62,8 +62,16 @@ def simulate_runs(fleet: Fleet, values: Sequence[Array], runs: Sequence[Run], *,
     return [Errors(run=run, simulated=_chains(fleet, values, run, refinement)[0]) for run in runs]
 
 
-def linearised_runs(freedom: Freedom, values: Sequence[Array], runs: Sequence[Run]) -> list[Errors]:
+def linearised_runs(
+    freedom: Freedom, values: Sequence[Array], runs: Sequence[Run], *, refinement: int = 1
+) -> list[Errors]:
     """Simulates all runs with derivatives by the free parameters.
+
+    Args:
+        freedom: what is free.
+        values: of all parameters, chain by chain.
+        runs: what was commanded and measured.
+        refinement: as in `simulate_runs`.
 
     Raises:
         SolverError: the loop is not stable.
@@ -72,7 +80,7 @@ def linearised_runs(freedom: Freedom, values: Sequence[Array], runs: Sequence[Ru
     return [
         Errors(run=run, simulated=simulated, jacobian=jacobian * run.counted[:, None, None])
         for run in runs
-        for simulated, jacobian in [_chains(freedom.fleet, values, run, 1, directions)]
+        for simulated, jacobian in [_chains(freedom.fleet, values, run, refinement, directions)]
     ]
 
 

@@ -101,7 +101,7 @@ class Diagnose(Verb):
 
     def _commands_alone(self) -> bool:
         """Whether all logs have commands and neither torque nor current."""
-        from estimation.actuators.command_logs import read_command_logs
+        from estimation.actuators.runs import read_command_logs
         from robots.drives import load_branches
 
         try:
@@ -115,7 +115,7 @@ class Diagnose(Verb):
     def _in_the_loop(self, progress: Progress) -> Printed:
         """Diagnoses logs of commands: diagnosis.json, actuators.json, motion.parquet and report.html."""
         from estimation.actuators import ActuatorOptions, identify_actuators, loop_diagnosis
-        from estimation.actuators.command_logs import read_command_logs
+        from estimation.actuators.runs import read_command_logs
         from oed.reports import save_actuators_report
 
         output = self.output

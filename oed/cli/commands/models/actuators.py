@@ -52,8 +52,8 @@ class Actuators(Verb):
     def run(self, progress: Progress) -> Printed:
         """Identifies the drives."""
         from estimation.actuators import identify_actuators
-        from estimation.actuators.command_logs import read_command_logs
         from estimation.actuators.exports import simulator_files
+        from estimation.actuators.runs import read_command_logs
         from estimation.payloads.stated import with_stated_setup
         from oed.reports import save_actuators_report
 
