@@ -125,7 +125,6 @@ def identify_actuators(
         freedom, start = with_constants(freedom, start, fitted_runs)
     fit = polished(fit_drives(freedom, start, fitted_runs, chosen.fit, bar), bar)
     bar.finish()
-    findings = tuple(finding for finding in findings if _stands(finding, fit))
     notes = (*notes, *more, *said, *scale_notes(fit, fleet, start, fitted_runs), *_fit_notes(fit))
     return _result(fleet, fit, plain, seen, findings, notes, text, given, chosen)
 
@@ -159,11 +158,11 @@ def _start(freedom: Freedom, runs: Sequence[Run], progress: Progress) -> tuple[A
     return best[1]
 
 
-def _stands(finding: LoopFinding, fit: Fit) -> bool:
-    """Whether an effect is still there after the fit of everything: its first parameter is not zero at its bound."""
-    for parameter, bound, value in zip(fit.freedom.free, fit.at_bound, fit.theta, strict=True):
+def _stands(finding: LoopFinding, fit: Fit, values: Sequence[DriveValue]) -> bool:
+    """Whether an effect is still there after the fit of everything: its size, which cannot be below zero, is above."""
+    for parameter, value in zip(fit.freedom.free, values, strict=True):
         if parameter.name == BY_NAME[finding.effect].free[0] and finding.joint - 1 in parameter.joints:
-            return not (bound and value == 0.0)
+            return parameter.lower != 0.0 or value.lower > 0.0
     return True
 
 
@@ -191,15 +190,15 @@ def _result(
             fleet.names, rms(fitted_as_described), fit.rms[: fleet.n], rms(seen_as_described), rms(after), strict=True
         )
     )
-    drives = reached.with_values(fit.values)
+    drives, parameters = reached.with_values(fit.values), _parameters(fleet, fit, options.seed)
     result = Actuators(
         robot=fleet.robots[0].name,
         joints=fleet.names,
         law=tuple(_law(drive) for drive in drives),
         values=tuple(_plain(drive.values) for drive in drives),
-        parameters=_parameters(fleet, fit, options.seed),
+        parameters=parameters,
         errors=errors,
-        findings=findings,
+        findings=tuple(finding for finding in findings if _stands(finding, fit, parameters)),
         notes=notes,
         held_out=held_out,
         traces=tuple(_trace(a, b) for a, b in zip(seen_as_described, after, strict=True)),
