@@ -215,7 +215,7 @@ def sized(machine: Machine, truth: Truth, effect: str, joint: int, rng: np.rando
 
 def two_masses(machine: Machine, truth: Truth, effect: str, joint: int, rng: np.random.Generator) -> Truth:
     """Adds an elastic gear that the law feels, or a gap that is wider than the encoder's steps."""
-    stiff = machine.kp[joint] * (rng.uniform(5, 10) if effect == "joint_elasticity" else 20.0)
+    stiff = machine.kp[joint] * (rng.uniform(2, 4) if effect == "joint_elasticity" else 20.0)
     damping = 0.1 * float(np.sqrt(stiff * truth.armature[joint]))
     size = stiff if effect == "joint_elasticity" else float(rng.uniform(0.01, 0.03))
     return replace(truth, effect=effect, joint=joint, size=size, notes={"gear_damping": damping, "stiffness": stiff})
@@ -231,7 +231,7 @@ def effects(options: argparse.Namespace) -> None:
             machine = MACHINES[kinds[seed % len(kinds)]]()
             rng = np.random.default_rng(1000 + seed)
             truth = random_truth(machine, rng)
-            loaded = effect in ("load_dependent_friction", "encoder_offset", "payload_change")
+            loaded = effect in ("load_dependent_friction", "encoder_offset", "payload_change", *TWO_MASSES)
             joint = int(rng.integers(1, 3)) if loaded else int(rng.integers(0, machine.n))
             if effect:
                 truth = sized(machine, truth, effect, joint, rng, options.seconds)

@@ -80,14 +80,14 @@ def _part(part: Errors) -> Part:
 
 
 def _step_error(fit: Fit, inverse: Array) -> Array:
-    """Error of the parameters (K,) by the length of the simulation's steps, of first order where joints stick."""
+    """Error of the parameters (K,) by the length of the steps: twice what halves change, being of first order."""
     runs = [part.run for part in fit.errors]
     finer = simulate_runs(fit.freedom.fleet, fit.values, runs, refinement=2 * FINE)
     total = np.zeros(len(inverse))
     for part, other in zip(fit.errors, finer, strict=True):
         assert part.jacobian is not None
         total += np.einsum("tjk,tj->k", part.jacobian, (other.simulated - part.simulated) * fit.weights)
-    return np.asarray(inverse @ total)
+    return np.asarray(2 * inverse @ total)
 
 
 def _bootstrap(fit: Fit, inverse: Array, seed: int) -> Array:
