@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -147,23 +148,26 @@ def _search_chain(
     for _ in range(ROUNDS):
         taken = {(finding.joint - 1, finding.effect) for finding in accepted}
         weights = np.maximum(rms(now), FLOOR) ** -2
-        promises = _promises(freedom, values, runs, now, weights, taken, geared)
+        smooth, bent = _promises(freedom, values, runs, now, weights, taken, geared)
         best: _Trial | None = None
         trials: list[_Trial] = []
         rivals: list[tuple[int, str, float]] = []
-        for promise in promises:
-            if best is not None and promise.cost < FAINT * best[0]:
-                # An effect does not bring many times what its derivatives promise.
-                continue
-            trial = _fitted(freedom, values, runs, promise, weights, geared)
-            if trial is None:
-                continue
-            seen = _outside(trial, held_out)
-            gain = _gain(outside, seen, promise.joint, weights)
-            rivals.append((promise.joint, promise.effect.name, float(rms(seen)[promise.joint])))
-            trials.append((gain, promise, trial, seen))
-            if gain > 0 and (best is None or gain > best[0]):
-                best = trials[-1]
+        for derivatives in (True, False):
+            if not derivatives and best is not None and smooth[0].share > MOST:
+                break
+            for promise in smooth if derivatives else bent():
+                if best is not None and promise.cost < FAINT * best[0]:
+                    # An effect does not bring many times what its derivatives promise.
+                    continue
+                trial = _fitted(freedom, values, runs, promise, weights, geared)
+                if trial is None:
+                    continue
+                seen = _outside(trial, held_out)
+                gain = _gain(outside, seen, promise.joint, weights)
+                rivals.append((promise.joint, promise.effect.name, float(rms(seen)[promise.joint])))
+                trials.append((gain, promise, trial, seen))
+                if gain > 0 and (best is None or gain > best[0]):
+                    best = trials[-1]
         if best is None:
             break
         _, promise, trial, seen = _plainest(best, trials, weights)
@@ -209,8 +213,8 @@ def _promises(
     weights: Array,
     taken: set[tuple[int, str]],
     geared: dict[int, Fleet],
-) -> list[_Promise]:
-    """What each effect would take off a joint's squared error, by derivatives or at its first values; most first."""
+) -> tuple[list[_Promise], Callable[[], list[_Promise]]]:
+    """What effects would take off a joint's squared error by derivatives, most first; and what gives the others."""
     fleet = freedom.fleet
     costs = np.array([sum(float((part.error[:, j] ** 2).sum()) for part in now) for j in range(fleet.n)]) * weights
     found: list[_Promise] = []
@@ -247,9 +251,8 @@ def _promises(
             best[key] = promise
     # A promise counts by what it takes off the whole chain's error.
     smooth = sorted(best.values(), key=lambda p: -p.share * costs[p.joint])[:TRIED]
-    if smooth and smooth[0].share > MOST:
-        return smooth
-    return [*smooth, *_bent(freedom, values, runs, starts, int(np.argmax(rms(now))), float(rms(now).max()), geared)]
+    worst = int(np.argmax(rms(now)))
+    return smooth, partial(_bent, freedom, values, runs, starts, worst, float(rms(now)[worst]), geared)
 
 
 def _bent(
