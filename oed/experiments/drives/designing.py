@@ -259,7 +259,7 @@ def _within(
             np.abs(dq).max(axis=0) / ((1 - options.margin) * speed),
             torque.max(axis=0) / ((1 - options.margin) * limit),
         )
-        scale = np.where(share > 1, scale * np.clip(NEAR / share, SMALLER, NEAR), scale)
+        scale = np.where(share > 1, scale * np.clip(NEAR / np.maximum(share, 1.0), SMALLER, NEAR), scale)
         beyond = (q.min(axis=0) < lower) | (q.max(axis=0) > upper)
         near = bool(guard.clearance(q[::every]).min() < CLEAR)
         if not (share > 1).any() and not beyond.any() and not near:
