@@ -67,7 +67,8 @@ class Truth:
         delay: of the command [s].
         effect: name of a hidden effect; empty for none.
         joint: where it acts, counted from 0.
-        size: of the effect, in its own unit.
+        size: of the effect, in its own unit: stiffness [N m/rad] of an elastic gear, width [rad] of a gap.
+        notes: more of it: damping [N m s/rad] of an elastic gear, stiffness of the flanks of a gap.
     """
 
     armature: Array
@@ -196,6 +197,8 @@ def ur5() -> Machine:
     )
 
 
+TWO_MASSES = ("joint_elasticity", "backlash")
+"""Effects that part a joint into a motor and a link."""
 MACHINES = {"leg": leg, "so101": so101, "ur5": ur5}
 
 
@@ -219,6 +222,13 @@ def mjcf(machine: Machine, truth: Truth | None = None, *, laws: bool = True, ste
             f'damping="{float(values[1][j])!r}" frictionloss="{float(values[2][j])!r}" {STICK} '
             f'range="{body.range[0]} {body.range[1]}"/>'
         )
+        if truth and truth.effect in TWO_MASSES and truth.joint == j:
+            # A second hinge turns the link against the motor.
+            spring = truth.size if truth.effect == "joint_elasticity" else 0.0
+            opened += (
+                f'<joint name="{body.name}_gear" axis="{body.axis}" stiffness="{float(spring)!r}" '
+                f'damping="{float(truth.notes["gear_damping"])!r}"/>'
+            )
         closed += "</body>"
     limits = [
         truth.size if truth and truth.effect == "current_clipping" and truth.joint == j else machine.limit[j]
@@ -270,25 +280,26 @@ def play(machine: Machine, truth: Truth, t: Array, command: Array) -> Array:
     """Plays commands on the plant; positions by its encoders at the commands' times (N, n)."""
     model = mujoco.MjModel.from_xml_string(mjcf(machine, truth))
     data = mujoco.MjData(model)
-    data.qpos[:] = command[0]
+    effect, j = truth.effect, truth.joint
+    # Behind the joint of an elastic gear there is one coordinate more.
+    motors = np.arange(machine.n) + (np.arange(machine.n) > j) * (model.nv - machine.n)
+    data.qpos[motors] = command[0]
     mujoco.mj_forward(model, data)
     substeps = round((t[1] - t[0]) / STEP)
     q = np.empty_like(command)
-    effect, j = truth.effect, truth.joint
     kp = machine.kp[j]
     period, late = t[1] - t[0], np.full(machine.n, truth.delay)
     if effect == "time_delay":
         late[j] += truth.size
-    columns, load = np.arange(machine.n), np.zeros(machine.n)
+    columns, load = np.arange(machine.n), np.zeros(model.nv)
     for k in range(len(t)):
-        q[k] = data.qpos
+        q[k] = data.qpos[motors]
         for s in range(substeps):
             at = np.clip(np.floor((k * period + s * STEP - late) / period + 1e-9).astype(int), 0, None)
             control = command[at, columns].copy()
-            v, position = data.qvel[j], data.qpos[j]
+            v, position = data.qvel[motors[j]], data.qpos[motors[j]]
             data.qfrc_applied[:] = 0
             if effect == "stribeck":
-                data.qfrc_applied[j] = 0.0
                 model.dof_frictionloss[j] = truth.coulomb[j] + truth.size * np.exp(-((v / 0.15) ** 2))
             elif effect == "position_dependent_friction":
                 model.dof_frictionloss[j] = max(0.0, truth.coulomb[j] + truth.size * np.cos(2 * position))
@@ -304,6 +315,10 @@ def play(machine: Machine, truth: Truth, t: Array, command: Array) -> Array:
             elif effect == "joint_limit":
                 stop = machine.home[j] + truth.size * machine.reach[j]
                 data.qfrc_applied[j] = -(50 * kp) * max(position - stop, 0.0)
+            elif effect == "backlash":
+                behind = data.qpos[j + 1]
+                beyond = behind - np.clip(behind, -truth.size / 2, truth.size / 2)
+                data.qfrc_applied[j + 1] = -truth.notes["stiffness"] * beyond
             data.ctrl[:] = control
             mujoco.mj_step(model, data)
     if effect == "encoder_offset":

@@ -9,7 +9,16 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from robots.drives import Backlash, ElasticGear
+
 Array = NDArray[np.float64]
+
+SOFTER = (2.0, 5.0, 15.0, 50.0)
+"""Stiffnesses of a gear from which a search begins, in position gains of the law."""
+LIGHTEST = 1e-4
+"""Least inertia of a rotor [kg m2] that counts."""
+FLANK, GAPS = 15.0, (0.005, 0.015, 0.045)
+"""Stiffness of the flanks, and gaps [rad] likewise."""
 
 
 class Seen(NamedTuple):
@@ -33,6 +42,7 @@ class LoopEffect:
         bends: whether the effect is there at once with these values; otherwise they are neutral, and derivatives show
             what it explains.
         states: writes the values in words, with units.
+        gear: the gear that the joint has with the effect; None for the one that it has.
     """
 
     name: str
@@ -41,13 +51,18 @@ class LoopEffect:
     starts: Callable[[Seen], Sequence[dict[str, float]]]
     states: Callable[[dict[str, float]], str]
     bends: bool = False
+    gear: ElasticGear | None = None
+
+
+def _gain(seen: Seen) -> float:
+    """Torque per position error [N m/rad] of the law."""
+    return seen.values.get("kp", seen.values.get("kv", 0.0) * seen.values.get("kr", 0.0))
 
 
 def _saturations(seen: Seen) -> list[dict[str, float]]:
     """Limits below the torque that the law asks for along the measured motion."""
     damping = seen.values.get("kd", seen.values.get("kv", 0.0))
-    gain = seen.values.get("kp", damping * seen.values.get("kr", 0.0))
-    asked = np.abs(gain * (seen.command - seen.q) - damping * seen.dq)
+    asked = np.abs(_gain(seen) * (seen.command - seen.q) - damping * seen.dq)
     peak = float(np.quantile(asked, 0.99))
     return [{"torque_limit": share * peak} for share in (1.0, 0.8, 0.6, 0.45, 0.3) if peak > 0]
 
@@ -69,6 +84,24 @@ def _stops(seen: Seen) -> list[dict[str, float]]:
     if seen.command.min() < low:
         found.append({"stop_lower": low})
     return found
+
+
+def _critical(seen: Seen, stiffness: float) -> float:
+    """Damping [N m s/rad] by which a rotor on a spring does not swing, within a factor of two."""
+    return float(np.sqrt(stiffness * max(seen.values["armature"], LIGHTEST)))
+
+
+def _springs(seen: Seen) -> list[dict[str, float]]:
+    """Gears so many times as stiff as the law, with a twentieth to a fifth of critical damping of the rotor."""
+    stiff = [factor * _gain(seen) for factor in SOFTER if _gain(seen) > 0]
+    return [{"stiffness": k, "gear_damping": 0.2 * _critical(seen, k)} for k in stiff]
+
+
+def _gaps(seen: Seen) -> list[dict[str, float]]:
+    """Gaps between flanks that are stiff beside the law."""
+    stiff = FLANK * _gain(seen)
+    damping = 0.1 * _critical(seen, stiff)
+    return [{"backlash": gap, "stiffness": stiff, "gear_damping": damping} for gap in GAPS if stiff > 0]
 
 
 EFFECTS: tuple[LoopEffect, ...] = (
@@ -145,6 +178,25 @@ EFFECTS: tuple[LoopEffect, ...] = (
             + " and ".join(f"{v[k]:.4g} rad" for k in ("stop_lower", "stop_upper") if k in v and abs(v[k]) < 100)
         ),
         bends=True,
+    ),
+    LoopEffect(
+        name=Backlash.name,
+        title=Backlash.title,
+        free=("backlash", "stiffness", "gear_damping"),
+        starts=_gaps,
+        states=lambda v: f"motor and link have {1e3 * v['backlash']:.3g} mrad of play",
+        bends=True,
+        gear=Backlash(),
+    ),
+    LoopEffect(
+        name=ElasticGear.name,
+        title=ElasticGear.title,
+        free=("stiffness", "gear_damping"),
+        starts=_springs,
+        states=lambda v: f"the gear has a stiffness of {v['stiffness']:.3g} N m/rad",
+        bends=True,
+        # The gear of the effect above with a gap of zero: it is compiled once.
+        gear=Backlash(),
     ),
 )
 """All effects, in the order in which they are tried."""

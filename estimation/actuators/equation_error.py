@@ -12,6 +12,7 @@ from estimation.actuators.freedom import Freedom
 from estimation.actuators.runs import Run
 from estimation.preprocessing.resampling import resample
 from estimation.preprocessing.smoothing import low_pass, smooth
+from robots.drives.simulation import followed
 
 Array = NDArray[np.float64]
 
@@ -36,6 +37,16 @@ def started(freedom: Freedom, values: Sequence[Array], runs: Sequence[Run]) -> t
         runs: what was recorded.
     """
     fleet = freedom.fleet
+    if any(dynamics.parted for dynamics in fleet.dynamics):
+        # Where the links are is not measured: the start is that of rigid gears.
+        rigid = fleet.rigid
+        own = tuple(p for p in freedom.free if all(p.name in rigid.drives[j].names for j in p.joints))
+        known = fleet.taken(started(Freedom(fleet=rigid, free=own), rigid.taken(values, fleet), runs), rigid)
+        mine = [p for p in freedom.free if p not in own]
+        for parameter in mine:
+            for joint in parameter.joints:
+                known = fleet.changed(known, parameter.name, [joint], fleet.of(values, joint, parameter.name))
+        return known
     if any(len(dynamics.owners) for dynamics in fleet.dynamics):
         return tuple(values)
     linear = [k for k, parameter in enumerate(freedom.free) if parameter.name != "delay"]
@@ -92,9 +103,11 @@ def _balance(
         means = low_pass(run.of(columns).means(edges, delays)[0], period, cutoff)
         own = q[:, columns] - p[layout.of("encoder_zero")]
         signals = [signal[rows] for signal in (own, dq[:, columns], ddq[:, columns], means)]
-        count = len(signals[0])
+        count, around = len(signals[0]), run.situations[chain] if run.situations else None
+        full = followed(p, around)
+        base = np.zeros((count, 0)) if around is None else around.at(run.t[rows])
         residual, _, by_own, by_mass, *_ = dynamics.slopes(
-            *signals, np.zeros((count, 0)), np.broadcast_to(p, (count, len(p)))
+            *signals, np.zeros((count, 0)), np.broadcast_to(full, (count, len(full))), base
         )
         mass = layout.of("mass_factor")
         for joint in range(len(columns)):

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,6 +14,7 @@ from estimation.actuators.freedom import Freedom
 from estimation.actuators.options import FitOptions
 from estimation.actuators.runs import Run
 from estimation.actuators.simulated_error import Errors, linearised_runs, rms, simulate_runs
+from estimation.uncertainty.correlations import correlation_rows
 from robots.common.errors import SolverError
 from robots.common.progress import SILENT, Progress
 
@@ -22,6 +24,10 @@ PRIOR = 100.0
 """Standard deviation of a free parameter about its start, in its sizes: what the motion does not show stays there."""
 FIRST, GROWTH, SHRINKAGE, MOST = 1e-3, 6.0, 0.2, 1e6
 """Damping of the first step, its factors after a step that fails or succeeds, and the largest."""
+FINE, POLISHED = 2, 6
+"""Steps of the finer simulation in usual ones, and the most steps of the fit with it."""
+SHARE = 0.1
+"""Decrease of the cost, in what a parameter takes off noise, at which the finer fit ends."""
 FLOOR = 1e-5
 """Least error of a joint [rad or m] in its weight: encoders are no better."""
 
@@ -35,10 +41,11 @@ class Fit:
         values: all parameters, chain by chain.
         theta: the free ones, scaled (K,).
         errors: of the simulated motion, with derivatives.
-        weights: of the joints (n,) [1/rad2 or 1/m2].
+        weights: of the joints (n,) [1/rad2 or 1/m2]; with currents, then of these (2 n,).
         cost: the weighted sum of squares.
         settled: whether the last steps changed nothing.
         start: the scaled values that the prior is about (K,).
+        options: settings.
     """
 
     freedom: Freedom
@@ -49,6 +56,7 @@ class Fit:
     cost: float
     settled: bool
     start: Array
+    options: FitOptions = field(default_factory=FitOptions)
 
     @property
     def at_bound(self) -> NDArray[np.bool_]:
@@ -79,7 +87,7 @@ def fit_drives(
         runs: what was recorded.
         options: settings.
         progress: receives each step.
-        weights: of the joints (n,) [1/rad2 or 1/m2] in the first round; by default alike.
+        weights: of the joints (n,) [1/rad2 or 1/m2], and of currents, in the first round; by default alike.
 
     Raises:
         SolverError: the loop is not stable at the start.
@@ -89,7 +97,8 @@ def fit_drives(
     prior = theta.copy()
     errors = linearised_runs(freedom, freedom.values(theta, start), runs)
     if weights is None:
-        weights = np.full(freedom.fleet.n, float(np.mean(np.maximum(rms(errors), FLOOR) ** 2)) ** -1)
+        kinds = np.split(np.maximum(rms(errors), FLOOR) ** 2, range(freedom.fleet.n, len(rms(errors)), freedom.fleet.n))
+        weights = np.concatenate([np.full(freedom.fleet.n, float(np.mean(kind)) ** -1) for kind in kinds])
     settled = False
     for round_ in range(chosen.rounds):
         theta, errors, settled = _descend(freedom, start, theta, prior, errors, weights, runs, chosen, progress)
@@ -104,7 +113,27 @@ def fit_drives(
         cost=_cost(errors, weights, theta - prior),
         settled=settled,
         start=prior,
+        options=chosen,
     )
+
+
+def polished(fit: Fit, progress: Progress = SILENT) -> Fit:
+    """Continues a fit with a finer simulation, until a step brings little beside what noise makes of the cost.
+
+    Args:
+        fit: that has settled.
+        progress: receives each step.
+    """
+    freedom, runs = fit.freedom, [part.run for part in fit.errors]
+    errors = linearised_runs(freedom, fit.values, runs, refinement=FINE)
+    memory = max(correlation_rows(column) for part in errors for column in part.error.T)
+    rows = sum(int(part.run.counted.sum()) for part in errors) * freedom.fleet.n
+    enough = replace(fit.options, iterations=POLISHED, settled=SHARE * memory / rows)
+    theta, errors, _ = _descend(
+        freedom, fit.values, fit.theta, fit.start, errors, fit.weights, runs, enough, progress, FINE
+    )
+    values, cost = freedom.values(theta, fit.values), _cost(errors, fit.weights, theta - fit.start)
+    return replace(fit, values=values, theta=theta, errors=tuple(errors), cost=cost)
 
 
 def normal_equations(errors: Sequence[Errors], weights: Array) -> tuple[Array, Array]:
@@ -133,6 +162,7 @@ def _descend(
     runs: Sequence[Run],
     options: FitOptions,
     progress: Progress,
+    refinement: int = 1,
 ) -> tuple[Array, list[Errors], bool]:
     lower, upper = freedom.bounds
     damping, cost = FIRST, _cost(errors, weights, theta - prior)
@@ -140,22 +170,26 @@ def _descend(
         gram, right = normal_equations(errors, weights)
         gram[np.diag_indices(len(theta))] += PRIOR**-2
         right = right - (theta - prior) / PRIOR**2
-        before = cost
+        before, reached = cost, list[Errors]()
+        # The first step mostly succeeds, and derivatives are wanted there; others are simulated alone first.
+        evaluate = partial(linearised_runs, freedom, refinement=refinement)
         while damping < MOST:
             trial = theta + _step(gram, right, damping, lower - theta, upper - theta)
             try:
-                reached = _cost(
-                    simulate_runs(freedom.fleet, freedom.values(trial, fixed), runs), weights, trial - prior
-                )
+                reached = evaluate(freedom.values(trial, fixed), runs)
+                found = _cost(reached, weights, trial - prior)
             except SolverError:
-                reached = np.inf
-            if reached < cost:
-                theta, cost, damping = trial, reached, max(damping * SHRINKAGE, 1e-9)
+                found = np.inf
+            if found < cost:
+                theta, cost, damping = trial, found, max(damping * SHRINKAGE, 1e-9)
                 break
             damping *= GROWTH
+            evaluate = partial(simulate_runs, freedom.fleet, refinement=refinement)
         if cost >= before:
             return theta, errors, True
-        errors = linearised_runs(freedom, freedom.values(theta, fixed), runs)
+        if reached[0].jacobian is None:
+            reached = linearised_runs(freedom, freedom.values(theta, fixed), runs, refinement=refinement)
+        errors = reached
         progress.update(0.0, f"simulated error {1e3 * float(np.mean(rms(errors))):.3g} mrad")
         if before - cost < options.settled * before:
             return theta, errors, True

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from robots.common.errors import InputError
-from robots.drives import Drive, DriveDynamics
+from robots.drives import Drive, DriveDynamics, ElasticGear
 from robots.robot import Robot
 
 Array = NDArray[np.float64]
@@ -49,10 +49,16 @@ class Fleet:
         robots: the chains.
         drives: of all joints, in the order of the chains.
         dynamics: of the chains, where they are known: they are compiled.
+        situated: whether runs have bases or payloads of their own.
     """
 
     def __init__(
-        self, robots: Sequence[Robot], drives: Sequence[Drive], dynamics: Sequence[DriveDynamics] | None = None
+        self,
+        robots: Sequence[Robot],
+        drives: Sequence[Drive],
+        dynamics: Sequence[DriveDynamics] | None = None,
+        *,
+        situated: bool = False,
     ) -> None:
         self.robots, self.drives = tuple(robots), tuple(drives)
         ends = np.cumsum([robot.n for robot in robots])
@@ -62,7 +68,7 @@ class Fleet:
         self.dynamics = tuple(
             dynamics
             or (
-                DriveDynamics(robot, [drives[j] for j in columns])
+                DriveDynamics(robot, [drives[j] for j in columns], situated=situated)
                 for robot, columns in zip(robots, self.columns, strict=True)
             )
         )
@@ -75,9 +81,20 @@ class Fleet:
         return len(self.drives)
 
     @property
+    def situated(self) -> bool:
+        """Whether runs have bases or payloads of their own."""
+        return self.dynamics[0].situated
+
+    @property
     def values(self) -> tuple[Array, ...]:
         """The drives' parameters, chain by chain."""
-        return tuple(dynamics.values for dynamics in self.dynamics)
+        own = self.drives
+        return tuple(np.array([own[j].values[name] for j in c for name in own[j].names]) for c in self.columns)
+
+    @property
+    def rigid(self) -> Fleet:
+        """The chains with rigid gears."""
+        return self.with_drives([drive.with_gear(None) for drive in self.drives])
 
     def index(self, joint: int, name: str) -> tuple[int, int]:
         """Chain and index of a joint's parameter."""
@@ -93,6 +110,32 @@ class Fleet:
         """Gives one chain alone, with its compiled functions."""
         drives = [self.drives[j] for j in self.columns[chain]]
         return Fleet([self.robots[chain]], drives, [self.dynamics[chain]])
+
+    def with_drives(self, drives: Sequence[Drive]) -> Fleet:
+        """Gives the chains with other drives; those of which no drive differs keep their compiled functions."""
+        dynamics = []
+        for chain, columns in enumerate(self.columns):
+            own = [drives[j] for j in columns]
+            same = all(new.members == self.drives[j].members for new, j in zip(own, columns, strict=True))
+            dynamics.append(
+                self.dynamics[chain] if same else DriveDynamics(self.robots[chain], own, situated=self.situated)
+            )
+        return Fleet(self.robots, drives, dynamics)
+
+    def with_gear(self, joint: int, gear: ElasticGear | None) -> Fleet:
+        """Gives the chains with another gear of one joint; None for a rigid one."""
+        drives = list(self.drives)
+        drives[joint] = drives[joint].with_gear(gear)
+        return self.with_drives(drives)
+
+    def taken(self, values: Sequence[Array], other: Fleet) -> tuple[Array, ...]:
+        """Gives values of another fleet of the same joints, as far as these drives have them."""
+        new = []
+        for known, mine in zip(other.with_values(values), self.drives, strict=True):
+            new.append({name: known.values.get(name, value) for name, value in mine.values.items()})
+        return tuple(
+            np.array([new[j][name] for j in columns for name in self.drives[j].names]) for columns in self.columns
+        )
 
     def changed(self, values: Sequence[Array], name: str, joints: Iterable[int], value: float) -> tuple[Array, ...]:
         """Gives values with another one of some joints."""

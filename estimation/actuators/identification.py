@@ -8,9 +8,11 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from estimation.actuators.base_motion import is_situated, with_base
+from estimation.actuators.effects import BY_NAME
 from estimation.actuators.equation_error import started
 from estimation.actuators.exports.expressible import expressible
-from estimation.actuators.fitting import Fit, fit_drives
+from estimation.actuators.fitting import FINE, Fit, fit_drives, polished
 from estimation.actuators.freedom import (
     Fleet,
     Freedom,
@@ -22,6 +24,7 @@ from estimation.actuators.freedom import (
 from estimation.actuators.options import ActuatorOptions
 from estimation.actuators.result import Actuators, DriveValue, MotionError, Trace
 from estimation.actuators.runs import Run, runs_of
+from estimation.actuators.scale import scale_notes, with_constants, with_currents
 from estimation.actuators.search import LoopFinding, search_effects
 from estimation.actuators.simulated_error import Errors, prepare, rms, simulate_runs
 from estimation.actuators.uncertainty import intervals, uncertainty_of
@@ -76,7 +79,8 @@ def identify_actuators(
 
     Args:
         robots: the robot, or its chains from a base that is held, see `robots.drives.branches.load_branches`.
-        logs: with commands, of all joints in the order of the chains.
+        logs: with commands, of all joints in the order of the chains. Currents, known payloads, and a base that moves
+            or stands otherwise than described count.
         drives: what is known of the joints' drives, see `robots.drives.described_drives`.
         held_out: logs that nothing is fitted to. Without them the last part of each run is held out.
         options: settings.
@@ -96,25 +100,33 @@ def identify_actuators(
     chains = [robots] if isinstance(robots, Robot) else list(robots)
     given = [logs] if isinstance(logs, Log) else list(logs)
     outside = [held_out] if isinstance(held_out, Log) else list(held_out)
-    fleet = Fleet(chains, drives)
+    given, outside = [with_base(log) for log in given], [with_base(log) for log in outside]
+    fleet = Fleet(chains, drives, situated=any(is_situated(log) for log in [*given, *outside]))
     runs, notes = runs_of(given, fleet)
     other, more = runs_of(outside, fleet) if outside else ((), ())
+    other = tuple(replace(run, current=None) for run in other)
     freedom = _freedom(fleet, chosen)
     bar.start("fitting the drives", None)
     prepare(fleet)
     begun, ended = zip(*(run.cut(TRAINED) for run in runs), strict=True)
     fitted_runs, text = (runs, "held-out logs") if outside else (begun, f"the last {1 - TRAINED:.0%} of each run")
-    seen: Sequence[Run] = other if outside else ended
-    start = _start(freedom, fitted_runs, bar)
+    seen: Sequence[Run] = other if outside else [replace(run, current=None) for run in ended]
+    fitted_runs, said = with_currents(fitted_runs, fleet)
+    plain = [replace(run, current=None) for run in fitted_runs]
+    start = _start(freedom, plain, bar)
     findings: tuple[LoopFinding, ...] = ()
     if chosen.effects:
-        trained, validated = zip(*(run.blocks() for run in fitted_runs), strict=True)
+        trained, validated = zip(*(run.blocks() for run in plain), strict=True)
         first = fit_drives(freedom, start, trained, replace(chosen.fit, settled=ROUGH), bar)
         freedom, start, findings = search_effects(first, trained, validated, bar)
-    fit = fit_drives(freedom, start, fitted_runs, chosen.fit, bar)
+    if fitted_runs[0].current is not None:
+        # Torques are simulated along a motion that is right already.
+        start = fit_drives(freedom, start, plain, replace(chosen.fit, settled=ROUGH), bar).values
+        freedom, start = with_constants(freedom, start, fitted_runs)
+    fit = polished(fit_drives(freedom, start, fitted_runs, chosen.fit, bar), bar)
     bar.finish()
-    notes = (*notes, *more, *_scale_notes(fleet, freedom), *_fit_notes(fit))
-    return _result(fleet, fit, fitted_runs, seen, findings, notes, text, given, chosen)
+    notes = (*notes, *more, *said, *scale_notes(fit, fleet, start, fitted_runs), *_fit_notes(fit))
+    return _result(fleet, fit, plain, seen, findings, notes, text, given, chosen)
 
 
 def _freedom(fleet: Fleet, options: ActuatorOptions) -> Freedom:
@@ -146,15 +158,12 @@ def _start(freedom: Freedom, runs: Sequence[Run], progress: Progress) -> tuple[A
     return best[1]
 
 
-def _scale_notes(fleet: Fleet, freedom: Freedom) -> list[str]:
-    free = {parameter.name for parameter in freedom.free}
-    if free & {"kp", "kv", "kr"}:
-        return [
-            "no torque, no gains: the masses of the description set the scale of all torques, gains and inertias; if "
-            "they are wrong by a factor, these are wrong by the same factor"
-        ]
-    del fleet
-    return ["no torque was logged: the stated gains set the scale of friction and inertia"]
+def _stands(finding: LoopFinding, fit: Fit, values: Sequence[DriveValue]) -> bool:
+    """Whether an effect is still there after the fit of everything: its size, which cannot be below zero, is above."""
+    for parameter, value in zip(fit.freedom.free, values, strict=True):
+        if parameter.name == BY_NAME[finding.effect].free[0] and finding.joint - 1 in parameter.joints:
+            return parameter.lower != 0.0 or value.lower > 0.0
+    return True
 
 
 def _fit_notes(fit: Fit) -> list[str]:
@@ -172,23 +181,24 @@ def _result(
     logs: Sequence[Log],
     options: ActuatorOptions,
 ) -> Actuators:
+    reached = fit.freedom.fleet
     fitted_as_described = _described_errors(fleet, runs)
-    seen_as_described, after = _described_errors(fleet, seen), simulate_runs(fleet, fit.values, seen)
+    seen_as_described, after = _described_errors(fleet, seen), simulate_runs(reached, fit.values, seen, refinement=FINE)
     errors = tuple(
         MotionError(name=name, described=a, fitted=b, held_out_described=c, held_out=d)
         for name, a, b, c, d in zip(
-            fleet.names, rms(fitted_as_described), fit.rms, rms(seen_as_described), rms(after), strict=True
+            fleet.names, rms(fitted_as_described), fit.rms[: fleet.n], rms(seen_as_described), rms(after), strict=True
         )
     )
-    drives = fleet.with_values(fit.values)
+    drives, parameters = reached.with_values(fit.values), _parameters(fleet, fit, options.seed)
     result = Actuators(
         robot=fleet.robots[0].name,
         joints=fleet.names,
         law=tuple(_law(drive) for drive in drives),
         values=tuple(_plain(drive.values) for drive in drives),
-        parameters=_parameters(fleet, fit, options.seed),
+        parameters=parameters,
         errors=errors,
-        findings=findings,
+        findings=tuple(finding for finding in findings if _stands(finding, fit, parameters)),
         notes=notes,
         held_out=held_out,
         traces=tuple(_trace(a, b) for a, b in zip(seen_as_described, after, strict=True)),
@@ -207,13 +217,14 @@ def _result(
 
 def _written_error(fleet: Fleet, fit: Fit, result: Actuators, seen: Sequence[Run]) -> float:
     """Error of the drives as simulators express them."""
-    values: tuple[Array, ...] = fit.values
+    fleet = fleet.rigid
+    values = fleet.taken(fit.values, fit.freedom.fleet)
     for joint, friction in enumerate(expressible(result).friction):
         values = fleet.changed(values, "coulomb", [joint], float(friction))
     for name, neutral in NEUTRAL.items():
         having = [joint for joint in range(fleet.n) if name in fleet.drives[joint].names]
         values = fleet.changed(values, name, having, neutral)
-    return float(np.mean(rms(simulate_runs(fleet, values, seen))))
+    return float(np.mean(rms(simulate_runs(fleet, values, seen, refinement=FINE))))
 
 
 def _described_errors(fleet: Fleet, runs: Sequence[Run]) -> list[Errors]:
@@ -242,7 +253,9 @@ def _parameters(fleet: Fleet, fit: Fit, seed: int) -> tuple[DriveValue, ...]:
                 lower=max(lower, parameter.lower),
                 upper=min(upper, parameter.upper),
                 unit=parameter.unit,
-                described=float(np.mean([fleet.drives[j].values[parameter.name] for j in parameter.joints])),
+                described=float(
+                    np.mean([fleet.drives[j].values.get(parameter.name, np.nan) for j in parameter.joints])
+                ),
                 status=status,
                 partners=tuple(_name(free[m]) for m in known.partners[k]),
             )

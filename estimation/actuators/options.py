@@ -15,12 +15,12 @@ class FitOptions:
     Attributes:
         iterations: the most Gauss-Newton steps of a round.
         rounds: how often the joints' weights are taken from their errors.
-        settled: relative decrease of the cost below which the fit has settled.
+        settled: relative decrease of the cost below which the fit has settled; a finer fit follows.
     """
 
     iterations: int = 25
     rounds: int = 2
-    settled: float = 1e-5
+    settled: float = 1e-4
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -41,7 +41,7 @@ class DriveValue:
         lower: end of the 95 % interval.
         upper: the other end.
         unit: such as ``kg m2``.
-        described: what the description said.
+        described: what the description said; NaN where it said nothing.
         status: ``identified``, ``at its bound`` or ``not determined``.
         partners: other parameters, of which the log shows only a combination with this one.
     """
@@ -172,6 +172,12 @@ class Actuators(Result, format="robot-oed actuators"):
         return float(np.mean([error.held_out_described for error in self.errors]))
 
     @property
+    def unexplained(self) -> tuple[MotionError, ...]:
+        """Joints whose held-out error is far above that of the others."""
+        middle = float(np.median([error.held_out for error in self.errors]))
+        return tuple(e for e in self.errors if e.held_out > _UNEXPLAINED * middle and len(self.errors) > 1)
+
+    @property
     def undetermined(self) -> tuple[DriveValue, ...]:
         """Parameters that the motion does not determine."""
         return tuple(value for value in self.parameters if value.status == "not determined")
@@ -220,18 +226,15 @@ class Actuators(Result, format="robot-oed actuators"):
             )
             for item in self.findings
         ]
-        middle = float(np.median([error.held_out for error in self.errors]))
-        for error in self.errors:
-            if error.held_out > _UNEXPLAINED * middle and len(self.errors) > 1:
-                found.append(
-                    Finding(
-                        code="drives.unexplained",
-                        subject=error.name,
-                        text=f"{1e3 * error.held_out:.3g} mrad remain, with no effect of the catalogue to explain "
-                        "them.",
-                        action="look at its motion below; compare the joint with its like",
-                    )
-                )
+        found += [
+            Finding(
+                code="drives.unexplained",
+                subject=error.name,
+                text=f"{1e3 * error.held_out:.3g} mrad remain, with no effect of the catalogue to explain them.",
+                action="look at its motion below; compare the joint with its like",
+            )
+            for error in self.unexplained
+        ]
         open_ = self.undetermined
         if open_:
             names = ", ".join(value.name for value in open_[:6]) + (", ..." if len(open_) > 6 else "")

@@ -2,19 +2,24 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from estimation.actuators.base_motion import situation_of
 from estimation.actuators.freedom import Fleet
-from estimation.logs.formats import read_foreign
+from estimation.logs import read_logs
+from estimation.logs.mappings.mapping import LogMapping
+from estimation.logs.readers.lerobot import is_lerobot, read_lerobot
 from robots.common.errors import InputError, NotIdentifiableError
-from robots.drives import HeldCommand
+from robots.drives import HeldCommand, Situation
 from robots.drives.simulation import usual_step
+from robots.robot import Robot
 from robots.signals import Log
 
 Array = NDArray[np.float64]
@@ -31,9 +36,8 @@ BLOCKS, EVERY = 15, 3
 """Blocks of time into which a run is divided to compare effects; one of so many is held out."""
 SAME = 1e-3
 """RMS difference of command and measurement, as a fraction of the motion, below which they are the same signal."""
-BASE = re.compile(r"(base|root|pelvis|torso|trunk|imu)", re.IGNORECASE)
-HELD = 0.02
-"""Standard deviation of a base's pose [m or rad or 1] up to which it counts as held."""
+ROUNDING = 1e-9
+"""Change of a position [rad or m] up to which it is none."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -49,6 +53,8 @@ class Run:
         steps: resolution of each joint's command (n,) [rad or m].
         mask: samples that count (N,); None for all.
         coarseness: of the simulation's steps, in usual ones.
+        situations: of the chains: bases and payloads; empty where all are as described.
+        current: of the motors (N, n) [A, or another unit]; None without.
     """
 
     name: str
@@ -59,6 +65,8 @@ class Run:
     steps: Array
     mask: NDArray[np.bool_] | None = None
     coarseness: float = 1.0
+    situations: tuple[Situation, ...] = ()
+    current: Array | None = None
 
     @cached_property
     def _held(self) -> dict[bytes, HeldCommand]:
@@ -84,6 +92,14 @@ class Run:
         return np.asarray(np.polyfit(t, self.q[:count], 2)[1])
 
     @cached_property
+    def noise(self) -> Array:
+        """Noise of measured positions (n,): differences of the third order, or the rounding of the encoder's steps."""
+        rough = np.diff(self.q, 3, axis=0).std(axis=0) / np.sqrt(20.0)
+        changes = np.abs(np.diff(self.q, axis=0))
+        steps = np.where(changes > ROUNDING, changes, np.inf).min(axis=0)
+        return np.maximum(rough, np.where(np.isfinite(steps), steps, 0.0) / np.sqrt(12.0))
+
+    @cached_property
     def counted(self) -> NDArray[np.bool_]:
         """Samples that count (N,)."""
         settled = self.t - self.t[0] >= min(SETTLING, 0.1 * (self.t[-1] - self.t[0]))
@@ -91,12 +107,28 @@ class Run:
 
     def joints(self, columns: NDArray[np.intp]) -> Run:
         """Gives some of the joints."""
-        return replace(self, q=self.q[:, columns], command=self.command[:, columns], steps=self.steps[columns])
+        return replace(
+            self,
+            q=self.q[:, columns],
+            command=self.command[:, columns],
+            steps=self.steps[columns],
+            current=None if self.current is None else self.current[:, columns],
+        )
+
+    def chain(self, number: int, columns: NDArray[np.intp]) -> Run:
+        """Gives one chain with its joints."""
+        return replace(self.joints(columns), situations=self.situations[number : number + 1])
+
+    def rows(self, part: slice) -> Run:
+        """Gives some of the samples."""
+        return replace(
+            self, t=self.t[part], q=self.q[part], current=None if self.current is None else self.current[part]
+        )
 
     def cut(self, share: float) -> tuple[Run, Run]:
         """Cuts the run at a share of its time."""
         at = int(np.searchsorted(self.t, self.t[0] + share * (self.t[-1] - self.t[0])))
-        return replace(self, t=self.t[:at], q=self.q[:at]), replace(self, t=self.t[at:], q=self.q[at:])
+        return self.rows(slice(None, at)), self.rows(slice(at, None))
 
     def blocks(self) -> tuple[Run, Run]:
         """Gives the run twice: with the samples of most blocks of time, and with those of the others.
@@ -120,7 +152,7 @@ def runs_of(logs: Sequence[Log], fleet: Fleet) -> tuple[tuple[Run, ...], tuple[s
         The runs, and what a reader should know of them.
 
     Raises:
-        InputError: no command, a command that is the measurement, other units, a slow log, or a base that moves.
+        InputError: no command, a command that is the measurement, other units, or a slow log.
         NotIdentifiableError: a command that does not change, or no run that is long enough.
     """
     runs: list[Run] = []
@@ -129,6 +161,7 @@ def runs_of(logs: Sequence[Log], fleet: Fleet) -> tuple[tuple[Run, ...], tuple[s
     for log in logs:
         notes += _check(log, fleet)
         assert log.command is not None
+        around = tuple(situation_of(log, robot) for robot in fleet.robots) if fleet.situated else ()
         edges = np.flatnonzero(np.diff(log.t) > GAP * np.median(np.diff(log.t))) + 1
         for part in np.split(np.arange(len(log.t)), edges):
             if len(part) >= SHORTEST:
@@ -140,6 +173,8 @@ def runs_of(logs: Sequence[Log], fleet: Fleet) -> tuple[tuple[Run, ...], tuple[s
                         log_t=log.t,
                         command=log.command,
                         steps=steps,
+                        situations=around,
+                        current=None if log.current is None else log.current[part],
                     )
                 )
     if not runs:
@@ -201,7 +236,6 @@ def _check(log: Log, fleet: Fleet) -> list[str]:
     notes += [
         f"{log.name}: {fleet.names[moving[k]]} follows its command without an error" for k in np.flatnonzero(same)
     ]
-    _check_base(log, file)
     return notes
 
 
@@ -246,21 +280,49 @@ def _check_units(log: Log, fleet: Fleet, joint: int, file: str | None) -> None:
         )
 
 
-def _check_base(log: Log, file: str | None) -> None:
-    """Refuses a log whose own columns show that the base moved."""
-    ignored = [name for name in log.metadata.get("ignored_columns", ()) if BASE.search(name)]
-    if not ignored or file is None:
-        return
-    try:
-        table = read_foreign(file, lambda name: name in ignored)
-    except InputError:
-        return
-    for name, values in table.columns.items():
-        if not table.is_text(name) and float(np.nanstd(values)) > HELD:
-            raise InputError(
-                f"the base moves (standard deviation {np.nanstd(values):.2g})",
-                file=file,
-                column=name,
-                allowed="a base that is held",
-                remedy="hang or clamp the robot; contacts with the ground are not part of the model",
-            )
+def read_command_logs(
+    paths: Sequence[Path],
+    chains: Sequence[Robot],
+    *,
+    joints: Sequence[str] | None = None,
+    mapping: LogMapping | Path | None = None,
+) -> list[Log]:
+    """Reads logs with commands: files of any known format, and LeRobot data sets.
+
+    Args:
+        paths: files and folders; none for no logs.
+        chains: of the robot.
+        joints: names of the log's joints in its order; by default that of the chains.
+        mapping: of the logs' columns.
+
+    Returns:
+        Logs whose joints are in the order of the chains.
+
+    Raises:
+        InputError: see `read_logs` and `read_lerobot`.
+    """
+    if not paths:
+        return []
+    own = [name for chain in chains for name in chain.joint_names]
+    names = list(joints or own)
+    # Where each joint of the chains is in the log, and the other way round.
+    places = [names.index(name) for name in own]
+    back = [places.index(column) for column in range(len(places))]
+    kinds = [kind for chain in chains for kind in chain.chain.kinds]
+    sets = [path for path in paths if is_lerobot(path)]
+    files = [path for path in paths if path not in sets]
+    settings: dict[str, Any] = {"n": len(names), "torque": False, "mapping": mapping, "joints": tuple(names)}
+    found = list(read_logs(files, kinds=tuple(kinds[k] for k in back), **settings)) if files else []
+    # Normalised positions of a data set are read by the joints' limits.
+    lower = np.array([float(value) for chain in chains for value in chain.limits.lower])[back]
+    upper = np.array([float(value) for chain in chains for value in chain.limits.upper])[back]
+    for path in sets:
+        found += read_lerobot(path, tuple(names), (lower, upper))
+    return [_in_order(log, places) for log in found]
+
+
+def _in_order(log: Log, places: list[int]) -> Log:
+    if places == sorted(places):
+        return log
+    columns = ("q", "command", "tau", "current", "dq", "ddq", "temperature", "qlink")
+    return replace(log, **{key: getattr(log, key)[:, places] for key in columns if getattr(log, key) is not None})

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,7 +14,7 @@ from estimation.actuators.effects import BY_NAME, EFFECTS, LoopEffect, Seen
 from estimation.actuators.fitting import FLOOR, Fit, FitOptions, fit_drives, normal_equations
 from estimation.actuators.freedom import Fleet, Freedom, FreeParameter, free_parameters
 from estimation.actuators.runs import Run
-from estimation.actuators.simulated_error import Errors, linearised_runs, rms, simulate_runs
+from estimation.actuators.simulated_error import CHAINS, Errors, linearised_runs, rms, simulate_runs
 from estimation.uncertainty.correlations import correlation_rows
 from robots.common.errors import SolverError
 from robots.common.progress import SILENT, Progress
@@ -28,14 +29,24 @@ TRIED = 3
 """Alternatives of a joint that are fitted in a round: those that promise most."""
 ROUNDS = 6
 """Rounds of the search on a chain: each may accept one effect per joint."""
+FAINT = 0.3
+"""Share of what an effect brought below which a promise is not tried beside it."""
 SURE = 3.0
 """Standard errors by which the logarithm of the held-out squared error must fall."""
 MEMORIES, FEWEST_BLOCKS, MOST_BLOCKS = 2, 6, 40
 """Length of a block in times of the error's memory, and the least and most blocks."""
+QUIET = 2.0
+"""Error of a joint, in times of its measurement's noise, up to which nothing is looked for."""
+CLEAR = 1e-4
+"""Error of a joint [rad or m] from which on an elastic gear is tried."""
+SHORTER = 0.5
+"""Steps of a simulation with an elastic gear, in usual ones: its flanks are stiff."""
 SMOOTHED = 5
 """Samples over which speeds are averaged that only start a search."""
 QUICK = FitOptions(iterations=6, rounds=1, settled=0.01)
 """Settings of the fits that compare effects."""
+FINISHED = FitOptions(iterations=30, rounds=1, settled=1e-4)
+"""Settings of the fit with an effect that was accepted, if that had not settled."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -69,6 +80,11 @@ class _Promise:
     effect: LoopEffect
     start: dict[str, float]
     share: float
+    cost: float
+    """What it takes off the chain's weighted squared error on fitted data; infinite where nobody knows."""
+
+
+_Trial = tuple[float, _Promise, Fit, list[Errors]]
 
 
 def search_effects(
@@ -87,21 +103,32 @@ def search_effects(
     """
     fleet = fit.freedom.fleet
     freedom, values, findings = fit.freedom, list(fit.values), list[LoopFinding]()
-    for chain, columns in enumerate(fleet.columns):
-        own, found = _search_chain(
+
+    def searched(chain: int) -> tuple[Fleet, tuple[Array, ...], list[LoopFinding]]:
+        columns = fleet.columns[chain]
+        return _search_chain(
             fit.freedom.part(chain),
             (fit.values[chain],),
-            [run.joints(columns) for run in runs],
-            [run.joints(columns) for run in held_out],
+            [run.chain(chain, columns) for run in runs],
+            [run.chain(chain, columns) for run in held_out],
             fit.weights[columns],
             progress,
         )
+
+    chains = range(len(fleet.columns))
+    parts = []
+    for chain, (part, own, found) in enumerate(CHAINS.map(searched, chains)):
+        columns = fleet.columns[chain]
         values[chain] = own[0]
-        findings += [replace(finding, joint=int(columns[finding.joint - 1]) + 1) for finding, _ in found]
-        for finding, effect in found:
-            joint = int(columns[finding.joint - 1])
-            alone = {fleet.names[joint]: (joint,)}
-            freedom = freedom.with_free(free_parameters(fleet, effect.free, alone, [joint]))
+        parts.append(part)
+        findings += [replace(finding, joint=int(columns[finding.joint - 1]) + 1) for finding in found]
+    dynamics = [part.dynamics[0] for part in parts]
+    fleet = Fleet(fleet.robots, [drive for part in parts for drive in part.drives], dynamics)
+    freedom = replace(freedom, fleet=fleet)
+    for finding in findings:
+        joint, effect = finding.joint - 1, BY_NAME[finding.effect]
+        alone = {fleet.names[joint]: (joint,)}
+        freedom = freedom.with_free(free_parameters(fleet, effect.free, alone, [joint]))
     findings.sort(key=lambda finding: finding.after - finding.before)
     return freedom, tuple(values), tuple(findings)
 
@@ -113,34 +140,69 @@ def _search_chain(
     held_out: Sequence[Run],
     weights: Array,
     progress: Progress,
-) -> tuple[tuple[Array, ...], list[tuple[LoopFinding, LoopEffect]]]:
-    accepted: list[tuple[LoopFinding, LoopEffect]] = []
+) -> tuple[Fleet, tuple[Array, ...], list[LoopFinding]]:
+    accepted: list[LoopFinding] = []
+    geared: dict[int, Fleet] = {}
     now = linearised_runs(freedom, values, runs)
     outside: list[Errors] = [replace(part, run=run) for part, run in zip(now, held_out, strict=True)]
     for _ in range(ROUNDS):
-        taken = {(finding.joint - 1, effect.name) for finding, effect in accepted}
+        taken = {(finding.joint - 1, finding.effect) for finding in accepted}
         weights = np.maximum(rms(now), FLOOR) ** -2
-        promises = _promises(freedom, values, runs, now, weights, taken)
-        best: tuple[float, _Promise, Fit, list[Errors]] | None = None
+        smooth, bent = _promises(freedom, values, runs, now, weights, taken, geared)
+        best: _Trial | None = None
+        trials: list[_Trial] = []
         rivals: list[tuple[int, str, float]] = []
-        for promise in promises:
-            trial = _fitted(freedom, values, runs, promise, weights)
-            if trial is None:
-                continue
-            seen = [replace(part, run=run, jacobian=None) for part, run in zip(trial.errors, held_out, strict=True)]
-            gain = _gain(outside, seen, promise.joint, weights)
-            rivals.append((promise.joint, promise.effect.name, float(rms(seen)[promise.joint])))
-            if gain > 0 and (best is None or gain > best[0]):
-                best = gain, promise, trial, seen
+        for derivatives in (True, False):
+            if not derivatives and best is not None and smooth[0].share > MOST:
+                break
+            for promise in smooth if derivatives else bent():
+                if best is not None and promise.cost < FAINT * best[0]:
+                    # An effect does not bring many times what its derivatives promise.
+                    continue
+                trial = _fitted(freedom, values, runs, promise, weights, geared)
+                if trial is None:
+                    continue
+                seen = _outside(trial, held_out)
+                gain = _gain(outside, seen, promise.joint, weights)
+                rivals.append((promise.joint, promise.effect.name, float(rms(seen)[promise.joint])))
+                trials.append((gain, promise, trial, seen))
+                if gain > 0 and (best is None or gain > best[0]):
+                    best = trials[-1]
         if best is None:
             break
-        _, promise, trial, seen = best
-        finding = _finding(freedom, promise, trial, outside, seen, rivals)
-        accepted.append((finding, promise.effect))
+        _, promise, trial, seen = _plainest(best, trials, weights)
+        if promise.effect.gear is not None:
+            # Flanks need shorter steps.
+            runs, held_out = ([replace(run, coarseness=SHORTER) for run in part] for part in (runs, held_out))
+        if not trial.settled or promise.effect.gear is not None:
+            # What an unfinished fit leaves would look like another effect.
+            trial = fit_drives(trial.freedom, trial.values, runs, FINISHED, weights=weights)
+            seen = _outside(trial, held_out)
+        finding = _finding(trial.freedom, promise, trial, outside, seen, rivals)
+        accepted.append(finding)
         progress.update(0.0, f"{finding.name}: {finding.title}")
+        if promise.effect.gear is not None:
+            geared.clear()
         freedom, values, outside = trial.freedom, trial.values, seen
         now = list(trial.errors)
-    return values, accepted
+    return freedom.fleet, values, accepted
+
+
+def _outside(fit: Fit, held_out: Sequence[Run]) -> list[Errors]:
+    """Errors of a fit on the samples that were not fitted."""
+    return [replace(part, run=run, jacobian=None) for part, run in zip(fit.errors, held_out, strict=True)]
+
+
+def _plainest(best: _Trial, trials: Sequence[_Trial], weights: Array) -> _Trial:
+    """Takes a trial of which the best one is a special case with more parameters, unless that is surely better."""
+    _, promise, _, seen = best
+    for trial in trials:
+        effect = trial[1].effect
+        plainer = set(effect.free) < set(promise.effect.free) and effect.gear == promise.effect.gear
+        same = trial[1].joint == promise.joint and trial[0] > 0
+        if plainer and same and not _gain(trial[3], seen, promise.joint, weights):
+            return trial
+    return best
 
 
 def _promises(
@@ -150,19 +212,22 @@ def _promises(
     now: Sequence[Errors],
     weights: Array,
     taken: set[tuple[int, str]],
-) -> list[_Promise]:
-    """What each effect would take off a joint's squared error, by derivatives or at its first values; most first."""
+    geared: dict[int, Fleet],
+) -> tuple[list[_Promise], Callable[[], list[_Promise]]]:
+    """What effects would take off a joint's squared error by derivatives, most first; and what gives the others."""
     fleet = freedom.fleet
     costs = np.array([sum(float((part.error[:, j] ** 2).sum()) for part in now) for j in range(fleet.n)]) * weights
     found: list[_Promise] = []
     starts: dict[tuple[int, str], Sequence[dict[str, float]]] = {}
-    for joint in range(fleet.n):
+    noise = np.max([run.noise for run in runs], axis=0)
+    for joint in np.flatnonzero(rms(now) > QUIET * noise).tolist():
         known = {name: fleet.of(values, joint, name) for name in fleet.drives[joint].names}
         q = np.concatenate([run.q[:, joint] for run in runs])
         dq = np.concatenate([uniform_filter1d(np.gradient(run.q[:, joint], run.t), SMOOTHED) for run in runs])
         command = np.concatenate([np.interp(run.t - known["delay"], run.log_t, run.command[:, joint]) for run in runs])
         for effect in EFFECTS:
-            if (joint, effect.name) not in taken and all(name in known for name in effect.free):
+            possible = all(name in known for name in effect.free) if effect.gear is None else "stiffness" not in known
+            if (joint, effect.name) not in taken and possible:
                 starts[joint, effect.name] = effect.starts(Seen(q, dq, command, known))
     for index in range(max((len(options) for options in starts.values()), default=0)):
         there = [key for key, options in starts.items() if index < len(options)]
@@ -170,7 +235,15 @@ def _promises(
         changed = _with_starts(fleet, values, {key: starts[key][index] for key in neutral})
         shares = _shares_by_slopes(freedom, changed, runs, now, neutral, costs, weights)
         for (joint, name), share in shares.items():
-            found.append(_Promise(joint=joint, effect=BY_NAME[name], start=starts[joint, name][index], share=share))
+            found.append(
+                _Promise(
+                    joint=joint,
+                    effect=BY_NAME[name],
+                    start=starts[joint, name][index],
+                    share=share,
+                    cost=share * costs[joint],
+                )
+            )
     best: dict[tuple[int, str], _Promise] = {}
     for promise in found:
         key = (promise.joint, promise.effect.name)
@@ -178,9 +251,8 @@ def _promises(
             best[key] = promise
     # A promise counts by what it takes off the whole chain's error.
     smooth = sorted(best.values(), key=lambda p: -p.share * costs[p.joint])[:TRIED]
-    if smooth and smooth[0].share > MOST:
-        return smooth
-    return [*smooth, *_bent(freedom, values, runs, starts, int(np.argmax(rms(now))))]
+    worst = int(np.argmax(rms(now)))
+    return smooth, partial(_bent, freedom, values, runs, starts, worst, float(rms(now)[worst]), geared)
 
 
 def _bent(
@@ -189,22 +261,34 @@ def _bent(
     runs: Sequence[Run],
     starts: Mapping[tuple[int, str], Sequence[dict[str, float]]],
     worst: int,
+    error: float,
+    geared: dict[int, Fleet],
 ) -> list[_Promise]:
-    """Effects that no derivative promises, of the joint with the largest error: each from its best first values."""
+    """Effects that no derivative promises, of the joint with the largest error: each from its best first values.
+
+    `error` is that joint's. `geared` keeps the chain with an elastic gear at a joint, which has to be compiled.
+    """
+    fleet = freedom.fleet
+    clear = error > CLEAR
     found = []
     for (joint, name), options in starts.items():
-        if joint != worst or not BY_NAME[name].bends:
+        gear = BY_NAME[name].gear
+        if joint != worst or not BY_NAME[name].bends or (gear is not None and not clear):
             continue
+        if gear is not None and joint not in geared:
+            geared[joint] = fleet.with_gear(joint, gear)
+        other = fleet if gear is None else geared[joint]
         costs = []
         for start in options:
             try:
-                errors = simulate_runs(freedom.fleet, _with_starts(freedom.fleet, values, {(joint, name): start}), runs)
+                began = _with_starts(other, other.taken(values, fleet), {(joint, name): start})
+                errors = simulate_runs(other, began, runs)
                 costs.append(float(rms(errors)[joint]))
             except SolverError:
                 costs.append(np.inf)
         if costs and np.isfinite(min(costs)):
             start = options[int(np.argmin(costs))]
-            found.append(_Promise(joint=joint, effect=BY_NAME[name], start=start, share=WORTH))
+            found.append(_Promise(joint=joint, effect=BY_NAME[name], start=start, share=WORTH, cost=np.inf))
     return found
 
 
@@ -274,11 +358,21 @@ def _of(part: Errors) -> Array:
 
 
 def _fitted(
-    freedom: Freedom, values: tuple[Array, ...], runs: Sequence[Run], promise: _Promise, weights: Array
+    freedom: Freedom,
+    values: tuple[Array, ...],
+    runs: Sequence[Run],
+    promise: _Promise,
+    weights: Array,
+    geared: Mapping[int, Fleet],
 ) -> Fit | None:
     """Fits an effect with everything that was free; None where the loop is not stable."""
-    fleet = freedom.fleet
-    changed = values
+    fleet, changed = freedom.fleet, values
+    if promise.effect.gear is not None:
+        other = geared[promise.joint]
+        drives = list(other.drives)
+        drives[promise.joint] = drives[promise.joint].with_values(promise.start)
+        fleet, changed = other.with_drives(drives), other.taken(values, fleet)
+        freedom = replace(freedom, fleet=fleet)
     for name, value in promise.start.items():
         changed = fleet.changed(changed, name, [promise.joint], value)
     names = [name for name in promise.effect.free if name in promise.start or not promise.effect.bends]

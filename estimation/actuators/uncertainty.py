@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from estimation.actuators.fitting import PRIOR, Fit, normal_equations
+from estimation.actuators.fitting import FINE, PRIOR, Fit, normal_equations
 from estimation.actuators.simulated_error import Errors, simulate_runs
 from estimation.uncertainty.blocks import moving_block_sums
 from estimation.uncertainty.correlations import correlation_rows
@@ -48,7 +48,7 @@ def uncertainty_of(fit: Fit, seed: int = 0) -> Uncertainty:
     """Estimates standard errors: a sandwich of coloured noise, and at least those of a moving block bootstrap.
 
     Args:
-        fit: with derivatives at its values.
+        fit: with derivatives at its values, see `polished`.
         seed: of the bootstrap.
     """
     size = len(fit.theta)
@@ -69,7 +69,7 @@ def _part(part: Errors) -> Part:
     assert part.jacobian is not None
     jacobian = part.jacobian
     used = [np.flatnonzero(jacobian[:, j].any(axis=0)) for j in range(jacobian.shape[1])]
-    mask = np.broadcast_to(part.run.counted[:, None], part.run.q.shape).astype(float)
+    mask = np.broadcast_to(part.run.counted[:, None], part.error.shape).astype(float)
     return Part(
         rows=len(jacobian),
         regressor=lambda start, stop: jacobian[start:stop],
@@ -80,13 +80,14 @@ def _part(part: Errors) -> Part:
 
 
 def _step_error(fit: Fit, inverse: Array) -> Array:
-    """Error of the parameters (K,) by the length of the simulation's steps, which is of second order in it."""
-    fine = simulate_runs(fit.freedom.fleet, fit.values, [part.run for part in fit.errors], refinement=2)
+    """Error of the parameters (K,) by the length of the steps: twice what halves change, being of first order."""
+    runs = [part.run for part in fit.errors]
+    finer = simulate_runs(fit.freedom.fleet, fit.values, runs, refinement=2 * FINE)
     total = np.zeros(len(inverse))
-    for part, other in zip(fit.errors, fine, strict=True):
+    for part, other in zip(fit.errors, finer, strict=True):
         assert part.jacobian is not None
         total += np.einsum("tjk,tj->k", part.jacobian, (other.simulated - part.simulated) * fit.weights)
-    return np.asarray(4 / 3 * inverse @ total)
+    return np.asarray(2 * inverse @ total)
 
 
 def _bootstrap(fit: Fit, inverse: Array, seed: int) -> Array:

@@ -275,7 +275,13 @@ def torque_of(robot: Robot, log: Log) -> Array:
     if log.tau is not None:
         return log.tau
     if log.current is None:
-        raise InputError("neither torque nor current", allowed="tau1.. [N m] or i1.. [A]")
+        raise InputError(
+            "neither torque nor current",
+            allowed="tau1.. [N m] or i1.. [A]",
+            remedy="identify logs of commands with oed actuators (estimation.identify_actuators)"
+            if log.command is not None
+            else "",
+        )
     constant = np.asarray(robot.torque_constant)
     if not np.isfinite(constant).all():
         source = log.metadata.get("torque_source")

@@ -22,7 +22,8 @@ class DriveDesignOptions:
         noise: standard deviation of measured positions [rad or m].
         home: commanded position at start and end (n,); by default the middle of the range, within `reach` of zero.
         margin: share of the limits that is left.
-        candidates: number of segments that are simulated.
+        candidates: number of segments that are simulated at first.
+        refinements: rounds in which so many segments near the best ones are simulated.
         seed: of their draw.
 
     Raises:
@@ -39,6 +40,7 @@ class DriveDesignOptions:
     home: Annotated[tuple[float, ...] | None, Option(reads=numbers, section="Robot")] = None
     margin: Annotated[float, Option(hidden=True)] = 0.1
     candidates: Annotated[int, Option(hidden=True)] = 60
+    refinements: Annotated[int, Option(hidden=True)] = 3
     seed: Seed = 0
 
     def __post_init__(self) -> None:

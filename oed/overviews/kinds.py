@@ -180,6 +180,20 @@ RESULTS: dict[str, tuple[str, Callable[[Data], Mapping[str, Figure]]]] = {
             "parameters": len(data["parameters"]),
         },
     ),
+    "robot-oed loop diagnosis": (
+        "diagnosis in the loop",
+        lambda data: {
+            "error [mrad]": 1e3 * sum(joint["held_out"] for joint in data["errors"]) / max(len(data["errors"]), 1),
+            "effects": len(data["findings"]),
+        },
+    ),
+    "robot-oed drive comparison": (
+        "comparison of drives",
+        lambda data: {
+            "runs": len(data["runs"]),
+            "significant differences": sum(bool(item["differs"]) for item in data["differences"]),
+        },
+    ),
     "robot-oed drive design": ("motion for drives", lambda data: {"parameters": len(data["expected"])}),
     "robot-oed payload": ("payload", lambda data: {"mass [kg]": data["mass"], "rows": data["rows"]}),
     "robot-oed calibration": ("calibration", _of_calibration),

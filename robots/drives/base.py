@@ -52,19 +52,25 @@ class Instant(NamedTuple):
         robot: the robot.
         joint: the joint, counted from 0.
         measured: position by the encoder [rad or m].
+        measured_rate: its derivative [rad/s or m/s].
         dq: velocity [rad/s or m/s].
         ddq: acceleration [rad/s2 or m/s2].
         load: torque of the rigid body on the gear [N m or N].
         state: the members' own states, such as the integral of a velocity error.
+        twist: position of the motor less that of the link, at the joint [rad or m]; zero without an elastic gear.
+        twist_rate: its derivative [rad/s or m/s].
     """
 
     robot: Robot
     joint: int
     measured: casadi.SX
+    measured_rate: casadi.SX
     dq: casadi.SX
     ddq: casadi.SX
     load: casadi.SX
     state: Values
+    twist: casadi.SX
+    twist_rate: casadi.SX
 
 
 class Member(ABC):
@@ -73,6 +79,8 @@ class Member(ABC):
     name: ClassVar[str]
     title: ClassVar[str]
     states: ClassVar[tuple[str, ...]] = ()
+    parts: ClassVar[bool] = False
+    """Whether the member parts the joint into a motor before it and a link after it, which move by themselves."""
 
     def parameters(self) -> tuple[DriveParameter, ...]:
         """Describes the member's numbers."""

@@ -12,15 +12,21 @@ from pydantic import Field
 
 from robots.common.config import Config, read_config
 from robots.common.errors import InputError
+from robots.drives.backlash import Backlash
 from robots.drives.drive import Drive
+from robots.drives.elastic_gear import ElasticGear
 from robots.drives.laws import LAWS, ServoLaw
 from robots.drives.mjcf_actuators import MjcfLaw, read_actuators
 from robots.robot import Robot
 
 Numbers = float | list[float] | dict[str, float]
 
-PARAMETERS = ("kp", "kd", "kr", "kv", "ki", "dead_band", "armature", "viscous", "coulomb", "torque_limit", "delay")
-"""Keys of a gains file that are parameters of every joint, if its law has them."""
+GAINS = ("kp", "kd", "kr", "kv", "ki", "dead_band")
+"""Keys of a gains file that are parameters of a law, if it has them."""
+OF_GEAR = ("stiffness", "gear_damping", "backlash")
+"""Those of an elastic gear. Joints for which none is stated have a rigid one."""
+PARAMETERS = (*GAINS, "armature", "viscous", "coulomb", "torque_limit", "delay", "torque_constant", *OF_GEAR)
+"""Keys of a gains file that are parameters of every joint."""
 
 
 class MotorCurve(Config):
@@ -53,6 +59,11 @@ class GainsFile(Config):
         viscous: viscous friction [N m s/rad], to start from.
         coulomb: Coulomb friction [N m], to start from.
         delay: of the command [s], to start from.
+        torque_constant: torque at the joint per unit of a logged current [N m/A], such as N m per percent of a load.
+        stiffness: of an elastic gear [N m/rad]; joints without it have a rigid one.
+        gear_damping: damping of an elastic gear [N m s/rad].
+        backlash: width of the gap of an elastic gear [rad].
+        encoder: what the encoder shows, motor or link. Default: link for a servo, else motor.
     """
 
     law: Literal["pd", "servo", "velocity", "cascade"]
@@ -69,6 +80,11 @@ class GainsFile(Config):
     viscous: Numbers | None = None
     coulomb: Numbers | None = None
     delay: float | None = None
+    torque_constant: Numbers | None = None
+    stiffness: Numbers | None = None
+    gear_damping: Numbers | None = None
+    backlash: Numbers | None = None
+    encoder: Literal["motor", "link"] | None = None
 
 
 class DescribedDrives(NamedTuple):
@@ -104,11 +120,14 @@ def described_drives(robots: Sequence[Robot], gains: str | PathLike[str] | None 
     for robot in robots:
         for j in range(robot.n):
             friction, limit = robot.friction[j], float(robot.limits.torque[j])
+            constant = float(np.asarray(robot.torque_constant)[j])
             stated[at] = {
                 "armature": float(robot.rotor_inertia[j]),
                 "viscous": float(friction[1]),
                 "coulomb": float(friction[0]),
-            } | ({"torque_limit": limit} if np.isfinite(limit) and limit > 0 else {})
+            }
+            stated[at] |= {"torque_limit": limit} if np.isfinite(limit) and limit > 0 else {}
+            stated[at] |= {"torque_constant": constant} if np.isfinite(constant) and constant > 0 else {}
             at += 1
     if gains is None:
         return _from_mjcf(robots, names, stated)
@@ -119,7 +138,7 @@ def described_drives(robots: Sequence[Robot], gains: str | PathLike[str] | None 
         value = getattr(file, key)
         if value is None:
             continue
-        if key in ("kp", "kd", "kr", "kv", "ki", "dead_band") and key not in own:
+        if key in GAINS and key not in own:
             raise InputError(f"{key} is no gain of the law {file.law}", file=gains, column=key, allowed=", ".join(own))
         for joint, number in enumerate(_spread(value, names, gains, key)):
             if number is not None:
@@ -134,11 +153,22 @@ def described_drives(robots: Sequence[Robot], gains: str | PathLike[str] | None 
         raise InputError("step belongs to the law servo", file=gains, column="step", remedy="law: servo")
     needed = [key for key in own if key not in ("dead_band", "ki")]
     unknown = tuple(key for key in needed if not all(key in values for values in stated))
+    encoder = file.encoder or ("link" if file.law == "servo" else "motor")
     try:
-        drives = tuple(Drive.usual(law, values=values, curve=curve is not None) for values in stated)
+        drives = tuple(
+            Drive.usual(law, values=values, curve=curve is not None, gear=_gear(values, name, gains), encoder=encoder)
+            for values, name in zip(stated, names, strict=True)
+        )
     except InputError as error:
-        raise InputError(error.problem, file=gains, allowed=error.allowed) from error
+        raise InputError(error.problem, file=gains, joint=error.joint, allowed=error.allowed) from error
     return DescribedDrives(drives, unknown, str(gains))
+
+
+def _gear(values: Mapping[str, float], joint: str, file: str | PathLike[str]) -> ElasticGear | None:
+    stated = [key for key in OF_GEAR if key in values]
+    if stated and "stiffness" not in values:
+        raise InputError(f"{stated[0]} without a stiffness", file=file, joint=joint, remedy="state `stiffness`, too")
+    return None if not stated else Backlash() if "backlash" in values else ElasticGear()
 
 
 def _spread(

@@ -9,7 +9,9 @@ ROUNDS, NEWTON_ROUNDS, NEWTON_STEPS = 3, 3, 3
 of each of these."""
 
 
-def dry_velocity(rest: casadi.SX, inertia: casadi.SX, limit: casadi.SX, width: float, newton: int) -> casadi.SX:
+def dry_velocity(
+    rest: casadi.SX, inertia: casadi.SX, limit: casadi.SX, width: casadi.SX | float, newton: int
+) -> casadi.SX:
     """Solves inertia z + limit tanh(z / width) = rest for z.
 
     With tanh straight-lined to a saturation the solution is exact and below the true one in size; from there Newton's
@@ -32,7 +34,7 @@ def dry_velocity(rest: casadi.SX, inertia: casadi.SX, limit: casadi.SX, width: f
 
 
 def dry_velocities(
-    matrix: casadi.SX, right: casadi.SX, limits: casadi.SX, start: casadi.SX, width: float, *, last: bool
+    matrix: casadi.SX, right: casadi.SX, limits: casadi.SX, start: casadi.SX, width: casadi.SX | float, *, last: bool
 ) -> casadi.SX:
     """Solves matrix z + limits tanh(z / width) = right, joint after joint (Gauss-Seidel).
 

@@ -23,6 +23,10 @@ Array = NDArray[np.float64]
 PASSES = 2
 """Times that a step's smooth torques are evaluated again: each brings the velocity at its end h / T nearer, T the time
 constant of the fastest loop."""
+BODY, BASE = 10, 9
+"""Numbers of a body's inertial parameters, and of the motion of a base, see `RigidBody.moving`."""
+MORE = 3
+"""Further passes with elastic gears, whose flanks may be reached within a step."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,13 +64,14 @@ class DriveDynamics:
     Args:
         robot: a chain of n joints with known masses.
         drives: of its joints (n).
-        width: speed [rad/s or m/s] below which dry friction fades.
+        situated: whether base and payload of a run are inputs: a base that moves or stands otherwise than described,
+            and a known body on the last link.
 
     Raises:
         InputError: another number of drives, or a robot without masses.
     """
 
-    def __init__(self, robot: Robot, drives: Sequence[Drive], width: float = 1e-4) -> None:
+    def __init__(self, robot: Robot, drives: Sequence[Drive], *, situated: bool = False) -> None:
         if len(drives) != robot.n:
             raise InputError(f"{len(drives)} drives of {robot.name}", allowed=f"{robot.n}, one per joint")
         if not robot.has_masses:
@@ -74,10 +79,11 @@ class DriveDynamics:
                 f"the masses of {robot.name} are not known",
                 remedy=f"without torque all values are relative to them: {MASSES_REMEDY}",
             )
-        self.robot, self.drives, self.width = robot, tuple(drives), width
+        self.robot, self.drives, self.situated = robot, tuple(drives), situated
         names = [(j, name) for j, drive in enumerate(drives) for name in drive.names]
         self.layout = Layout(np.array([j for j, _ in names], dtype=np.intp), tuple(name for _, name in names))
         self.owners = np.array([j for j, drive in enumerate(drives) for _ in drive.states], dtype=np.intp)
+        self.parted = tuple(j for j, drive in enumerate(drives) if drive.gear is not None)
 
     @property
     def n(self) -> int:
@@ -85,9 +91,38 @@ class DriveDynamics:
         return self.robot.n
 
     @property
+    def masses(self) -> int:
+        """Number d of coordinates: those of the n motors, then those of the links behind elastic gears.
+
+        Without an elastic gear a motor's coordinate is that of its joint.
+        """
+        return self.n + len(self.parted)
+
+    @cached_property
+    def links(self) -> NDArray[np.intp]:
+        """Coordinates of the links (n,)."""
+        found = np.arange(self.n)
+        found[list(self.parted)] = self.n + np.arange(len(self.parted))
+        return found
+
+    @cached_property
+    def shown(self) -> NDArray[np.intp]:
+        """Coordinates that the encoders show (n,)."""
+        return np.where([drive.encoder == "link" for drive in self.drives], self.links, np.arange(self.n))
+
+    @property
     def size(self) -> int:
         """Number of parameters P."""
         return len(self.layout.names)
+
+    @property
+    def extra(self) -> tuple[int, int]:
+        """Numbers that follow the parameters and the commands.
+
+        After the parameters a body, and the speed [rad/s or m/s] below which dry friction fades; after the commands the
+        motion of the base.
+        """
+        return (BODY + 1, BASE) if self.situated else (1, 0)
 
     @property
     def values(self) -> Array:
@@ -96,84 +131,176 @@ class DriveDynamics:
 
     @cached_property
     def balance(self) -> casadi.Function:
-        """(q, dq, ddq, command, state, p) -> torques of drives and rigid body, sizes of dry friction (n,), rates (s,).
+        """(x, dx, ddx, command, state, p, base) -> torques (d,), rigid body (n,), dry friction (n,), rates, efforts.
 
-        The drives' torque is that without dry friction.
+        The torques are those of drives on motors and links, without dry friction. The rigid body takes its part from
+        the links. The efforts are the motors' torques (n,).
         """
-        n, s = self.n, len(self.owners)
-        q, dq, ddq, command = (casadi.SX.sym(name, n) for name in ("q", "dq", "ddq", "command"))
-        state, p = casadi.SX.sym("state", s), casadi.SX.sym("p", self.size)
-        Y = RigidBody().regressor(self.robot, q, dq, ddq)
+        n, d, s = self.n, self.masses, len(self.owners)
+        x, dx, ddx = (casadi.SX.sym(name, d) for name in ("x", "dx", "ddx"))
+        command, state = casadi.SX.sym("command", n), casadi.SX.sym("state", s)
+        p, base = casadi.SX.sym("p", self.size + self.extra[0]), casadi.SX.sym("base", self.extra[1])
+        places = self.links.tolist()
         factors = [p[self.layout.place(j, "mass_factor")] for j in range(n)]
         inertia = casadi.vertcat(*(factors[j] * casadi.DM(self.robot.inertia[j]) for j in range(n)))
-        rigid = Y @ inertia
-        torques, sizes, rates = [], [], []
+        if self.situated:
+            inertia[-BODY:] += p[self.size : -1]
+        signals = x[places], dx[places], ddx[places]
+        rigid = RigidBody().moving(self.robot, *signals, base if self.situated else None) @ inertia
+        torques, sizes, rates, efforts = casadi.SX(d, 1), [], [], []
         for j, drive in enumerate(self.drives):
             own = {name: p[self.layout.place(j, name)] for name in drive.names}
             states = dict(zip(drive.states, (state[int(k)] for k in np.flatnonzero(self.owners == j)), strict=True))
-            measured = q[j] + own["encoder_zero"]
-            now = Instant(self.robot, j, measured, dq[j], ddq[j], rigid[j], states)
-            torque, dry, rate = drive.torque(command[j], now, own)
-            torques.append(torque)
+            encoder, link = int(self.shown[j]), int(self.links[j])
+            zero, twist = own["encoder_zero"], (x[j] - x[link], dx[j] - dx[link])
+            motor_now = Instant(self.robot, j, x[encoder] + zero, dx[encoder], dx[j], ddx[j], rigid[j], states, *twist)
+            link_now = motor_now._replace(measured=x[link] + zero, dq=dx[link], ddq=ddx[link])
+            found, dry, rate, effort = drive.torques(command[j], motor_now, link_now, own)
+            torques[j] = found[0]
+            if link != j:
+                torques[link] = found[1]
             sizes.append(dry)
+            efforts.append(effort)
             rates += rate
-        outputs = [casadi.vertcat(*torques), rigid, casadi.vertcat(*sizes), casadi.vertcat(casadi.SX(0, 1), *rates)]
-        return casadi.Function("balance", [q, dq, ddq, command, state, p], outputs)
+        outputs = [torques, rigid, casadi.vertcat(*sizes), casadi.vertcat(casadi.SX(0, 1), *rates)]
+        return casadi.Function("balance", [x, dx, ddx, command, state, p, base], [*outputs, casadi.vertcat(*efforts)])
+
+    @cached_property
+    @builds_expressions
+    def twist(self) -> casadi.Function:
+        """(q, p, base) -> twist of the elastic gears (m,) at rest, and its derivatives by q (m, n) and p (m, P)."""
+        q, rest = casadi.SX.sym("q", self.n), casadi.SX(self.masses, 1)
+        p, base = casadi.SX.sym("p", self.size + self.extra[0]), casadi.SX.sym("base", self.extra[1])
+        still = casadi.SX(self.n, 1), casadi.SX(len(self.owners), 1)
+        full = casadi.SX(self.masses, 1)
+        for j, place in enumerate(self.links.tolist()):
+            full[j] = full[place] = q[j]
+        rigid = self.balance(full, rest, rest, *still, p, base)[1]
+        found = []
+        for j in self.parted:
+            gear = self.drives[j].gear
+            assert gear is not None
+            own = {name: p[self.layout.place(j, name)] for name in self.drives[j].names}
+            found.append(gear.twist(rigid[j], own))
+        twist = casadi.vertcat(casadi.SX(0, 1), *found)
+        slopes = casadi.jacobian(twist, q), casadi.jacobian(twist, p)[:, : self.size]
+        return casadi.Function("twist", [q, p, base], [twist, *slopes])
 
     @cached_property
     def step(self) -> BatchFunction:
-        """(state (3 n + s), [h, command] (n + 1), p) -> state after a step; it holds q, dq, ddq and drive states."""
+        """(state (3 d + s), [h, command, base] (n + 1, or n + 10), p) -> state after a step.
+
+        A state holds x, dx, ddx and the drives' own states.
+        """
         return batch_function(self._step())
 
     @cached_property
     def slopes(self) -> BatchFunction:
-        """(q, dq, ddq, command, state, p) -> residual (n,), its Jacobian by [q, dq, ddq, command, state], by p; rates'.
+        """(x, dx, ddx, command, state, p, base) -> residual (d,), its derivatives by signals and by p; those of rates.
 
-        The residual includes dry friction. A parameter acts on its own joint alone, except the links' mass factors; so
-        the derivatives by p are (1, P), and those by the n mass factors (n, n).
+        Signals are [x, dx, ddx, command, state]. The residual includes dry friction. A parameter acts on its own joint
+        alone, except the links' mass factors; so the derivatives by p are (1, P), those of motors, or (2, P), those of
+        motors and of links behind elastic gears. Those by the n mass factors are (d, n).
         """
         return batch_function(self._slopes())
 
+    @cached_property
+    def efforts(self) -> BatchFunction:
+        """(x, dx, ddx, command, state, p, base) -> motors' torques (n,), derivatives as those of `slopes`: (1, P)."""
+        return batch_function(self._efforts())
+
     @builds_expressions
     def _step(self) -> casadi.Function:
-        n, s = self.n, len(self.owners)
-        state, inputs, p = casadi.SX.sym("x", 3 * n + s), casadi.SX.sym("u", n + 1), casadi.SX.sym("p", self.size)
-        q, v, a, own = state[:n], state[n : 2 * n], state[2 * n : 3 * n], state[3 * n :]
-        h, command = inputs[0], inputs[1:]
-        z = casadi.SX.sym("z", n)
-        middle, acceleration = q + h / 2 * z, 2 * (z - v) / h
-        rate = self.balance(middle, z, acceleration, command, own, p)[3]
-        torque, rigid, dry, _ = self.balance(middle, z, acceleration, command, own + h / 2 * rate, p)
+        n, d, s = self.n, self.masses, len(self.owners)
+        state, inputs = casadi.SX.sym("x", 3 * d + s), casadi.SX.sym("u", 1 + n + self.extra[1])
+        p = casadi.SX.sym("p", self.size + self.extra[0])
+        x, v, a, own = state[:d], state[d : 2 * d], state[2 * d : 3 * d], state[3 * d :]
+        h, command, base = inputs[0], inputs[1 : n + 1], inputs[n + 1 :]
+        z = casadi.SX.sym("z", d)
+        middle, acceleration = x + h / 2 * z, 2 * (z - v) / h
+        rate = self.balance(middle, z, acceleration, command, own, p, base)[3]
+        torque, rigid, dry, *_ = self.balance(middle, z, acceleration, command, own + h / 2 * rate, p, base)
         predicted = v + h / 2 * a
-        # The mass matrix couples the joints; all other slopes are the joint's own.
-        y = casadi.SX.sym("y", n)
-        mass = casadi.jacobian(self.balance(q + h / 2 * predicted, predicted, y, command, own, p)[1], y)
-        slopes = casadi.vertcat(*(casadi.jacobian(torque[j], z[j]) for j in range(n)))
-        evaluate = casadi.Function("evaluate", [z, state, inputs, p], [torque - rigid, dry, slopes])
+        # The mass matrix couples the joints; all other slopes are the joint's own, or of its motor and its link.
+        y, places = casadi.SX.sym("y", d), self.links.tolist()
+        mass = casadi.jacobian(self.balance(x + h / 2 * predicted, predicted, y, command, own, p, base)[1], y)
+        slopes = casadi.SX(d, d)
+        for j, place in enumerate(places):
+            pair = sorted({j, place})
+            slopes[pair, pair] = casadi.jacobian(torque[pair], z)[:, pair]
+        left = torque - self._on_links(rigid)
+        evaluate = casadi.Function("evaluate", [z, state, inputs, p], [left, dry, slopes])
+        heavy = casadi.SX(d, d)
+        heavy[places, :] = 2 / h * mass
         velocity = predicted
-        for index in range(PASSES):
+        passes = PASSES + (MORE if self.parted else 0)
+        for index in range(passes):
             left, size, slope = evaluate(velocity, state, inputs, p)
-            matrix = 2 / h * mass + casadi.diag(casadi.fmax(-slope, 0))
-            right = left + matrix @ velocity
-            velocity = dry_velocities(matrix, right, size, velocity, self.width, last=index == PASSES - 1)
-        final = self.balance(q + h / 2 * velocity, velocity, 2 * (velocity - v) / h, command, own, p)[3]
-        new = casadi.vertcat(q + h * velocity, 2 * velocity - v, 2 * (velocity - v) / h, own + h * final)
+            for k in range(d):
+                slope[k, k] = casadi.fmin(slope[k, k], 0)
+            velocity = self._solved(heavy - slope, left, size, velocity, p[-1], last=index == passes - 1)
+        final = self.balance(x + h / 2 * velocity, velocity, 2 * (velocity - v) / h, command, own, p, base)[3]
+        new = casadi.vertcat(x + h * velocity, 2 * velocity - v, 2 * (velocity - v) / h, own + h * final)
         return casadi.Function("step", [state, inputs, p], [new])
+
+    def _on_links(self, torque: casadi.SX) -> casadi.SX:
+        """Torques of the joints (n,) on the coordinates of their links (d,)."""
+        found = casadi.SX(self.masses, 1)
+        found[self.links.tolist()] = torque
+        return found
+
+    def _solved(
+        self,
+        matrix: casadi.SX,
+        left: casadi.SX,
+        dry: casadi.SX,
+        velocity: casadi.SX,
+        width: casadi.SX,
+        *,
+        last: bool,
+    ) -> casadi.SX:
+        """Solves matrix (z - velocity) + dry friction of the motors = left for the velocities z (d,).
+
+        Links behind elastic gears have no dry friction, and are eliminated.
+        """
+        n, right = self.n, left + matrix @ velocity
+        if not self.parted:
+            return dry_velocities(matrix, right, dry, velocity, width, last=last)
+        inner, down, across = matrix[n:, n:], matrix[n:, :n], matrix[:n, n:]
+        solved = casadi.solve(inner, casadi.horzcat(down, right[n:]))
+        reduced, rest = matrix[:n, :n] - across @ solved[:, :n], right[:n] - across @ solved[:, n]
+        motors = dry_velocities(reduced, rest, dry, velocity[:n], width, last=last)
+        return casadi.vertcat(motors, solved[:, n] - solved[:, :n] @ motors)
 
     @builds_expressions
     def _slopes(self) -> casadi.Function:
         n, s = self.n, len(self.owners)
-        names = ("q", "dq", "ddq", "command")
-        inputs = [*(casadi.SX.sym(name, n) for name in names), casadi.SX.sym("s", s), casadi.SX.sym("p", self.size)]
-        torque, rigid, dry, rates = self.balance(*inputs)
-        residual = torque - rigid - dry * casadi.tanh(inputs[1] / self.width)
-        moving, by_p = casadi.vertcat(*inputs[:5]), casadi.jacobian(residual, inputs[5])
+        inputs = self._signals()
+        torque, rigid, dry, rates, _ = self.balance(*inputs)
+        residual = torque - self._on_links(rigid)
+        residual[:n] -= dry * casadi.tanh(inputs[1][:n] / inputs[5][-1])
+        moving, by_p = casadi.vertcat(*inputs[:5]), casadi.jacobian(residual, inputs[5])[:, : self.size]
+        sums = [casadi.sum1(by_p[:n, :]), *([casadi.sum1(by_p[n:, :])] if self.parted else [])]
         outputs = [
             residual,
             casadi.jacobian(residual, moving),
-            casadi.sum1(by_p),
+            casadi.vertcat(*sums),
             by_p[:, self.layout.of("mass_factor").tolist()],
         ]
         if s:
-            outputs += [casadi.jacobian(rates, moving), casadi.jacobian(casadi.sum1(rates), inputs[5])]
+            outputs += [casadi.jacobian(rates, moving), casadi.jacobian(casadi.sum1(rates), inputs[5])[:, : self.size]]
         return casadi.Function("slopes", inputs, [casadi.densify(out) for out in outputs])
+
+    @builds_expressions
+    def _efforts(self) -> casadi.Function:
+        inputs = self._signals()
+        effort = self.balance(*inputs)[4]
+        by_p = casadi.sum1(casadi.jacobian(effort, inputs[5])[:, : self.size])
+        outputs = [effort, casadi.jacobian(effort, casadi.vertcat(*inputs[:5])), by_p]
+        return casadi.Function("efforts", inputs, [casadi.densify(out) for out in outputs])
+
+    def _signals(self) -> list[casadi.SX]:
+        d, names = self.masses, ("x", "dx", "ddx", "command", "s", "p", "base")
+        body, base = self.extra
+        sizes = (d, d, d, self.n, len(self.owners), self.size + body, base)
+        return [casadi.SX.sym(name, size) for name, size in zip(names, sizes, strict=True)]

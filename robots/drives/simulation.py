@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
@@ -10,7 +10,8 @@ from numpy.typing import NDArray
 
 from robots.common.errors import SolverError
 from robots.drives.delay import HeldCommand
-from robots.drives.dynamics import DriveDynamics
+from robots.drives.dynamics import BODY, DriveDynamics
+from robots.robot import Robot
 
 Array = NDArray[np.float64]
 
@@ -19,6 +20,31 @@ UNSTABLE = 1e3
 
 LONGEST = 2.5e-3
 """Longest step [s] by default: at a time constant of 10 ms its error is below a per cent of the motion's lag."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Situation:
+    """What a run has around the drives.
+
+    Attributes:
+        t: times (N,) [s].
+        base: motion of the base (N, 9), see `RigidBody.moving`.
+        body: inertial parameters of a known payload in the frame of the last link (10,).
+    """
+
+    t: Array
+    base: Array
+    body: Array
+
+    def at(self, times: Array) -> Array:
+        """The motion of the base at other times (K,)."""
+        return np.column_stack([np.interp(times, self.t, column) for column in self.base.T])
+
+    @staticmethod
+    def usual(robot: Robot) -> Situation:
+        """A base at rest as described, without a payload."""
+        still = np.concatenate([-np.asarray(robot.chain.gravity, dtype=float), np.zeros(6)])
+        return Situation(t=np.zeros(1), base=still[None], body=np.zeros(BODY))
 
 
 class Start(NamedTuple):
@@ -38,14 +64,23 @@ class Simulated:
         dq: velocities (N, n) [rad/s or m/s].
         sensitivity: derivatives of `measured` by the chosen combinations of parameters (N, n, k), if they were asked
             for.
-        residual: largest residual of the balance of torques in all steps (n,) [N m or N], if they were.
+        effort: torques of the motors (N, n) [N m or N], if they were asked for.
+        effort_sensitivity: their derivatives (N, n, k).
+        residual: largest residual of the balance of torques in all steps (d,) [N m or N], if they were.
     """
 
     t: Array
     measured: Array
     dq: Array
     sensitivity: Array | None = None
+    effort: Array | None = None
+    effort_sensitivity: Array | None = None
     residual: Array | None = None
+
+
+WIDTH = 1e-4
+"""Speed [rad/s or m/s] below which dry friction fades by default: small beside a motion's, but a motion that sticks and
+slips still changes smoothly with the parameters."""
 
 
 class Steps(NamedTuple):
@@ -77,6 +112,9 @@ def simulate_drives(
     *,
     directions: Array | None = None,
     longest: float | None = None,
+    situation: Situation | None = None,
+    efforts: bool = False,
+    width: float = WIDTH,
 ) -> Simulated:
     """Simulates a chain that follows commands.
 
@@ -88,65 +126,144 @@ def simulate_drives(
         values: parameters (P,).
         directions: combinations of parameters (P, k) by which derivatives are wanted; None for none.
         longest: longest step [s]; by default half the log's period, and at most `LONGEST`.
+        situation: of a situated chain: its base and payload; by default as described.
+        efforts: whether the torques of the motors are wanted.
+        width: speed [rad/s or m/s] below which dry friction fades.
 
     Raises:
         SolverError: the loop is not stable.
     """
-    n, s = dynamics.n, len(dynamics.owners)
-    layout = dynamics.layout
+    layout, d, shown = dynamics.layout, dynamics.masses, dynamics.shown
     edges, substeps = step_times(t, usual_step(t) if longest is None else longest)
     zero, delay = layout.of("encoder_zero"), layout.of("delay")
-    delays = np.zeros(n)
+    delays = np.zeros(dynamics.n)
     delays[layout.joints[delay]] = values[delay]
     means, slopes = command.means(edges, delays)
-    h = np.diff(edges)
-    first = np.concatenate([start.measured - values[zero], start.dq, np.zeros(n + s)])
-    inputs = np.concatenate([h[:, None], means], axis=1)[:, None, :]
-    states = dynamics.step.run(first[None], inputs, values[None])[:, 0]
+    h, around = np.diff(edges), (situation or Situation.usual(dynamics.robot)) if dynamics.situated else None
+    p = followed(values, around, width)
+    base = np.zeros((len(h), 0)) if around is None else around.at((edges[:-1] + edges[1:]) / 2)
+    place, place_slopes = _placed(dynamics, start.measured - values[zero], p, base[0])
+    speed = np.concatenate([start.dq, start.dq[list(dynamics.parted)]])
+    first = np.concatenate([place, speed, np.zeros(d + len(dynamics.owners))])
+    inputs = np.concatenate([h[:, None], means, base], axis=1)[:, None, :]
+    states = dynamics.step.run(first[None], inputs, p[None])[:, 0]
     path = np.concatenate([first[None], states])
-    if not np.isfinite(path).all() or np.abs(path[:, :n]).max() > UNSTABLE:
+    if not np.isfinite(path).all() or np.abs(path[:, :d]).max() > UNSTABLE:
         raise SolverError(
             f"the simulated loop of {dynamics.robot.name} is not stable",
             remedy="check gains and delay, or start nearer to the truth",
         )
-    measured, dq = path[::substeps, :n] + values[zero], path[::substeps, n : 2 * n]
+    result = Simulated(t=t, measured=path[::substeps, shown] + values[zero], dq=path[::substeps, d + shown])
+    if directions is None and not efforts:
+        return result
+    middle = _middles(dynamics, path, h, means, p, base)
     if directions is None:
-        return Simulated(t=t, measured=measured, dq=dq)
-    sensitivity, residual = _sensitivity(dynamics, path, h, means, slopes, values, directions)
-    chosen = sensitivity[::substeps] + directions[zero]
-    return Simulated(t=t, measured=measured, dq=dq, sensitivity=chosen, residual=residual)
+        effort = dynamics.efforts(*middle)[0][:, :, 0]
+        return replace(result, effort=_at_samples(effort, substeps))
+    moved = np.zeros((len(h), dynamics.n, directions.shape[1]))
+    delay = layout.of("delay")
+    moved[:, layout.joints[delay]] = slopes[:, layout.joints[delay], None] * directions[delay]
+    sensitivity, residual = _sensitivity(dynamics, middle, h, moved, directions, place_slopes @ directions)
+    chosen = sensitivity[::substeps, shown] + directions[zero]
+    result = replace(result, sensitivity=chosen, residual=residual)
+    if not efforts:
+        return result
+    effort, by_x, by_p = dynamics.efforts(*middle)
+    between = (sensitivity[1:, :d] + sensitivity[:-1, :d]) / 2
+    rates = (sensitivity[1:, :d] - sensitivity[:-1, :d]) / h[:, None, None]
+    own = (sensitivity[1:, 2 * d :] + sensitivity[:-1, 2 * d :]) / 2
+    by_q, by_v, _, by_command, by_state = np.split(by_x, np.cumsum([d, d, d, dynamics.n]), axis=2)
+    total = by_q @ between + by_v @ rates + by_command @ moved + by_state @ own
+    for joint in range(dynamics.n):
+        mine = layout.of_joints[joint]
+        total[:, joint] += by_p[:, 0, mine] @ directions[mine]
+    found = (_at_samples(part, substeps) for part in (effort[:, :, 0], total))
+    return replace(result, **dict(zip(("effort", "effort_sensitivity"), found, strict=True)))
+
+
+def followed(values: Array, situation: Situation | None, width: float = WIDTH) -> Array:
+    """Puts behind the parameters (P,) what `DriveDynamics.extra` says."""
+    return np.concatenate([values, [] if situation is None else situation.body, [width]])
+
+
+def _at_samples(values: Array, substeps: int) -> Array:
+    """Values (N, ...) at samples, from those in the middle of K steps: the mean of the two steps that meet there."""
+    padded = np.concatenate([values[:1], values, values[-1:]])
+    return np.asarray((padded[:-1] + padded[1:])[::substeps] / 2)
+
+
+def _middles(dynamics: DriveDynamics, path: Array, h: Array, means: Array, p: Array, base: Array) -> tuple[Array, ...]:
+    """Signals in the middle of each step, as `DriveDynamics.slopes` takes them."""
+    d = dynamics.masses
+    q, v, own = path[:-1, :d], path[:-1, d : 2 * d], path[:-1, 3 * d :]
+    velocity = (path[1:, :d] - q) / h[:, None]
+    middle, acceleration = q + h[:, None] / 2 * velocity, 2 * (velocity - v) / h[:, None]
+    half = (path[1:, 3 * d :] + own) / 2
+    return middle, velocity, acceleration, means, half, np.broadcast_to(p, (len(h), len(p))), base
+
+
+def _placed(dynamics: DriveDynamics, q: Array, p: Array, base: Array) -> tuple[Array, Array]:
+    """Coordinates (d,) at rest where the encoders show q (n,), and their derivatives by the parameters (d, P)."""
+    n, parted = dynamics.n, list(dynamics.parted)
+    slopes = np.zeros((dynamics.masses, dynamics.size))
+    slopes[dynamics.shown, dynamics.layout.of("encoder_zero")] = -1.0
+    place = np.concatenate([q, q[parted]])
+    if not parted:
+        return place, slopes
+    twist, by_q, by_p = (np.asarray(part, dtype=float) for part in dynamics.twist(q, p, base))
+    for k, joint in enumerate(parted):
+        by_link = dynamics.shown[joint] != joint
+        other, sign = (joint, 1.0) if by_link else (n + k, -1.0)
+        place[other] += sign * twist[k, 0]
+        moved = slopes[dynamics.shown]
+        slopes[other] = slopes[dynamics.shown[joint]] + sign * (by_p[k] + by_q[k] @ moved)
+    return place, slopes
 
 
 def _sensitivity(
-    dynamics: DriveDynamics, path: Array, h: Array, means: Array, slopes: Array, values: Array, directions: Array
+    dynamics: DriveDynamics,
+    middle: tuple[Array, ...],
+    h: Array,
+    moved: Array,
+    directions: Array,
+    start: Array,
 ) -> tuple[Array, Array]:
-    """Derivatives of positions (K + 1, n, k) by the implicit function theorem in each step; largest residuals (n,)."""
-    n, s, layout = dynamics.n, len(dynamics.owners), dynamics.layout
+    """Derivatives of states by the implicit function theorem in each step; largest residuals (d,).
+
+    Args:
+        dynamics: the chain.
+        middle: see `_middles`.
+        h: lengths of the steps (K,) [s].
+        moved: derivatives of the commands (K, n, k).
+        directions: of the parameters (P, k).
+        start: derivatives of the coordinates at the start (d, k).
+
+    Returns:
+        Those of coordinates, velocities and drive states (K + 1, 2 d + s, k), and the residuals.
+    """
+    n, d, s, layout = dynamics.n, dynamics.masses, len(dynamics.owners), dynamics.layout
     length = h[:, None, None]
-    q, v, own = path[:-1, :n], path[:-1, n : 2 * n], path[:-1, 3 * n :]
-    velocity = (path[1:, :n] - q) / h[:, None]
-    middle, acceleration = q + h[:, None] / 2 * velocity, 2 * (velocity - v) / h[:, None]
-    half = (path[1:, 3 * n :] + own) / 2
-    p = np.broadcast_to(values, (len(h), len(values)))
-    residual, J, by_own, by_mass, *of_rates = dynamics.slopes(middle, velocity, acceleration, means, half, p)
-    Jq, Jv, Ja, Jc, Jx = (J[:, :, k * n : min((k + 1) * n, 4 * n + s)] for k in range(5))
+    residual, J, by_own, by_mass, *of_rates = dynamics.slopes(*middle)
+    ends = np.cumsum([d, d, d, n])
+    Jq, Jv, Ja, Jc, Jx = np.split(J, ends, axis=2)
     # Columns by the directions: those of a joint's own parameters, of its command by the delay, and of masses.
-    by_p = np.zeros((len(h), n, directions.shape[1]))
-    mass, delay = layout.of("mass_factor"), layout.of("delay")
+    by_p = np.zeros((len(h), d, directions.shape[1]))
+    mass = layout.of("mass_factor")
     for joint in range(n):
         mine = layout.of_joints[joint]
         by_p[:, joint] = by_own[:, 0, mine] @ directions[mine]
+    for k, joint in enumerate(dynamics.parted):
+        mine = layout.of_joints[joint]
+        by_p[:, n + k] = by_own[:, 1, mine] @ directions[mine]
     if directions[mass].any():
         by_p += by_mass @ directions[mass]
-    moved = np.zeros((len(h), n, directions.shape[1]))
-    moved[:, layout.joints[delay]] = slopes[:, layout.joints[delay], None] * directions[delay]
     by_p += Jc @ moved
-    size = 2 * n + s
+    size = 2 * d + s
     A, B = np.zeros((len(h), size, size)), np.zeros((len(h), size, directions.shape[1]))
     by_z, by_q, by_v = Jq * length / 2 + Jv + 2 / length * Ja, Jq, -2 / length * Ja
     if s:
-        R, Rp = of_rates[0], _rate_columns(dynamics, of_rates[1], directions) + of_rates[0][:, :, 3 * n : 4 * n] @ moved
-        Rq, Rv, Rx = R[:, :, :n], R[:, :, n : 2 * n], R[:, :, 4 * n :]
+        Rq, Rv, _, Rc, Rx = np.split(of_rates[0], ends, axis=2)
+        Rp = _rate_columns(dynamics, of_rates[1], directions) + Rc @ moved
         # The state in the middle of a step: half = own + h / 2 rate(half), to be solved for its change.
         solved = np.linalg.inv(np.eye(s) - length / 2 * Rx)
         to_z, to_q, to_p = (solved @ (length / 2 * part) for part in (Rq * length / 2 + Rv, Rq, Rp))
@@ -154,19 +271,19 @@ def _sensitivity(
         by_x = Jx @ solved
     inverse = -np.linalg.inv(by_z)
     zq, zv, zp = inverse @ by_q, inverse @ by_v, inverse @ by_p
-    eye = np.eye(n)
-    A[:, :n, :n], A[:, :n, n : 2 * n], B[:, :n] = eye + length * zq, length * zv, length * zp
-    A[:, n : 2 * n, :n], A[:, n : 2 * n, n : 2 * n], B[:, n : 2 * n] = 2 * zq, 2 * zv - eye, 2 * zp
+    eye = np.eye(d)
+    A[:, :d, :d], A[:, :d, d : 2 * d], B[:, :d] = eye + length * zq, length * zv, length * zp
+    A[:, d : 2 * d, :d], A[:, d : 2 * d, d : 2 * d], B[:, d : 2 * d] = 2 * zq, 2 * zv - eye, 2 * zp
     if s:
         zx = inverse @ by_x
-        A[:, :n, 2 * n :], A[:, n : 2 * n, 2 * n :] = length * zx, 2 * zx
-        A[:, 2 * n :, :n] = 2 * (to_z @ zq + to_q)
-        A[:, 2 * n :, n : 2 * n] = 2 * to_z @ zv
-        A[:, 2 * n :, 2 * n :] = 2 * (to_z @ zx + solved) - np.eye(s)
-        B[:, 2 * n :] = 2 * (to_z @ zp + to_p)
+        A[:, :d, 2 * d :], A[:, d : 2 * d, 2 * d :] = length * zx, 2 * zx
+        A[:, 2 * d :, :d] = 2 * (to_z @ zq + to_q)
+        A[:, 2 * d :, d : 2 * d] = 2 * to_z @ zv
+        A[:, 2 * d :, 2 * d :] = 2 * (to_z @ zx + solved) - np.eye(s)
+        B[:, 2 * d :] = 2 * (to_z @ zp + to_p)
     first = np.zeros((size, directions.shape[1]))
-    first[:n] = -directions[layout.of("encoder_zero")]
-    return _recursion(A, B, first)[:, :n], np.abs(residual[:, :, 0]).max(axis=0)
+    first[:d] = start
+    return _recursion(A, B, first), np.abs(residual[:, :, 0]).max(axis=0)
 
 
 def _rate_columns(dynamics: DriveDynamics, by_p: Array, directions: Array) -> Array:

@@ -53,14 +53,14 @@ def _largest(model: Any, actuator: int) -> float:
         bounds.append(float(np.min(np.abs(model.actuator_forcerange[actuator]))))
     unbiased = model.actuator_biastype[actuator] == 0  # mjBIAS_NONE
     direct = model.actuator_gaintype[actuator] == FIXED_GAIN and unbiased
-    control = _control(model, actuator)
+    control = control_of(model, actuator)
     if direct and model.actuator_ctrllimited[control]:
         reach = float(np.min(np.abs(model.actuator_ctrlrange[control])))
         bounds.append(reach * abs(float(model.actuator_gainprm[actuator, 0])))
     return min(bounds)
 
 
-def _control(model: Any, actuator: int) -> int:
+def control_of(model: Any, actuator: int) -> int:
     """The number of an actuator's control input; since version 4 they are counted separately."""
     addresses = getattr(model, "actuator_ctrladr", None)
     return actuator if addresses is None else int(addresses[actuator])

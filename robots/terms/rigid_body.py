@@ -18,6 +18,8 @@ if TYPE_CHECKING:
     from robots.robot import Robot
 
 SYMBOLS = ("m", "mPx", "mPy", "mPz", "Ixx", "Ixy", "Ixz", "Iyy", "Iyz", "Izz")
+ZERO6 = casadi.SX(6, 1)
+"""Angular velocity and acceleration of a base at rest."""
 UNITS = ("kg",) + ("kg m",) * 3 + ("kg m2",) * 6
 
 
@@ -42,6 +44,21 @@ class RigidBody(Term):
         """Builds Y (n, 10 n): only links from k outwards load joint k, so Y is block upper triangular."""
         return _rows(robot)(q, dq, ddq)
 
+    def moving(
+        self, robot: Robot, q: casadi.SX, dq: casadi.SX, ddq: casadi.SX, base: casadi.SX | None = None
+    ) -> casadi.SX:
+        """Builds Y (n, 10 n) of a chain on a base that moves.
+
+        Args:
+            robot: the chain.
+            q: positions (n,).
+            dq: velocities (n,).
+            ddq: accelerations (n,).
+            base: acceleration of the base less gravity [m/s2], its angular velocity [rad/s] and acceleration [rad/s2]
+                (9,), in its own frame; None for a base at rest as described.
+        """
+        return self.regressor(robot, q, dq, ddq) if base is None else _moving_rows(robot)(q, dq, ddq, base)
+
     def nominal(self, robot: Robot) -> NDArray[np.float64]:
         """Returns the inertial parameters of the robot's description, link by link (10 n,)."""
         return np.asarray(robot.inertia, dtype=float).reshape(-1)
@@ -51,11 +68,24 @@ class RigidBody(Term):
 def _rows(robot: Robot) -> casadi.Function:
     """Builds the recursion as a function, once for all models of a robot."""
     q, dq, ddq = (casadi.SX.sym(name, robot.n) for name in ("q", "dq", "ddq"))
+    still = casadi.SX(-cleaned(np.asarray(robot.chain.gravity, dtype=float)))
+    return casadi.Function("rigid_body", [q, dq, ddq], [_recursion(robot, q, dq, ddq, casadi.vertcat(still, ZERO6))])
+
+
+@lru_cache(maxsize=8)
+def _moving_rows(robot: Robot) -> casadi.Function:
+    """Builds the recursion from a base that moves (9,)."""
+    q, dq, ddq = (casadi.SX.sym(name, robot.n) for name in ("q", "dq", "ddq"))
+    base = casadi.SX.sym("base", 9)
+    return casadi.Function("moving_body", [q, dq, ddq, base], [_recursion(robot, q, dq, ddq, base)])
+
+
+def _recursion(robot: Robot, q: casadi.SX, dq: casadi.SX, ddq: casadi.SX, base: casadi.SX) -> casadi.SX:
     chain = robot.chain
     rotations, translations = zip(
         *(symbolic_placement(joint, q[i]) for i, joint in enumerate(chain.joints)), strict=True
     )
-    blocks = _link_wrenches(chain.joints, rotations, translations, chain.gravity, dq, ddq)
+    blocks = _link_wrenches(chain.joints, rotations, translations, base, dq, ddq)
     Y = casadi.SX(chain.n, 10 * chain.n)
     for link, block in enumerate(blocks):
         wrench = block  # (6, 10): force, then moment, of the link on its parent, in the frame of link k
@@ -67,20 +97,19 @@ def _rows(robot: Robot) -> casadi.Function:
                 force = rotations[k] @ wrench[:3, :]
                 moment = rotations[k] @ wrench[3:, :] + casadi.skew(translations[k]) @ force
                 wrench = casadi.vertcat(force, moment)
-    return casadi.Function("rigid_body", [q, dq, ddq], [Y])
+    return Y
 
 
 def _link_wrenches(
     joints: tuple[Joint, ...],
     rotations: tuple[casadi.SX, ...],
     translations: tuple[casadi.SX, ...],
-    gravity: NDArray[np.float64],
+    base: casadi.SX,
     dq: casadi.SX,
     ddq: casadi.SX,
 ) -> list[casadi.SX]:
     """Builds per link the map (6, 10) from parameters to inertial wrench by forward recursion (eq. 4 to 7, 23)."""
-    omega, alpha = casadi.SX(3, 1), casadi.SX(3, 1)
-    acceleration = casadi.SX(-cleaned(np.asarray(gravity, dtype=float)))
+    acceleration, omega, alpha = base[:3], base[3:6], base[6:]
     blocks = []
     for i, joint in enumerate(joints):
         back, offset, axis = rotations[i].T, translations[i], casadi.SX(cleaned(joint.axis))

@@ -78,6 +78,10 @@ def expressible(result: Actuators) -> Expressible:
             left.append(f"{name}: a dead band of {1e3 * own['dead_band']:.3g} mrad")
         if own["encoder_zero"] != 0:
             left.append(f"{name}: an encoder zero of {1e3 * own['encoder_zero']:.3g} mrad")
+        if own.get("backlash", 0.0) > 0:
+            left.append(f"{name}: a backlash of {1e3 * own['backlash']:.3g} mrad")
+        elif "stiffness" in own:
+            left.append(f"{name}: an elastic gear of {own['stiffness']:.3g} N m/rad")
         if own.get("ki", 0.0) > 0:
             left.append(f"{name}: the integral part of its velocity loop")
         stops = [own[key] for key in ("stop_lower", "stop_upper") if abs(own[key]) < FAR]

@@ -169,6 +169,15 @@ class Drives:
     joints: Annotated[tuple[str, ...] | None, Option(reads=names, section="Robot")] = None
     lock: Annotated[tuple[str, ...], Option(section="Robot")] = ()
 
+    @property
+    def locked(self) -> dict[str, float] | None:
+        """Positions of locked joints.
+
+        Raises:
+            InputError: a lock that is not name=value.
+        """
+        return locked_positions(self.lock)
+
     def load(self) -> tuple[tuple[Robot, ...], DescribedDrives]:
         """Loads the chains of the robot, and what is known of their drives.
 
@@ -177,5 +186,5 @@ class Drives:
         """
         from robots.drives import described_drives, load_branches
 
-        chains = load_branches(self.robot, joints=self.joints, locked=locked_positions(self.lock))
+        chains = load_branches(self.robot, joints=self.joints, locked=self.locked)
         return chains, described_drives(chains, self.gains)

@@ -22,6 +22,7 @@ PAGES = {
     "DetectionLimits": "diagnosis_limits.plan_page",
     "Diagnosis": "diagnosis_report.diagnosis_page",
     "Discrimination": "discrimination_report.discrimination_page",
+    "DriveComparison": "comparisons.drive_comparison_report.drive_comparison_page",
     "DriveDesign": "drives.design_report.drive_design_page",
     "Estimate": "estimate_report.estimate_page",
     "FleetResult": "monitoring.fleet_report.fleet_page",

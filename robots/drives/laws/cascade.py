@@ -34,4 +34,4 @@ class CascadeLaw(Member):
         return {"velocity_error": self._error(signal, now, values)}
 
     def _error(self, signal: casadi.SX, now: Instant, values: Values) -> casadi.SX:
-        return values["kr"] * (signal - now.measured) - now.dq
+        return values["kr"] * (signal - now.measured) - now.measured_rate

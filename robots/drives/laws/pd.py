@@ -28,4 +28,8 @@ class PdLaw(Member):
         """Builds the torque of a position command."""
         error, band = signal - now.measured, values["dead_band"]
         outside = error - casadi.fmax(casadi.fmin(error, band), -band)
-        return values["kp"] * outside - values["kd"] * now.dq
+        return values["kp"] * outside - values["kd"] * self.rate(now)
+
+    def rate(self, now: Instant) -> casadi.SX:
+        """Gives the velocity that damps: that of the encoder, from which the controller computes it."""
+        return now.measured_rate

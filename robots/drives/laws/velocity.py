@@ -27,8 +27,8 @@ class VelocityLaw(Member):
 
     def transmit(self, signal: casadi.SX, now: Instant, values: Values) -> casadi.SX:
         """Builds the torque of a velocity command."""
-        return values["kv"] * (signal - now.dq) + values["ki"] * now.state["velocity_error"]
+        return values["kv"] * (signal - now.measured_rate) + values["ki"] * now.state["velocity_error"]
 
     def rates(self, signal: casadi.SX, now: Instant, values: Values) -> dict[str, casadi.SX]:
         """Builds the velocity error, which the loop integrates."""
-        return {"velocity_error": signal - now.dq}
+        return {"velocity_error": signal - now.measured_rate}

@@ -10,8 +10,15 @@ import numpy as np
 import pytest
 
 from benchmarks.actuators_parts.plants import random_truth
-from estimation.actuators import ActuatorOptions, Actuators, identify_actuators, load_actuators
-from estimation.actuators.exports import drives_mjcf, isaac_lab_text, newton_text
+from estimation.actuators import (
+    ActuatorOptions,
+    Actuators,
+    LoopDiagnosis,
+    identify_actuators,
+    load_actuators,
+    loop_diagnosis,
+)
+from estimation.actuators.exports import drives_mjcf, expressible, isaac_lab_text, newton_text
 from robots.common.errors import InputError, NotIdentifiableError
 from robots.drives import Drive
 from tests.estimation.actuators.conftest import LEG, Played, played
@@ -65,6 +72,27 @@ def test_a_hidden_effect_is_named(tmp_path: Path) -> None:
     assert result.value("stribeck", "thigh_joint").value == pytest.approx(0.4, rel=0.2)
     # Three times the error of the encoder's steps: without the effect it is fifty times as large.
     assert result.held_out_error < 3 * LEG.encoder / np.sqrt(12)
+
+
+@pytest.mark.parametrize(
+    ("effect", "size", "notes"),
+    [
+        ("joint_elasticity", 160.0, {"gear_damping": 0.2}),
+        ("backlash", 0.02, {"gear_damping": 0.06, "stiffness": 400.0}),
+    ],
+)
+def test_a_gear_is_named(tmp_path: Path, effect: str, size: float, notes: dict[str, float]) -> None:
+    """An elastic gear or play of one joint is found, with its size; the diagnosis says the same."""
+    truth = replace(random_truth(LEG, np.random.default_rng(5)), effect=effect, joint=1, size=size, notes=notes)
+    case = played(tmp_path, truth)
+    result = identify_actuators(case.chains, case.log, case.drives, held_out=case.held_out)
+    assert [(finding.effect, finding.name) for finding in result.findings] == [(effect, "thigh_joint")]
+    name = "stiffness" if effect == "joint_elasticity" else "backlash"
+    assert result.value(name, "thigh_joint").value == pytest.approx(size, rel=0.1)
+    diagnosis = loop_diagnosis(result)
+    assert (diagnosis.verdict, diagnosis.findings[0].joint) == ("named", 2)
+    assert LoopDiagnosis.from_dict(diagnosis.to_dict()).summary() == diagnosis.summary()
+    assert any(name in text for text in expressible(result).left_out for name in ("elastic gear", "backlash"))
 
 
 def test_shared_parameters_are_one(leg: Played) -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from pathlib import Path
 
+import mujoco
 import pytest
 
 from benchmarks.actuators_parts.plants import MACHINES, mjcf
@@ -41,6 +42,38 @@ def test_position_actuators_are_pd_laws(leg: Callable[..., Path]) -> None:
         LEG.viscous[2],
         LEG.coulomb[2],
     )
+
+
+DC = (
+    '<dcmotor name="{0}" joint="{0}_joint" gear="10" motorconst="0.05" resistance="2" input="pos" '
+    'controller="0.3 {1} 0.02" saturation="0.5 0 0"/>'
+)
+
+
+@pytest.mark.skipif(not hasattr(mujoco.mjtGain, "mjGAIN_DCMOTOR"), reason="MuJoCo before version 3.7 has no dcmotor")
+def test_dc_motors_are_pd_laws(tmp_path: Path) -> None:
+    """A dcmotor with a position input is PD control; MuJoCo's own torque at a joint is that of the law that is read."""
+    names = [body.name for body in LEG.bodies]
+
+    def written(integral: float) -> Path:
+        motors = "".join(DC.format(name, integral) for name in names)
+        path = tmp_path / f"dc{integral}.xml"
+        path.write_text(mjcf(LEG, laws=False).replace("</mujoco>", f"<actuator>{motors}</actuator></mujoco>"))
+        return path
+
+    values = described_drives(load_branches(written(0.0))).drives[1].values
+    model = mujoco.MjModel.from_xml_path(str(tmp_path / "dc0.0.xml"))
+    data = mujoco.MjData(model)
+    data.qpos[:], data.qvel[:], data.ctrl[:] = 0.1, 0.05, 1.2
+    mujoco.mj_forward(model, data)
+    # The command counts at the motor, behind a gear of 10.
+    expected = values["kp"] * (1.2 / 10 - 0.1) - values["kd"] * 0.05
+    assert data.qfrc_actuator[1] == pytest.approx(expected)
+    data.ctrl[:] = 1e3
+    mujoco.mj_forward(model, data)
+    assert values["torque_limit"] == pytest.approx(data.qfrc_actuator[1])
+    with pytest.raises(InputError, match=r"control law of hip_joint, .* is not known"):
+        described_drives(load_branches(written(0.1)))
 
 
 def test_motors_need_a_gains_file(leg: Callable[..., Path]) -> None:

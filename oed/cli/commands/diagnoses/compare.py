@@ -1,6 +1,7 @@
-"""Compares models of several runs, days or robots of one type.
+"""Compares models or drives of several runs, days or robots of one type.
 
-Says which differences are significant, and writes compare.json, a merged model.json and report.html.
+Says which differences are significant, and writes compare.json, a merged model.json and report.html; of results of oed
+actuators compare.json, parameters.csv and report.html.
 """
 
 from __future__ import annotations
@@ -27,7 +28,8 @@ class Compare(Verb):
     """``oed compare``.
 
     Attributes:
-        models: two or more model.json files or their folders; with --robot, logs or folders of logs.
+        models: two or more model.json files or their folders; or actuators.json files or their folders; with --robot,
+            logs or folders of logs.
         robot: compare logs: each is identified by itself, with one cut-off and one friction model for all. A catalogue
             name, a URDF, or a robot YAML.
         false_alarms: probability of any false alarm among all tests.
@@ -36,6 +38,7 @@ class Compare(Verb):
     function = "estimation.compare"
     examples = (
         "oed compare monday/model.json friday/model.json --out compared",
+        "oed compare drives_cold drives_warm --out compared",
         "oed compare logs/day1.csv logs/day2.csv logs/day3.csv --robot er3a --out compared",
     )
 
@@ -49,7 +52,9 @@ class Compare(Verb):
 
     @property
     def use(self) -> str:
-        """Models need no robot; what is no model is a log."""
+        """Models and drives need no robot; what is neither is a log."""
+        if all(_is_drives(path) for path in self.models):
+            return "drives"
         return "models" if all(_is_model(path) for path in self.models) else "logs"
 
     def reason(self, names: Collection[str]) -> tuple[str, str]:
@@ -61,6 +66,11 @@ class Compare(Verb):
         from estimation import compare
         from estimation.comparisons import identify_runs, read_model_runs
 
+        if self.use == "drives":
+            return self._drives()
+        mixed = next((path for path in self.models if _is_drives(path)), None)
+        if mixed is not None:
+            raise InputError("holds drives, and others do not", file=mixed, remedy="compare drives with drives")
         for path in self.models:
             if self.robot is not None and _is_model(path):
                 raise InputError("is a model, but --robot is given", file=path, remedy="give logs, or no --robot")
@@ -80,6 +90,24 @@ class Compare(Verb):
             result = compare(runs, alpha=self.false_alarms)
             self.output.save(folder, result)
         return self.output.printed(result)
+
+    def _drives(self) -> Printed:
+        """Compares results of `oed actuators`."""
+        from estimation.comparisons import compare_drives, read_drive_runs
+
+        with self.output.opened("compare.json", "parameters.csv", "report.html") as folder:
+            result = compare_drives(*read_drive_runs(self.models), alpha=self.false_alarms)
+            result.to_frame().to_csv(folder.path("parameters.csv"), index=False)
+            self.output.save(folder, result)
+        return self.output.printed(result)
+
+
+def _is_drives(path: Path) -> bool:
+    if path.is_dir():
+        return (path / "actuators.json").is_file() and not (path / "model.json").is_file()
+    if path.suffix != ".json" or not path.is_file():
+        return False
+    return b'"robot-oed actuators"' in path.read_bytes()[:200]
 
 
 def _is_model(path: Path) -> bool:

@@ -1,6 +1,7 @@
 """Finds the causes of a model's errors and extends the model.
 
-Writes diagnosis.json, the extended model.json, report.html and, if useful, motions for the next experiment.
+Writes diagnosis.json, the extended model.json, report.html and, if useful, motions for the next experiment. Logs with
+commands and without torque are diagnosed in the loop of their drives, with actuators.json in place of model.json.
 """
 
 from __future__ import annotations
@@ -15,8 +16,9 @@ import typer
 from oed.cli.options.logs import KnownLogs
 from oed.cli.options.models import Fit, model_for
 from oed.cli.options.results import ModelFolder
-from oed.cli.options.robots import RobotOptions
+from oed.cli.options.robots import Drives, RobotOptions
 from oed.cli.verbs import Printed, Verb
+from robots.common.errors import InputError
 from robots.common.options import Option
 from robots.common.progress import Progress
 
@@ -36,6 +38,8 @@ class Diagnose(Verb):
             and each stretch of a single log from the rest.
         own_clocks: each log's time starts at its own zero. Logs are put one after the other, one minute apart.
             Heat and drift between logs are then as uncertain as that minute.
+        gains: for logs of commands without torque: a YAML file with the control law and its gains. Default: the
+            actuators of the MJCF.
         limits: before an experiment: compute which effects the planned --trajectory could show, and from which size on.
         trajectory: with --limits: a planned trajectory.csv. Repeatable.
         model: with --limits: an identified model.json. Default: the robot's nominal dynamics.
@@ -50,6 +54,7 @@ class Diagnose(Verb):
     held_out: Annotated[tuple[Path, ...], OfLogs] = ()
     known: Annotated[KnownLogs, OfLogs] = KnownLogs()
     own_clocks: Annotated[bool, Option(section="Input")] = False
+    gains: Annotated[Path | None, OfLogs] = None
     fit: Fit = Fit()
     limits: bool = False
     trajectory: Annotated[tuple[Path, ...], OfLimits] = ()
@@ -78,7 +83,61 @@ class Diagnose(Verb):
             raise typer.BadParameter("--limits needs --trajectory")
         if not self.limits and not self.log:
             raise typer.BadParameter("give --log, or --limits with --trajectory")
-        return self._limits(progress) if self.limits else self._diagnosis(progress)
+        if self.limits:
+            return self._limits(progress)
+        if self.gains is not None:
+            return self._in_the_loop(progress)
+        try:
+            return self._diagnosis(progress)
+        except InputError:
+            if not self._commands_alone():
+                raise
+        return self._in_the_loop(progress)
+
+    @property
+    def _drives(self) -> Drives:
+        chain = self.robot.chain
+        return Drives(robot=self.robot.robot, gains=self.gains, joints=chain.joints, lock=chain.lock)
+
+    def _commands_alone(self) -> bool:
+        """Whether all logs have commands and neither torque nor current."""
+        from estimation.actuators.runs import read_command_logs
+        from robots.drives import load_branches
+
+        try:
+            chains = load_branches(self.robot.robot, joints=self.robot.chain.joints, locked=self._drives.locked)
+            joints = self.robot.chain.joints
+            logs = read_command_logs(self.log, chains, joints=joints, mapping=self.known.stated)
+        except InputError:
+            return False
+        return all(log.command is not None and log.tau is None and log.current is None for log in logs)
+
+    def _in_the_loop(self, progress: Progress) -> Printed:
+        """Diagnoses logs of commands: diagnosis.json, actuators.json, motion.parquet and report.html."""
+        from estimation.actuators import ActuatorOptions, identify_actuators, loop_diagnosis
+        from estimation.actuators.runs import read_command_logs
+        from oed.reports import save_report
+
+        output = self.output
+        if output.urdf is not None or output.mjcf is not None:
+            raise InputError("--urdf and --mjcf need logs with torque", remedy="oed actuators writes files of drives")
+        with output.opened("diagnosis.json", "actuators.json", "motion.parquet", "report.html") as folder:
+            chains, known = self._drives.load()
+            read, other = (
+                read_command_logs(paths, chains, joints=self.robot.chain.joints, mapping=self.known.stated)
+                for paths in (self.log, self.held_out)
+            )
+            both = self.known.with_setup([*read, *other])
+            how = ActuatorOptions(free=known.unknown, seed=self.fit.seed)
+            result = identify_actuators(
+                chains, both[: len(read)], known.drives, held_out=both[len(read) :], options=how, progress=progress
+            )
+            place = folder.path("actuators.json").parent
+            result.save(place)
+            diagnosis = loop_diagnosis(result)
+            diagnosis.save(place)
+            save_report(result, folder, png=output.png)
+        return Printed(summary="\n".join([diagnosis.summary(), *output.written()]), data=diagnosis.to_dict())
 
     def _limits(self, progress: Progress) -> Printed:
         """Computes which effects planned motions could show; writes limits.json and report.html."""

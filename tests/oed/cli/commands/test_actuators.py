@@ -64,6 +64,7 @@ def test_all_files_are_written(run, files: Path, tmp_path: Path) -> None:
         (("--robot", "leg.xml", "--log", "positions.csv"), "positions.csv: column qref1: no command"),
         (("--robot", "leg.xml", "--log", "log.csv", "--share", "knee"), "no joint's name contains 'knee'"),
         (("--robot", "leg.xml", "--log", "log.csv", "--free", "mass"), "no drive has a parameter 'mass'"),
+        (("--robot", "leg.xml", "--log", "log.csv", "--payload", "3=1,0,0,0"), "--payload of log 3; allowed: 1 to 1"),
         (("--robot", "leg.xml", "--log", "log.csv", "--joints", "hip"), "there is no joint 'hip'"),
         (("--robot", "leg.xml", "--log", "log.csv", "--lock", "hip_joint"), "--lock hip_joint; allowed: name=value"),
     ],
@@ -75,6 +76,36 @@ def test_bad_input(run, files: Path, tmp_path: Path, words: tuple[str, ...], mes
     assert done.code == 2
     assert message in " ".join(done.err.split())
     assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.slow
+def test_logs_of_commands_are_diagnosed_and_compared(run, files: Path, tmp_path: Path) -> None:
+    """`oed diagnose` takes a log without torque; `oed compare` takes the drives of two logs, and refuses mixtures."""
+    words = ("--robot", files / "leg.xml", "--log", files / "log.csv")
+    done = run("diagnose", *words, "--out", tmp_path / "diagnosed", "--json")
+    assert done.code == 0, done.err
+    names = {"diagnosis.json", "actuators.json", "motion.parquet", "report.html"}
+    assert {path.name for path in (tmp_path / "diagnosed").iterdir()} == names
+    assert json.loads((tmp_path / "diagnosed" / "diagnosis.json").read_text())["verdict"] == "none"
+    refused = run("diagnose", *words, "--urdf", tmp_path / "a.urdf", "--out", tmp_path / "other")
+    assert (refused.code, "need logs with torque" in refused.err) == (2, True)
+    table = pd.read_csv(files / "log.csv")
+    table[len(table) // 2 :].to_csv(tmp_path / "second.csv", index=False)
+    table[: len(table) // 2].to_csv(tmp_path / "first.csv", index=False)
+    for name in ("first", "second"):
+        words = ("--robot", files / "leg.xml", "--log", tmp_path / f"{name}.csv", "--no-effects")
+        assert run("actuators", *words, "--out", tmp_path / name).code == 0
+    done = run("compare", tmp_path / "first", tmp_path / "second", "--out", tmp_path / "compared")
+    assert done.code == 0, done.err
+    assert {path.name for path in (tmp_path / "compared").iterdir()} == {
+        "compare.json",
+        "parameters.csv",
+        "report.html",
+    }
+    same = run("compare", tmp_path / "first", tmp_path / "first", "--out", tmp_path / "same")
+    assert (same.code, "same log" in same.err) == (2, True)
+    mixed = run("compare", tmp_path / "first", files / "leg.xml", "--out", tmp_path / "mixed")
+    assert (mixed.code, "compare drives with drives" in " ".join(mixed.err.split())) == (2, True)
 
 
 @pytest.mark.slow
