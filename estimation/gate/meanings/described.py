@@ -53,7 +53,6 @@ class JointEvidence:
         multiple: that the torque is the described one times each factor (F,).
         weightless: that it is the described one without gravity, with no other factor than the description's error.
         external: that it is what a wrong model leaves.
-        alone: log likelihood of friction, offset and noise alone: it compares readings of a log.
         size: standard deviation of the measured torque over that of the described one.
         friction: RMS of the fitted friction that links and offset do not explain, over that of the torque.
     """
@@ -65,7 +64,6 @@ class JointEvidence:
     multiple: Array
     weightless: float
     external: float
-    alone: float
     size: float
     friction: float
 
@@ -144,7 +142,6 @@ def _evidence_of(fitted: Fitted, joint: int, kept: NDArray[np.intp], heavy: Arra
         multiple=_evidence(shared, torque, measured, factors),
         weightless=_mean(_evidence(columns, weightless, measured, near), norm.logpdf(near, 0.0, COMMON)),
         external=_mean(_evidence(shared, 0.0 * torque, measured, scatters), np.zeros(len(scatters))),
-        alone=-0.5 * float(measured @ measured) + min(len(tau), INDEPENDENT) * float(np.log(root)),
         size=size,
         friction=float(np.sqrt(np.mean(friction**2)) / max(float(tau.std()), 1e-300)),
     )

@@ -39,28 +39,10 @@ def _at(recorded: Recorded, rows: NDArray[np.intp]) -> Flags:
     return np.isin(np.arange(len(recorded.log)), rows)
 
 
-def _hung(recorded: Recorded) -> Flags:
-    flags = np.zeros((len(recorded.log), recorded.robot.n), dtype=bool)
-    for hang in recorded.hangs:
-        flags[hang.first + 1 : hang.first + hang.rows, hang.joint] = True
-    return flags
-
-
-def _held(recorded: Recorded) -> Flags:
-    updates = recorded.updates
-    return ~_at(recorded, updates) if len(updates) else np.zeros(len(recorded.log), dtype=bool)
-
-
-def _rests(recorded: Recorded) -> Flags:
-    return rows_at_rest(recorded.log.t, recorded.log.q)
-
-
 FLAGS = {
     "outlier": RowFlag("a value that leaves its neighbours and returns", lambda r: _at(r, r.spikes), left_out=True),
     "copy": RowFlag("the row before, with a new time", lambda r: _at(r, r.repeated.copies), left_out=True),
     "untimed": RowFlag("a row that was written late by an unknown time", lambda r: _at(r, r.times.lost), left_out=True),
-    "hung": RowFlag("a column of the joint that kept its value while the arm moved, and then jumped", _hung),
-    "held": RowFlag("a torque between two updates of a controller, interpolated", _held),
     "at rest": RowFlag(
         "a joint that stands: friction or a brake holds it with any torque", lambda r: rows_at_rest(r.log.t, r.log.q)
     ),

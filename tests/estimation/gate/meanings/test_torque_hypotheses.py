@@ -23,7 +23,6 @@ def evidence_of(joint: int, factor: float, *, described: float = 1000.0, multipl
         multiple=multiple + fit,
         weightless=0.0,
         external=0.0,
-        alone=0.0,
         size=factor,
         friction=0.1,
     )
