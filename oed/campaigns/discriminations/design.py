@@ -6,13 +6,12 @@ Of each kind of experiment, T-optimality asks how much of either cause base mode
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from functools import partial
+from collections.abc import Callable, Sequence
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from estimation.diagnosis.experiment_plans.experiment_motions import MAKERS, VARIED
+from estimation.diagnosis.experiment_plans.experiment_motions import MAKERS, VARIED, MotionRange, Stage
 from estimation.diagnosis.experiment_plans.next_experiment import VARIANTS
 from estimation.diagnosis.experiment_plans.planned_limits import planned_problem
 from estimation.diagnosis.hypothesis_tests.hypotheses import Hypothesis
@@ -123,7 +122,7 @@ def discriminate(
     try:
         for number, (kind, make) in enumerate(MAKERS.items(), start=1):
             try:
-                runs[kind] = clear.runs(builder, kind, partial(make, joint=index, variant=0))
+                runs[kind] = clear.runs(builder, kind, _maker(make, index, 0))
                 judged[kind] = judge(kind, runs[kind])
             except InfeasibleError as error:
                 judged[kind] = DiscriminationScore.impossible(kind, str(error))
@@ -138,7 +137,7 @@ def discriminate(
     kind = max(runs, key=lambda name: judged[name].merit)
     for variant in range(1, VARIANTS if kind in VARIED else 1):
         try:
-            varied = clear.runs(builder, kind, partial(MAKERS[kind], joint=index, variant=variant))
+            varied = clear.runs(builder, kind, _maker(MAKERS[kind], index, variant))
         except InfeasibleError:
             continue
         better = judge(kind, varied)
@@ -162,6 +161,13 @@ def discriminate(
         },
         surroundings=around if collision else None,
     )
+
+
+def _maker(
+    make: Callable[[MotionRange, int, int], tuple[Stage, ...]], joint: int, variant: int
+) -> Callable[[MotionRange], tuple[Stage, ...]]:
+    """Gives what makes the stages of a kind of experiment within a range."""
+    return lambda room: make(room, joint, variant)
 
 
 def _level(noise: ArrayLike | None, robot: Robot) -> Array | None:
