@@ -11,7 +11,6 @@ from oed.controllers import stream as stream
 from oed.criteria import Criterion as Criterion
 from oed.experiments import Design as Design
 from oed.experiments import Effort as Effort
-from oed.experiments import InteriorPoint as InteriorPoint
 from oed.experiments import Ipopt as Ipopt
 from oed.experiments import LimitOptions as LimitOptions
 from oed.experiments import ModelOptions as ModelOptions

@@ -35,6 +35,8 @@ LOADERS = {
 """Which function reads which format."""
 
 ELSEWHERE = {
+    "robot-oed loop diagnosis": "load the actuators.json beside it, and call estimation.actuators.loop_diagnosis again",
+    "robot-oed drive comparison": "load the results of oed actuators, and call compare_drives again",
     "robot-oed comparison": "its models are not in it; load them, and call estimation.compare again",
     "robot-oed discriminating experiment": "read its trajectory.csv by oed.read_trajectory",
     "robot-oed pareto front": "load one of the designs in its sub-folders",
@@ -65,7 +67,7 @@ def load(path: str | PathLike[str]) -> Any:
         file = file / found
     data = read_json(file, remedy=REMEDY)
     form = str(data.get("format"))
-    if file.name == "diagnosis.json":
+    if file.name == "diagnosis.json" and form not in ELSEWHERE:
         return _named("estimation.diagnosis.Diagnosis.load")(file.parent)
     if form in ELSEWHERE:
         raise InputError(f"is a {form.removeprefix('robot-oed ')}", file=file, remedy=ELSEWHERE[form])

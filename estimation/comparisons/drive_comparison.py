@@ -9,13 +9,13 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import chi2, f
+from scipy.stats import f
 
 from estimation.actuators import Actuators, load_actuators
 from estimation.comparisons.hypothesis_tests import adjust_holm, agreement_test
 from estimation.comparisons.runs import date_in, distinct_labels, unique_labels
 from estimation.logs.provenance import are_same_log
-from estimation.uncertainty.quantiles import NORMAL_95
+from estimation.uncertainty.quantiles import NORMAL_95, chi2_limit, normal_limit
 from robots.common.errors import InputError
 from robots.common.plain import number, percent
 from robots.common.records import Finding, Record, Result, axes_for, findings_of
@@ -382,7 +382,7 @@ def _spread(values: Array, errors: Array) -> float:
     weights = errors**-2.0
     mean = (values * weights).sum(axis=1, keepdims=True) / weights.sum(axis=1, keepdims=True)
     statistics = ((values - mean) ** 2 * weights).sum(axis=1)
-    return float(np.sqrt(max(1.0, np.median(statistics) / chi2.ppf(0.5, values.shape[1] - 1))))
+    return float(np.sqrt(max(1.0, np.median(statistics) / chi2_limit(0.5, values.shape[1] - 1))))
 
 
 def _shared(found: Sequence[DriveDifference], runs: int, alpha: float) -> Iterator[CommonChange]:
@@ -398,7 +398,7 @@ def _shared(found: Sequence[DriveDifference], runs: int, alpha: float) -> Iterat
             )
             deviation = np.hypot(logs.std(ddof=1), np.sqrt(np.mean(errors**2))) / np.sqrt(len(own))
             alike = np.abs(np.sign(logs).sum()) == len(logs) and logs.std(ddof=1) < abs(logs.mean())
-            if alike and abs(logs.mean()) > chi2.ppf(1 - alpha, 1) ** 0.5 * deviation:
+            if alike and abs(logs.mean()) > normal_limit(alpha) * deviation:
                 ends = np.expm1(logs.mean() + np.array([-1, 0, 1]) * NORMAL_95 * deviation)
                 yield CommonChange(
                     parameter=parameter,

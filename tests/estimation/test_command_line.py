@@ -183,7 +183,12 @@ def test_predict_refuses_what_is_no_model(run, log_file, tmp_path):
     """A damaged model is refused by its name, and no table is written."""
     model = tmp_path / "model.json"
     model.write_text('{"format": "robot-oed model", "format_version": 1}')
-    refused(run("predict", "--model", model, "--log", log_file, "--out", tmp_path / "p.csv"), 2, str(model), "damaged")
+    refused(
+        run("predict", "--model", model, "--log", log_file, "--out", tmp_path / "p.csv"),
+        2,
+        str(model),
+        "column robot: is missing",
+    )
     assert [path.name for path in tmp_path.iterdir()] == ["model.json"]
 
 

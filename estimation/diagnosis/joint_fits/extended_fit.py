@@ -11,7 +11,6 @@ from numpy.typing import NDArray
 from estimation.diagnosis.hypothesis_tests.fitted_effects import FittedEffect, accept_all_but
 from estimation.diagnosis.hypothesis_tests.problem import Problem
 from estimation.diagnosis.hypothesis_tests.scoring import accept, score
-from estimation.diagnosis.joint_fits.cutoff_errors import cutoff_change
 from estimation.diagnosis.joint_fits.event_window import open_event_edges
 from estimation.diagnosis.joint_fits.shape_errors import (
     formula_errors,
@@ -117,11 +116,7 @@ def fit_extended(problem: Problem, members: Sequence[FittedEffect], provenance: 
     values[linear & ~known] = moments.pulled(pull).posterior()
     by_reversals = reversal_columns(members, [start for start, *_ in slices], (problem.n, flat.shape[1]))
     covariance, unseen = _covariance(np.concatenate([flat, by_reversals, *forms]))
-    moved = white.independent(cutoff_change(problem, values[: baseline.base.size]))
-    shift = covariance @ (flat[:plain].T @ moved)
     covariance = widened_by_blocks(covariance, flat[:plain], (tau - flat @ values)[:plain])
-    # Between two neighbouring cut-offs of the positions, which are about as plausible.
-    covariance += np.outer(shift, shift)
     lower_upper = [m.hypothesis.coefficient_bounds(problem.situation.robot, m.shape) for m in members]
     extensions, determined_of = [], []
     for member, (start, size, shapes), steps, (lower, upper) in zip(

@@ -186,7 +186,7 @@ def test_files_that_are_no_calibrations_are_refused(tmp_path):
     with pytest.raises(InputError, match="not a calibration file"):
         load_calibration(other)
     other.write_text('{"format": "robot-oed calibration", "format_version": 1}')
-    with pytest.raises(InputError, match="damaged"):
+    with pytest.raises(InputError, match="is missing"):
         load_calibration(other)
 
 
