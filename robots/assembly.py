@@ -7,8 +7,9 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from robots.common.arrays import Array
 from robots.common.config import read_config
 from robots.common.errors import InputError
 from robots.description import MOTOR_UNITS, Bounds, Pose, Range, RobotDescription, Values
@@ -25,8 +26,6 @@ from robots.limits import Limits
 from robots.mujoco_models import robot_from_mjcf
 from robots.per_joint import PerJoint
 from robots.robot import Robot
-
-Array = NDArray[np.float64]
 
 
 def robot_from_urdf(

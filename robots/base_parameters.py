@@ -8,13 +8,13 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from robots.common.arrays import Array
 from robots.common.errors import NotIdentifiableError
 from robots.regressor import TorqueModel
 from robots.terms import Column
 
-Array = NDArray[np.float64]
 log = logging.getLogger(__name__)
 
 _COLUMN_ROUNDING = 1e-9  # of a column; rounding in the regressor, and in its least squares, stays well below

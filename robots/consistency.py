@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from robots.common.arrays import Array
 from robots.common.errors import InputError
 from robots.geometry.inertia import BODY_PARAMETERS
-
-Array = NDArray[np.float64]
 
 _SIGMA = ((4, (0, 0)), (5, (0, 1)), (6, (0, 2)), (7, (1, 1)), (8, (1, 2)), (9, (2, 2)))
 

@@ -8,13 +8,12 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from robots.common.arrays import Array
 from robots.common.errors import InputError
 from robots.geometry.chain import Kind
 from robots.geometry.urdf import UrdfChain
 from robots.limits import ACCELERATION_PER_VELOCITY, JERK_PER_ACCELERATION, Limits
 from robots.robot import MASSES_REMEDY
-
-Array = NDArray[np.float64]
 
 
 def require_stops(names: Sequence[str], accepted: bool, file: str | Path) -> None:

@@ -7,10 +7,11 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from robots.common.arrays import Array
 from robots.common.errors import InputError
 from robots.common.records import read_null_as
 from robots.joints.velocity_ramps import VelocityRamp
-from robots.signals import FloatArray, Motion
+from robots.signals import Motion
 
 ACCELERATION_PER_VELOCITY = 4.0
 """Default acceleration limit over the velocity limit [1/s]: full speed in a quarter of a second, as small arms do."""
@@ -103,13 +104,13 @@ class Limits:
         InputError: arrays of different lengths, NaN, ``lower`` not below ``upper``, or a negative bound.
     """
 
-    lower: FloatArray
-    upper: FloatArray
-    velocity: FloatArray
-    acceleration: FloatArray
-    jerk: FloatArray
-    torque: FloatArray
-    torque_rms: FloatArray = field(default_factory=lambda: np.array(np.inf))
+    lower: Array
+    upper: Array
+    velocity: Array
+    acceleration: Array
+    jerk: Array
+    torque: Array
+    torque_rms: Array = field(default_factory=lambda: np.array(np.inf))
     ramp: VelocityRamp | None = None
     kinds: tuple[str, ...] = ()
 
@@ -157,13 +158,13 @@ class Limits:
         return linear if self.kinds[joint] == "prismatic" else angular
 
     @property
-    def home(self) -> FloatArray:
+    def home(self) -> Array:
         """A pose within the limits (n,): zero, or the middle of a range without zero, or its one end."""
         zero = (self.lower <= 0.0) & (self.upper >= 0.0)
         return np.where(zero, 0.0, self.middle)
 
     @property
-    def middle(self) -> FloatArray:
+    def middle(self) -> Array:
         """The middle of each range (n,); where an end is open, zero or the other end."""
         ranged = np.isfinite(self.lower) & np.isfinite(self.upper)
         middle = np.where(ranged, (np.where(ranged, self.lower, 0.0) + np.where(ranged, self.upper, 0.0)) / 2.0, 0.0)
@@ -272,7 +273,7 @@ class Limits:
 
 
 def symmetric_margins(
-    quantity: str, t: FloatArray, values: NDArray[np.floating], limit: NDArray[np.floating]
+    quantity: str, t: Array, values: NDArray[np.floating], limit: NDArray[np.floating]
 ) -> list[Margin]:
     """Returns the closest approach of each column of any signal to a bound on its magnitude.
 
@@ -311,7 +312,7 @@ def symmetric_margins(
     ]
 
 
-def finite_jerk(motion: Motion) -> tuple[FloatArray, FloatArray]:
+def finite_jerk(motion: Motion) -> tuple[Array, Array]:
     """Returns the jerk between samples as the difference of the acceleration over time.
 
     Args:
@@ -330,7 +331,7 @@ def _slack_fraction(magnitude: float, limit: float) -> float:
     return 0.0 if magnitude == 0.0 else -np.inf
 
 
-def _bound(name: str, value: NDArray[np.floating]) -> FloatArray:
+def _bound(name: str, value: NDArray[np.floating]) -> Array:
     try:
         array = np.array(value, dtype=np.float64, order="C")
     except (TypeError, ValueError) as error:
@@ -341,7 +342,7 @@ def _bound(name: str, value: NDArray[np.floating]) -> FloatArray:
     return array
 
 
-def _reject(wrong: NDArray[np.bool_], array: FloatArray, name: str, allowed: str) -> None:
+def _reject(wrong: NDArray[np.bool_], array: Array, name: str, allowed: str) -> None:
     if wrong.any():
         joint = int(np.flatnonzero(wrong)[0])
         raise InputError(f"found {array[joint]:g}", column=name, joint=joint + 1, allowed=allowed)

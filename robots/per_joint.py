@@ -6,13 +6,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from robots.common.arrays import Array
 from robots.common.errors import InputError
 from robots.description import UNITS, Same
 from robots.geometry.chain import Chain
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

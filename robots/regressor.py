@@ -8,9 +8,10 @@ from functools import cached_property
 
 import casadi
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from robots.batch import BatchFunction, batch_function, builds_expressions
+from robots.common.arrays import Array
 from robots.common.errors import InputError
 from robots.robot import MASSES_REMEDY, Robot
 from robots.terms import (
@@ -27,7 +28,6 @@ from robots.terms import (
     TorqueOffset,
 )
 
-Array = NDArray[np.float64]
 FRICTIONS = {"polynomial": POLYNOMIAL, "coulomb-viscous": COULOMB_VISCOUS}
 
 

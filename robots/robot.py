@@ -8,13 +8,12 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from robots.common.arrays import Array
 from robots.common.errors import InputError
 from robots.common.plain import as_html
 from robots.geometry.chain import Chain, LinkPlace
 from robots.joints.controller_axes import ControllerAxes
 from robots.limits import Limits
-
-Array = NDArray[np.float64]
 
 MASSES_REMEDY = "state them under dynamics.links of a robot YAML, or assume usual ones (--assume-masses KG of payload)"
 """What to do where masses are unknown."""

@@ -6,14 +6,12 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from robots.common.arrays import Array
 from robots.common.plain import finite
 from robots.geometry.inertia import symmetric
 from robots.limits import ACCELERATION_PER_VELOCITY, BOUNDS, JERK_PER_ACCELERATION
 from robots.robot import Robot
-
-Array = NDArray[np.float64]
 
 
 def robot_data(robot: Robot) -> dict[str, Any]:

@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from robots.common.arrays import Array
 from robots.common.errors import InputError
 
-FloatArray = NDArray[np.float64]
 
-
-def checked_time(value: ArrayLike) -> FloatArray:
+def checked_time(value: ArrayLike) -> Array:
     """Gives increasing times (N,)."""
     t = _array("t", value, 1)
     if len(t) == 0:
@@ -27,9 +26,7 @@ def checked_time(value: ArrayLike) -> FloatArray:
     return t
 
 
-def checked_joints(
-    name: str, value: ArrayLike, rows: int, joints: int | None, *, nan_allowed: bool = False
-) -> FloatArray:
+def checked_joints(name: str, value: ArrayLike, rows: int, joints: int | None, *, nan_allowed: bool = False) -> Array:
     """Gives a signal (N, n) of all joints."""
     array = _array(name, value, 2)
     if array.shape[0] != rows:
@@ -40,7 +37,7 @@ def checked_joints(
     return array
 
 
-def checked_common(name: str, value: ArrayLike, rows: int) -> FloatArray:
+def checked_common(name: str, value: ArrayLike, rows: int) -> Array:
     """Gives a signal (N,) that all joints share: whole numbers, but for the ambient temperature."""
     array = _array(name, value, 1)
     if len(array) != rows:
@@ -53,7 +50,7 @@ def checked_common(name: str, value: ArrayLike, rows: int) -> FloatArray:
     return array
 
 
-def _array(name: str, value: ArrayLike, dimensions: int) -> FloatArray:
+def _array(name: str, value: ArrayLike, dimensions: int) -> Array:
     shape = "(N,)" if dimensions == 1 else "(N, n)"
     try:
         given = np.asarray(value)
@@ -67,7 +64,7 @@ def _array(name: str, value: ArrayLike, dimensions: int) -> FloatArray:
     return array
 
 
-def require_finite(name: str, array: FloatArray, *, joints: bool, nan_allowed: bool = False) -> None:
+def require_finite(name: str, array: Array, *, joints: bool, nan_allowed: bool = False) -> None:
     """Refuses infinite numbers (N, k), and NaN where no sensor may be silent, naming the first row."""
     bad = np.isinf(array) if nan_allowed else ~np.isfinite(array)
     if not bad.any():
@@ -86,7 +83,7 @@ def _more(count: int) -> str:
     return f" (the first of {count})" if count > 1 else ""
 
 
-def checked_body(value: ArrayLike) -> FloatArray:
+def checked_body(value: ArrayLike) -> Array:
     """Gives ten inertial parameters of a body."""
     body = _numbers("payload", value)
     if body.shape != (10,) or not np.isfinite(body).all() or body[0] < 0:
@@ -98,7 +95,7 @@ def checked_body(value: ArrayLike) -> FloatArray:
     return body
 
 
-def checked_gravity(value: ArrayLike) -> FloatArray:
+def checked_gravity(value: ArrayLike) -> Array:
     """Gives gravity's acceleration (3,)."""
     gravity = _numbers("gravity", value)
     if gravity.shape != (3,) or not np.isfinite(gravity).all():
@@ -110,7 +107,7 @@ def checked_gravity(value: ArrayLike) -> FloatArray:
     return gravity
 
 
-def _numbers(name: str, value: ArrayLike) -> FloatArray:
+def _numbers(name: str, value: ArrayLike) -> Array:
     try:
         return np.array(value, dtype=float)
     except (TypeError, ValueError) as error:

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from robots.common.arrays import Array
 from robots.common.errors import InputError
 from robots.common.plain import as_html
 from robots.signal_checks import (
@@ -20,8 +21,6 @@ from robots.signal_checks import (
     checked_time,
     require_finite,
 )
-
-FloatArray = NDArray[np.float64]
 
 UNKNOWN_PAUSE = 60.0
 """Pause [s] assumed between two logs where it was not recorded."""
@@ -39,8 +38,8 @@ class _Samples:
         q: positions [rad or m], (N, n).
     """
 
-    t: FloatArray
-    q: FloatArray
+    t: Array
+    q: Array
 
     def __len__(self) -> int:
         return len(self.t)
@@ -95,10 +94,10 @@ class Motion(_Samples):
         InputError: an array of another shape, a value that is not finite, or a time that does not increase.
     """
 
-    t: FloatArray
-    q: FloatArray
-    dq: FloatArray
-    ddq: FloatArray
+    t: Array
+    q: Array
+    dq: Array
+    ddq: Array
 
     def __post_init__(self) -> None:
         t = checked_time(self.t)
@@ -180,20 +179,20 @@ class Log(_Samples):
             is the field, its row the sample, counted from 1.
     """
 
-    t: FloatArray
-    q: FloatArray
-    tau: FloatArray | None = None
-    current: FloatArray | None = None
-    dq: FloatArray | None = None
-    ddq: FloatArray | None = None
-    temperature: FloatArray | None = None
-    ambient: FloatArray | None = None
-    qlink: FloatArray | None = None
-    command: FloatArray | None = None
-    segment: FloatArray | None = None
-    cycle: FloatArray | None = None
-    payload: FloatArray | None = None
-    gravity: FloatArray | None = None
+    t: Array
+    q: Array
+    tau: Array | None = None
+    current: Array | None = None
+    dq: Array | None = None
+    ddq: Array | None = None
+    temperature: Array | None = None
+    ambient: Array | None = None
+    qlink: Array | None = None
+    command: Array | None = None
+    segment: Array | None = None
+    cycle: Array | None = None
+    payload: Array | None = None
+    gravity: Array | None = None
     name: str = ""
     metadata: Mapping[str, Any] = field(default_factory=dict)
 
@@ -241,7 +240,7 @@ _PER_JOINT = ("tau", "current", "dq", "ddq", "temperature", "qlink", "command")
 _COMMON = ("ambient", "segment", "cycle")
 
 
-def uniform_period(t: FloatArray) -> float | None:
+def uniform_period(t: Array) -> float | None:
     """Returns the sample period of increasing times, or None if they are uneven or a single one.
 
     Args:
@@ -257,7 +256,7 @@ def uniform_period(t: FloatArray) -> float | None:
     return period if even else None
 
 
-def _freeze(owner: object, **arrays: FloatArray) -> None:
+def _freeze(owner: object, **arrays: Array) -> None:
     for name, array in arrays.items():
         array.setflags(write=False)
         object.__setattr__(owner, name, array)

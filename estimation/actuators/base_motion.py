@@ -7,20 +7,18 @@ from collections.abc import Mapping
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from estimation.logs.formats import read_foreign
 from estimation.preprocessing.resampling import resample
 from estimation.preprocessing.smoothing import smooth
+from robots.common.arrays import Array
 from robots.common.errors import InputError
 from robots.drives import Situation
 from robots.robot import Robot
 from robots.signals import Log
 from robots.terms.situations.flange_body import require_flange
 from robots.terms.situations.sensitivities import moved_body
-
-Array = NDArray[np.float64]
 
 POSE = "base_pose"
 """Where a log's metadata have the columns of its base."""

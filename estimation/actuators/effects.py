@@ -7,11 +7,9 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from robots.common.arrays import Array
 from robots.drives import Backlash, ElasticGear
-
-Array = NDArray[np.float64]
 
 SOFTER = (2.0, 5.0, 15.0, 50.0)
 """Stiffnesses of a gear from which a search begins, in position gains of the law."""

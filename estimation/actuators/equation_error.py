@@ -5,16 +5,14 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import lsq_linear
 
 from estimation.actuators.freedom import Freedom
 from estimation.actuators.runs import Run
 from estimation.preprocessing.resampling import resample
 from estimation.preprocessing.smoothing import low_pass, smooth
+from robots.common.arrays import Array
 from robots.drives.simulation import followed
-
-Array = NDArray[np.float64]
 
 CUTOFF, HIGHEST = 0.1, 20.0
 """Cut-off as a share of the sampling rate, and its largest value [Hz]: a start needs no more."""

@@ -15,10 +15,9 @@ from estimation.actuators.options import FitOptions
 from estimation.actuators.runs import Run
 from estimation.actuators.simulated_error import Errors, linearised_runs, rms, simulate_runs
 from estimation.uncertainty.correlations import correlation_rows
+from robots.common.arrays import Array
 from robots.common.errors import SolverError
 from robots.common.progress import SILENT, Progress
-
-Array = NDArray[np.float64]
 
 PRIOR = 100.0
 """Standard deviation of a free parameter about its start, in its sizes: what the motion does not show stays there."""

@@ -7,13 +7,11 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
+from robots.common.arrays import Array
 from robots.common.errors import InputError
 from robots.drives import Drive, DriveDynamics, ElasticGear
 from robots.robot import Robot
-
-Array = NDArray[np.float64]
 
 OWN = ("torque_offset", "encoder_zero", "stop_lower", "stop_upper")
 """Parameters that joints of a class do not share: they belong to one assembly."""

@@ -6,7 +6,6 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from estimation.actuators.base_motion import is_situated, with_base
 from estimation.actuators.effects import BY_NAME
@@ -29,6 +28,7 @@ from estimation.actuators.search import LoopFinding, search_effects
 from estimation.actuators.simulated_error import Errors, prepare, rms, simulate_runs
 from estimation.actuators.uncertainty import intervals, uncertainty_of
 from estimation.logs.provenance import describe_logs
+from robots.common.arrays import Array
 from robots.common.errors import InputError, SolverError
 from robots.common.parallel import one_blas_thread
 from robots.common.progress import SILENT, Progress
@@ -36,8 +36,6 @@ from robots.drives import Drive
 from robots.robot import Robot
 from robots.signals import Log
 from robots.version import VERSION
-
-Array = NDArray[np.float64]
 
 BASIC = ("armature", "viscous", "coulomb", "torque_offset")
 """Parameters of every joint that are always identified, beside the delay of all."""

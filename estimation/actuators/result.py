@@ -8,9 +8,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from estimation.actuators.search import LoopFinding
+from robots.common.arrays import Array
 from robots.common.errors import InputError
 from robots.common.records import Finding, Result, axes_for, findings_of, read, read_json
 from robots.drives import Drive
@@ -20,7 +20,6 @@ if TYPE_CHECKING:
     import pandas as pd
     from matplotlib.axes import Axes
 
-Array = NDArray[np.float64]
 
 MOTION = "motion.parquet"
 _REMEDY = "give an actuators.json of oed actuators"

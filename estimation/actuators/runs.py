@@ -16,13 +16,12 @@ from estimation.actuators.freedom import Fleet
 from estimation.logs import read_logs
 from estimation.logs.mappings.mapping import LogMapping
 from estimation.logs.readers.lerobot import is_lerobot, read_lerobot
+from robots.common.arrays import Array
 from robots.common.errors import InputError, NotIdentifiableError
 from robots.drives import HeldCommand, Situation
 from robots.drives.simulation import usual_step
 from robots.robot import Robot
 from robots.signals import Log
-
-Array = NDArray[np.float64]
 
 GAP = 5.0
 """Steps of the median length from which on a pause ends a run."""

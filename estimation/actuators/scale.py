@@ -6,16 +6,14 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from estimation.actuators.fitting import Fit
 from estimation.actuators.freedom import Fleet, Freedom, FreeParameter
 from estimation.actuators.runs import Run
 from estimation.actuators.simulated_error import Errors, simulate_runs
 from estimation.actuators.uncertainty import uncertainty_of
+from robots.common.arrays import Array
 from robots.common.errors import InputError
-
-Array = NDArray[np.float64]
 
 CONSTANT = "torque_constant"
 APART = 0.2

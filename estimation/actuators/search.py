@@ -7,7 +7,6 @@ from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.ndimage import uniform_filter1d
 
 from estimation.actuators.effects import BY_NAME, EFFECTS, LoopEffect, Seen
@@ -16,10 +15,9 @@ from estimation.actuators.freedom import Fleet, Freedom, FreeParameter, free_par
 from estimation.actuators.runs import Run
 from estimation.actuators.simulated_error import CHAINS, Errors, linearised_runs, rms, simulate_runs
 from estimation.uncertainty.correlations import correlation_rows
+from robots.common.arrays import Array
 from robots.common.errors import SolverError
 from robots.common.progress import SILENT, Progress
-
-Array = NDArray[np.float64]
 
 WORTH = 0.04
 """Share of a joint's squared error that an effect must promise to be fitted, and bring on held-out data."""

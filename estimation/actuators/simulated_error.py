@@ -7,14 +7,12 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from estimation.actuators.freedom import Fleet, Freedom
 from estimation.actuators.runs import Run
+from robots.common.arrays import Array
 from robots.drives import Start, simulate_drives
 from robots.drives.simulation import WIDTH
-
-Array = NDArray[np.float64]
 
 NARROW = 1e-5
 """Speed [rad/s or m/s] below which dry friction fades in a refined simulation."""

@@ -14,8 +14,7 @@ from estimation.uncertainty.blocks import moving_block_sums
 from estimation.uncertainty.correlations import correlation_rows
 from estimation.uncertainty.quantiles import NORMAL_95
 from estimation.uncertainty.sandwich import Part, at_least, covariance
-
-Array = NDArray[np.float64]
+from robots.common.arrays import Array
 
 RESAMPLES = 500
 MEMORIES, LONGEST = 5, 0.1

@@ -7,7 +7,6 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from estimation.calibrations.fit import GeometryFit, fit_geometry
 from estimation.calibrations.folds import outside_range
@@ -24,6 +23,7 @@ from estimation.calibrations.selection import HeldOut, KindTrial, held_out_error
 from estimation.calibrations.suspicions import require_enough
 from estimation.calibrations.undetermined import undetermined
 from estimation.uncertainty.quantiles import student_95
+from robots.common.arrays import Array
 from robots.common.errors import InputError
 from robots.common.parallel import one_blas_thread
 from robots.common.progress import SILENT, Progress
@@ -35,8 +35,6 @@ from robots.geometry_errors.terms import TERMS, ErrorTerm, error_term
 from robots.geometry_errors.twists import rotation_vector
 from robots.robot import Robot
 from robots.version import VERSION
-
-Array = NDArray[np.float64]
 
 COMMON = 0.1  # of the poses; more outliers are no single faults
 

@@ -10,14 +10,13 @@ from numpy.typing import NDArray
 
 from estimation.calibrations.sizes import LARGEST, Normal, estimate_sizes, kind_numbers
 from estimation.calibrations.weighting import Weights, least_squares_sigma, robust_weights
+from robots.common.arrays import Array
 from robots.common.errors import SolverError
 from robots.geometry_errors.measurements import Setup
 from robots.geometry_errors.measurements.setup import moved_setup
 from robots.geometry_errors.model import GeometryModel, Prediction
 from robots.geometry_errors.reduction import Reduction, reduce_columns
 from robots.geometry_errors.terms import ErrorParameter
-
-Array = NDArray[np.float64]
 
 STEPS, REFITS = 60, 5
 SMALL_STEP = 1e-6  # standard errors; a fit that moves less is done

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.cluster.hierarchy import fcluster, linkage
 
-Array = NDArray[np.float64]
+from robots.common.arrays import Array
 
 ALIKE = 0.1
 """Poses are alike within so much of the range that each joint covers."""

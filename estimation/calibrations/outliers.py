@@ -9,9 +9,8 @@ from numpy.typing import NDArray
 
 from estimation.calibrations.fit import GeometryFit, fit_geometry, scaled_rows
 from estimation.uncertainty.quantiles import chi2_limit, normal_limit, robust_deviation
+from robots.common.arrays import Array
 from robots.geometry_errors.model import Prediction
-
-Array = NDArray[np.float64]
 
 ALPHA = 0.001
 """Probability that a calibration without outliers names one."""

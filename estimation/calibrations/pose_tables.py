@@ -13,6 +13,7 @@ from scipy.spatial.transform import Rotation
 
 from estimation.calibrations.column_names import column_names, refuse_recordings
 from estimation.calibrations.options import ANGLES, LENGTHS, TableOptions
+from robots.common.arrays import Array
 from robots.common.errors import InputError
 from robots.common.files import sha256
 from robots.common.tables.table import Table
@@ -30,8 +31,6 @@ from robots.geometry_errors.measurements import (
 )
 from robots.geometry_errors.poses import MeasuredPoses, approaches
 from robots.robot import Robot
-
-Array = NDArray[np.float64]
 
 QUATERNION = ("qx", "qy", "qz", "qw")
 MATRIX = tuple(f"r{i}{j}" for i in (1, 2, 3) for j in (1, 2, 3))

@@ -10,9 +10,8 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import KDTree
 
+from robots.common.arrays import Array
 from robots.geometry_errors.poses import MeasuredPoses
-
-Array = NDArray[np.float64]
 
 SAME = 1e-3
 """Positions that are one pose [rad or m]: controllers stop within a few encoder counts of it."""

@@ -15,6 +15,7 @@ from estimation.calibrations.repeatability import Repeatability
 from estimation.calibrations.selection import KindTrial
 from estimation.calibrations.undetermined import Undetermined
 from estimation.models.robot_in_file import build_robot, describe_robot
+from robots.common.arrays import Array
 from robots.common.records import Finding, Record, Result, axes_for, damage_refused, findings_of, read_json
 from robots.geometry_errors.terms import error_term
 from robots.geometry_errors.terms.base import shown_unit
@@ -24,7 +25,6 @@ if TYPE_CHECKING:
     import pandas as pd
     from matplotlib.axes import Axes
 
-Array = NDArray[np.float64]
 
 SHOWN = {"m": ("mm", 1e3), "rad": ("mrad", 1e3), "px": ("px", 1.0)}
 

@@ -13,12 +13,11 @@ from estimation.calibrations.fit import GeometryFit, fit_geometry
 from estimation.calibrations.folds import fold_numbers, outside_range
 from estimation.calibrations.sizes import Normal, estimate_sizes, kind_numbers
 from estimation.calibrations.weighting import pose_distance
+from robots.common.arrays import Array
 from robots.geometry_errors.model import GeometryModel
 from robots.geometry_errors.poses import MeasuredPoses
 from robots.geometry_errors.terms import ErrorTerm
 from robots.robot import Robot
-
-Array = NDArray[np.float64]
 
 CLEAR = 1.0
 """Standard errors by which the held-out error has to fall before a kind is added."""

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg.lapack import dpotrf, dpotri
 
-Array = NDArray[np.float64]
+from robots.common.arrays import Array
 
 LARGEST, SMALLEST = 30.0, 1e-3
 """Bounds of the size of a kind, in the usual sizes of its parameters: 150 mrad and 5 urad of joint zeros."""

@@ -6,7 +6,6 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from estimation.calibrations.fit import fit_geometry
@@ -16,8 +15,6 @@ from robots.geometry_errors.measurements.base import affine_fit
 from robots.geometry_errors.model import GeometryModel
 from robots.geometry_errors.poses import MeasuredPoses
 from robots.robot import Robot
-
-Array = NDArray[np.float64]
 
 FULL_TURNS = 2.5 * 2.0 * np.pi  # rad; no joint of an arm turns farther
 BETTER = 5.0  # times smaller an error has to become before another reading of the numbers is believed

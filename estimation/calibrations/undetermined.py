@@ -7,16 +7,14 @@ from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
 from estimation.calibrations.fit import GeometryFit
+from robots.common.arrays import Array
 from robots.geometry_errors.model import GeometryModel
 from robots.geometry_errors.poses import MeasuredPoses, approaches
 from robots.geometry_errors.terms import ErrorTerm
 from robots.geometry_errors.virtual import random_positions
 from robots.robot import Robot
-
-Array = NDArray[np.float64]
 
 POSES = 200  # drawn per question
 REDUNDANT = 1e-6  # of a column that is new at random poses; rounding leaves 1e-12

@@ -6,11 +6,9 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from estimation.uncertainty.quantiles import robust_deviation
-
-Array = NDArray[np.float64]
+from robots.common.arrays import Array
 
 HUBER = 2.0  # standard deviations of a pose's mean distance from where it loses weight
 SMALLEST = {"m": 1e-9, "rad": 1e-9, "px": 1e-6}  # below it residuals are rounding, as of noise-free poses

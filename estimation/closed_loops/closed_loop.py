@@ -8,16 +8,14 @@ from typing import NamedTuple
 
 import casadi
 import numpy as np
-from numpy.typing import NDArray
 from scipy.interpolate import CubicHermiteSpline
 
 from robots.base_parameters import BaseParameters
+from robots.common.arrays import Array
 from robots.common.errors import InputError, SolverError
 from robots.drives.dry_friction import dry_velocity
 from robots.signals import Motion
 from robots.terms import FrictionTerm
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, kw_only=True)

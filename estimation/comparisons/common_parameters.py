@@ -11,10 +11,9 @@ from numpy.typing import NDArray
 from estimation.comparisons.runs import Run
 from estimation.logs.provenance import are_same_log
 from estimation.models.model import Model
+from robots.common.arrays import Array
 from robots.common.errors import InputError
 from robots.terms import Column, FrictionTerm
-
-Array = NDArray[np.float64]
 
 # What a model lacks biases the parameters alike where the motion is the same, and otherwise where it is not. Standard
 # errors do not hold that bias. Between other motions they are this many times larger (`benchmarks/comparison.py`).

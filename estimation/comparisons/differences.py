@@ -7,15 +7,14 @@ from dataclasses import dataclass, replace
 from typing import Any, Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
 from estimation.comparisons.common_parameters import CommonParameters
 from estimation.comparisons.friction_curves import FrictionCurves
 from estimation.comparisons.hypothesis_tests import adjust_holm, agreement_test
+from robots.common.arrays import Array
 from robots.common.records import Record
 from robots.terms import Column
 
-Array = NDArray[np.float64]
 Level = Literal["whole", "part", "parameter"]
 
 PARTS = {"rigid_body": "rigid body", "rotor_inertia": "rotor inertia", "torque_offset": "torque offset"}

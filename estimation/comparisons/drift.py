@@ -6,16 +6,14 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.stats import t
 
 from estimation.comparisons.common_parameters import CommonParameters
 from estimation.comparisons.friction_curves import LEVEL_SPEED_SHARE, FrictionCurves
 from estimation.comparisons.hypothesis_tests import adjust_holm
 from estimation.uncertainty.quantiles import normal_limit
+from robots.common.arrays import Array
 from robots.common.records import Record
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -8,7 +8,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.stats import f
 
 from estimation.actuators import Actuators, load_actuators
@@ -16,6 +15,7 @@ from estimation.comparisons.hypothesis_tests import adjust_holm, agreement_test
 from estimation.comparisons.runs import date_in, distinct_labels, unique_labels
 from estimation.logs.provenance import are_same_log
 from estimation.uncertainty.quantiles import NORMAL_95, chi2_limit, normal_limit
+from robots.common.arrays import Array
 from robots.common.errors import InputError
 from robots.common.plain import number, percent
 from robots.common.records import Finding, Record, Result, axes_for, findings_of
@@ -24,7 +24,6 @@ if TYPE_CHECKING:
     import pandas as pd
     from matplotlib.axes import Axes
 
-Array = NDArray[np.float64]
 
 FALSE_ALARMS = 0.01
 """Chance of any false alarm among all tests of a comparison."""

@@ -7,14 +7,13 @@ from dataclasses import dataclass
 from typing import Any, Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
 from estimation.comparisons.common_parameters import CommonParameters
 from estimation.comparisons.friction_curves import FrictionCurves
 from estimation.uncertainty.quantiles import NORMAL_95, normal_limit
+from robots.common.arrays import Array
 from robots.common.records import Record
 
-Array = NDArray[np.float64]
 Kind = Literal["unchanged", "common", "own", "unequal", "changed"]
 
 

@@ -7,15 +7,13 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from estimation.comparisons.common_parameters import CommonParameters, friction_table
 from estimation.comparisons.runs import Run
 from estimation.linear_algebra.scaled import square_root
 from estimation.uncertainty.quantiles import NORMAL_95
+from robots.common.arrays import Array
 from robots.common.records import Record
-
-Array = NDArray[np.float64]
 
 # Speeds of the curves, as shares of the largest common speed; below the first the width of the sign decides.
 SHARES = np.linspace(0.05, 1.0, 40)

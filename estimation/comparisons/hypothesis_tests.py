@@ -6,10 +6,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from scipy.special import chdtrc
 
-Array = NDArray[np.float64]
+from robots.common.arrays import Array
 
 # Directions whose variance is below this share of the largest, after scaling, are rounding.
 VARIANCE_ROUNDING = 1e-10

@@ -13,9 +13,8 @@ from estimation.comparisons.common_parameters import CommonParameters
 from estimation.comparisons.differences import parts_of
 from estimation.comparisons.runs import Run
 from estimation.models.model import Model
+from robots.common.arrays import Array
 from robots.version import VERSION
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, kw_only=True)

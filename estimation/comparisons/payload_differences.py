@@ -7,7 +7,6 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from estimation.comparisons.common_parameters import CommonParameters
 from estimation.comparisons.hypothesis_tests import VARIANCE_ROUNDING, agreement_test
@@ -18,12 +17,11 @@ from estimation.payloads.intervals import Quantity, quantities
 from estimation.payloads.physical import physical_body
 from estimation.uncertainty.quantiles import normal_limit
 from robots.base_parameters import find_base_parameters
+from robots.common.arrays import Array
 from robots.common.records import Record
 from robots.geometry.inertia import BODY_PARAMETERS
 from robots.terms.situations.flange_body import FLANGE, link_columns
 from robots.terms.situations.sensitivities import moved_body
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -8,7 +8,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
 from estimation.comparisons.common_parameters import CommonParameters
 from estimation.comparisons.differences import Difference
@@ -18,6 +17,7 @@ from estimation.comparisons.friction_curves import FrictionCurves
 from estimation.comparisons.merging import MergedModel
 from estimation.comparisons.payload_differences import PayloadDifference
 from estimation.comparisons.runs import Run
+from robots.common.arrays import Array
 from robots.common.plain import joints_in_words
 from robots.common.records import Finding, Result, axes_for, findings_of, plain
 
@@ -25,7 +25,6 @@ if TYPE_CHECKING:
     import pandas as pd
     from matplotlib.axes import Axes
 
-Array = NDArray[np.float64]
 
 COMPARISON, MODEL = "compare.json", "model.json"
 # Parts and parameters that the summary lists of each run.

@@ -14,12 +14,11 @@ from numpy.typing import NDArray
 from scipy.linalg import block_diag
 
 from estimation.models.model import Model, load_model
+from robots.common.arrays import Array
 from robots.common.plain import number
 from robots.common.records import Record
 from robots.common.tables.times import YEAR_2000
 from robots.terms import PositionTorque
-
-Array = NDArray[np.float64]
 
 _DATE = re.compile(r"(?<!\d)(20\d\d)[-_.]?([01]\d)[-_.]?([0-3]\d)(?:[T_ -]?([0-2]\d)[-:_h]?([0-5]\d))?(?!\d)")
 

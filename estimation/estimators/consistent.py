@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from estimation.estimators.base import Solution
 from estimation.estimators.wls import WeightedLeastSquares
@@ -25,10 +25,9 @@ from estimation.regressions.standard_parameters import (
     scaling,
 )
 from robots.collision.drawn.link_boxes import link_boxes
+from robots.common.arrays import Array
 from robots.common.errors import InputError, SolverError
 from robots.consistency import BASIS, normalised_eigenvalues
-
-Array = NDArray[np.float64]
 
 # Smallest eigenvalue of a pseudo-inertia, in units in which the reference body's trace is 2.
 LEAST_BODY_EIGENVALUE = 1e-5

@@ -12,8 +12,7 @@ from estimation.exports.standard import BODY_MARGIN, rigid_grouping, semidefinit
 from estimation.linear_algebra.conic import ConicProgram
 from estimation.models.model import Model
 from estimation.regressions.parameter_priors import link_spreads
-
-Array = NDArray[np.float64]
+from robots.common.arrays import Array
 
 NEAREST = (
     "no bodies that can exist have exactly the identified inertial parameters; those of the nearest ones differ by up "

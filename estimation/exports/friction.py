@@ -5,12 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import nnls
 
 from estimation.models.model import Model
-
-Array = NDArray[np.float64]
+from robots.common.arrays import Array
 
 # A larger difference from the identified curve, as a share of the largest friction or spring torque, is named.
 NAMED_DIFFERENCE = 0.02

@@ -6,13 +6,12 @@ from collections.abc import Hashable, Mapping, Set
 from typing import TypeVar
 
 import numpy as np
-from numpy.typing import NDArray
 
 from estimation.exports.standard import REMEDY
+from robots.common.arrays import Array
 from robots.common.errors import InfeasibleError
 from robots.consistency import normalised_eigenvalues
 
-Array = NDArray[np.float64]
 Key = TypeVar("Key", bound=Hashable)
 
 SHARES = (1.0, 0.1, 1e-2, 1e-3, 1e-4, 1e-5, 1e-6)  # of bodies on locked joints, which cannot be without mass

@@ -5,17 +5,15 @@ from __future__ import annotations
 from contextlib import suppress
 
 import numpy as np
-from numpy.typing import NDArray
 
 from estimation.linear_algebra.conic import ConicProgram
 from estimation.models.model import Model
 from estimation.regressions.parameter_priors import link_spreads
 from robots.base_parameters import find_base_parameters
+from robots.common.arrays import Array
 from robots.common.errors import InfeasibleError, InputError
 from robots.consistency import BASIS, normalised_eigenvalues
 from robots.geometry.inertia import BODY_PARAMETERS
-
-Array = NDArray[np.float64]
 
 # Smallest eigenvalue of a pseudo-inertia, in units of the link's own mass and reach.
 BODY_MARGIN = 1e-6

@@ -9,7 +9,6 @@ from typing import NamedTuple
 from xml.etree import ElementTree
 
 import numpy as np
-from numpy.typing import NDArray
 
 from estimation.exports.feasible import NEAREST, nearest_feasible
 from estimation.exports.friction import NAMED_DIFFERENCE, LinearFriction, linear_friction
@@ -17,6 +16,7 @@ from estimation.exports.remainders import remainder
 from estimation.exports.standard import REMEDY, standard_parameters
 from estimation.exports.unstated import unstated_terms
 from estimation.models.model import Model
+from robots.common.arrays import Array
 from robots.common.errors import InfeasibleError, InputError, NearestBodiesWarning
 from robots.common.files import write_atomic
 from robots.geometry.chain import Joint
@@ -26,7 +26,6 @@ from robots.geometry.xacro_ import is_description, split_arguments, urdf_bytes
 from robots.robot import Robot
 from robots.version import VERSION
 
-Array = NDArray[np.float64]
 Element = ElementTree.Element
 
 EYE = np.eye(4)

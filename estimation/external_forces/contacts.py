@@ -13,11 +13,10 @@ from estimation.external_forces.thresholds.calibrations import Calibration
 from estimation.external_forces.thresholds.observations import Observed
 from estimation.external_forces.wrenches import tool_load
 from estimation.uncertainty.quantiles import NORMAL_95
+from robots.common.arrays import Array
 from robots.common.records import Record
 from robots.common.stretches import joined_spans
 from robots.geometry.chain import Chain
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

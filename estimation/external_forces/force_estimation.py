@@ -6,7 +6,6 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from estimation.external_forces.contacts import find_contacts
 from estimation.external_forces.options import ForceOptions
@@ -22,6 +21,7 @@ from estimation.logs.provenance import are_same_log, describe_logs
 from estimation.models.model import Model
 from estimation.predictions.checked_motions import smoothed_at_least
 from estimation.predictions.prediction import Prediction, predict
+from robots.common.arrays import Array
 from robots.common.errors import InputError, NotIdentifiableError
 from robots.common.progress import SILENT, Progress
 from robots.signals import Log
@@ -153,9 +153,6 @@ def forces_of(
         calibration=calibration,
         warnings=tuple(warnings),
     )
-
-
-Array = NDArray[np.float64]
 
 
 def check_fit(signals: Signals, band: Array | None, name: str) -> str | None:

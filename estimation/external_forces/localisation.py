@@ -5,12 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from estimation.external_forces.wrenches import misfit
+from robots.common.arrays import Array
 from robots.geometry.chain import Chain
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from estimation.external_forces.contacts import Contact
 from estimation.external_forces.thresholds.calibrations import Calibration
+from robots.common.arrays import Array
 from robots.common.errors import InputError
 from robots.common.plain import percent
 from robots.common.records import Finding, Result, axes_for, findings_of, read, read_json
@@ -20,7 +21,6 @@ if TYPE_CHECKING:
     import pandas as pd
     from matplotlib.axes import Axes
 
-Array = NDArray[np.float64]
 
 AXES = ("x", "y", "z")
 TABLE = "forces.csv"

@@ -14,6 +14,7 @@ from estimation.logs.torque_source import NO_TORQUE
 from estimation.recordings.rows.held_values import between_updates
 from estimation.recordings.rows.outliers import interpolated
 from estimation.recordings.rows.timing import FEWEST
+from robots.common.arrays import Array
 from robots.common.errors import InputError, NotIdentifiableError
 from robots.common.records import Finding as Remark
 from robots.common.records import Result
@@ -22,7 +23,6 @@ from robots.signals import Log
 if TYPE_CHECKING:
     import pandas as pd
 
-Array = NDArray[np.float64]
 
 # Findings that do not concern a prediction, and findings on torques, which only make its error wrong.
 NOT_OF_MOTION = frozenset(

@@ -15,10 +15,9 @@ from estimation.identifications.fit import Fit
 from estimation.identifications.verdicts import determined_parameters
 from estimation.logs.provenance import describe_logs
 from estimation.models.model import Model
+from robots.common.arrays import Array
 from robots.signals import Log
 from robots.version import VERSION
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

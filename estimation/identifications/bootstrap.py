@@ -20,6 +20,7 @@ from estimation.regressions.moments import Moments
 from estimation.regressions.preparation import Prepared, Rows
 from estimation.uncertainty.blocks import circular_block_counts
 from robots.base_parameters import find_base_parameters
+from robots.common.arrays import Array
 from robots.common.errors import InputError, NotIdentifiableError
 from robots.common.parallel import one_blas_thread, threaded
 from robots.common.records import Record
@@ -28,7 +29,6 @@ from robots.common.stretches import chunks
 if TYPE_CHECKING:
     import pandas as pd
 
-Array = NDArray[np.float64]
 
 # Quantiles one standard deviation from the middle of a normal distribution: a resample that has lost a direction does
 # not distort them.

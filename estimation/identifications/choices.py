@@ -6,7 +6,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from estimation.estimators import Estimator
 from estimation.identifications.comparison import VELOCITY_SCALES, Comparison
@@ -16,8 +15,7 @@ from estimation.preprocessing import Smoother
 from estimation.regressions.parameter_priors import GaussianPrior
 from estimation.regressions.preparation import Prepared
 from robots.base_parameters import BaseParameters
-
-Array = NDArray[np.float64]
+from robots.common.arrays import Array
 
 __all__ = ["VELOCITY_SCALES", "Candidates", "Choice", "choose"]
 

@@ -20,9 +20,8 @@ from estimation.regressions.preparation import Prepared, Rows, rows_of
 from estimation.regressions.standard_parameters import column_levels
 from estimation.uncertainty.averages import AVERAGING_TIME
 from robots.base_parameters import BaseParameters
+from robots.common.arrays import Array
 from robots.terms import PositionTorque
-
-Array = NDArray[np.float64]
 
 # tanh(dq / v0): the first is the sign in practice, and stays unless the data ask for a wider one.
 VELOCITY_SCALES = (0.001, 0.002, 0.005, 0.01, 0.02, 0.05, 0.1)

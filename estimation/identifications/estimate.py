@@ -14,6 +14,7 @@ from estimation.gate import GateReport
 from estimation.identifications.choices import Choice
 from estimation.models.model import Model
 from estimation.recordings import Recording
+from robots.common.arrays import Array
 from robots.common.errors import InputError
 from robots.common.plain import percent, place_of
 from robots.common.records import Finding, Result, axes_for
@@ -22,7 +23,6 @@ if TYPE_CHECKING:
     import pandas as pd
     from matplotlib.axes import Axes
 
-Array = NDArray[np.float64]
 
 MODEL = "model.json"
 

@@ -9,7 +9,6 @@ from operator import add
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from estimation.estimators import Estimator, RegressionData, Solution
 from estimation.identifications.choices import Choice
@@ -20,10 +19,9 @@ from estimation.regressions.preparation import Prepared, Rows
 from estimation.uncertainty import Part, Played, batch_factors, covariance, with_repetitions
 from estimation.uncertainty.averages import AVERAGING_TIME
 from robots.base_parameters import BaseParameters
+from robots.common.arrays import Array
 from robots.common.parallel import threaded
 from robots.common.stretches import ROWS_AT_A_TIME, chunks
-
-Array = NDArray[np.float64]
 
 # In a longer log, evenly spread parts represent the noise's correlation and the sandwich's inner matrix.
 SANDWICH_ROWS, SANDWICH_STRETCHES = 100_000, 24

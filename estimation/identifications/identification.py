@@ -21,6 +21,7 @@ from estimation.recordings import make_ready
 from estimation.regressions.preparation import Prepared
 from estimation.uncertainty import fast_noise, period_noise
 from estimation.uncertainty.quantiles import band_of
+from robots.common.arrays import Array
 from robots.common.errors import NotIdentifiableError
 from robots.common.parallel import one_blas_thread
 from robots.common.progress import SILENT, Progress
@@ -28,8 +29,6 @@ from robots.robot import Robot
 from robots.signals import Log
 from robots.terms import BendingFriction, FrictionTerm
 from robots.terms.friction import USUAL_SPEED_SHARE
-
-Array = NDArray[np.float64]
 
 
 @one_blas_thread()

@@ -16,8 +16,8 @@ from estimation.regressions.blocks import Blocks, Sides
 from estimation.regressions.moments import Moments
 from estimation.regressions.preparation import Rows
 from estimation.uncertainty.quantiles import BAND_SHARE, NORMAL_95
+from robots.common.arrays import Array
 
-Array = NDArray[np.float64]
 Which = NDArray[np.bool_]
 
 # Factors on the parameters' standard errors from which the band of other motions takes the first that suffices.

@@ -10,9 +10,8 @@ from numpy.typing import NDArray
 from estimation.identifications.choices import Choice
 from estimation.identifications.estimate import JointFit
 from estimation.identifications.fit import Fit
+from robots.common.arrays import Array
 from robots.common.errors import NotIdentifiableError
-
-Array = NDArray[np.float64]
 
 # A parameter is determined when its standard error is below this share of it ...
 DETERMINED_ERROR = 0.5

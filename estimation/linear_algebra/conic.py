@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import sparse
 
+from robots.common.arrays import Array
 from robots.common.errors import InfeasibleError, SolverError
-
-Array = NDArray[np.float64]
 
 
 class ConicProgram:

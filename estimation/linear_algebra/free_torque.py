@@ -11,7 +11,8 @@ from numpy.typing import NDArray
 from scipy.linalg import cho_solve_banded, solve_triangular
 from scipy.sparse import csc_matrix
 
-Array = NDArray[np.float64]
+from robots.common.arrays import Array
+
 Real = TypeVar("Real", np.float32, np.float64)
 Piece = tuple[int, Array]
 

@@ -8,9 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from estimation.linear_algebra.conic import ConicProgram
+from robots.common.arrays import Array
 from robots.consistency import BASIS
-
-Array = NDArray[np.float64]
 
 LOG_DETERMINANT_VARIABLES = 14
 """Further variables that the log determinant of one body takes."""

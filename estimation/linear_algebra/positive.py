@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.linalg.lapack import dposv
 
-Array = NDArray[np.float64]
+from robots.common.arrays import Array
 
 
 def solve_positive(matrix: Array, right: Array) -> Array:

@@ -3,11 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from estimation.linear_algebra.positive import solve_nearly_positive
-
-Array = NDArray[np.float64]
+from robots.common.arrays import Array
 
 # Ridge for columns of unit length that keeps any matrix invertible, far below what data say.
 LEAST_RIDGE = 1e-12

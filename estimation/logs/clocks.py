@@ -8,13 +8,11 @@ from itertools import pairwise
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from estimation.logs.provenance import are_same_log, describe_logs
+from robots.common.arrays import Array
 from robots.common.errors import InputError
 from robots.signals import UNKNOWN_PAUSE, Log
-
-Array = NDArray[np.float64]
 
 OWN = 1.0
 """So far [s] a log may reach beyond what is known of it in a fit, to be on the same clock."""

@@ -7,8 +7,9 @@ from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from robots.common.arrays import Array
 from robots.common.errors import InputError
 from robots.regressor import TorqueModel
 from robots.robot import Robot
@@ -16,8 +17,6 @@ from robots.signals import Log, Motion
 from robots.terms import RigidBody
 from robots.terms.situations.flange_body import carrying, require_flange
 from robots.terms.situations.sensitivities import moved_body
-
-Array = NDArray[np.float64]
 
 HEAT = "a thermal model"
 """Models without payloads and gravity vectors, for `require_plain`."""

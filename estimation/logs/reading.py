@@ -24,9 +24,10 @@ from estimation.logs.mappings.suggestions import PLAIN_REMEDY, remedy_for_column
 from estimation.logs.needed_columns import without_faulty_extras
 from estimation.logs.repairs import repair_rows
 from estimation.logs.torque_source import KEY, NO_TORQUE, parse_meaning
+from robots.common.arrays import Array
 from robots.common.errors import InputError
 from robots.common.tables.table import Table
-from robots.signals import FloatArray, Log
+from robots.signals import Log
 
 LISTED = 10
 """Columns of a file that an error message lists."""
@@ -294,11 +295,11 @@ def _count_joints(table: Table, quantities: Mapping[str, Quantity], n: int | Non
     return joints
 
 
-def _signal(table: Table, quantity: Quantity, joints: int, factors: Mapping[str, float]) -> FloatArray:
+def _signal(table: Table, quantity: Quantity, joints: int, factors: Mapping[str, float]) -> Array:
     """Returns the array of one quantity in SI units, (N,) or (N, n); NaN for a joint that has no column."""
     if not quantity.per_joint:
         name = quantity.prefix
-        values: FloatArray = table.columns[name]
+        values: Array = table.columns[name]
         return values if factors[name] == 1.0 else values * factors[name]
     signal = np.full((len(table), joints), np.nan)
     for joint in range(1, joints + 1):
@@ -343,9 +344,7 @@ def _header_row(table: Table) -> int | None:
     return table.first_row - 1 or None
 
 
-def _raise_for_file(
-    error: InputError, table: Table, kept: NDArray[np.intp], signals: Mapping[str, FloatArray]
-) -> NoReturn:
+def _raise_for_file(error: InputError, table: Table, kept: NDArray[np.intp], signals: Mapping[str, Array]) -> NoReturn:
     """Raises an error about an array as one about the file: its column by name, its row by line."""
     quantity = BY_FIELD[error.column or "t"]
     if error.problem.startswith("time"):

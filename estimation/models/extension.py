@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from typing import Any, get_args
 
 import numpy as np
-from numpy.typing import NDArray
 
+from robots.common.arrays import Array
 from robots.common.errors import InputError
 from robots.common.plain import finite
 from robots.common.records import Record
@@ -18,8 +18,6 @@ from robots.terms.effect_bases.capabilities import AtReversals, Reading
 from robots.terms.effect_bases.gear_load import ExtraGearLoad, LoadPath, LoadSource, with_gear_load
 from robots.terms.effects import EFFECTS, Effect
 from robots.terms.situations.situation import Situation
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

@@ -15,6 +15,7 @@ from estimation.logs.known_setup import require_known
 from estimation.models.extension import Extension, extension_torque, read_extension, read_gear_load
 from estimation.models.robot_in_file import build_robot, describe_robot, require_described
 from estimation.uncertainty.quantiles import normal_quantile
+from robots.common.arrays import Array
 from robots.common.errors import InputError
 from robots.common.plain import as_html
 from robots.common.records import Record, damage_refused, read, read_json, write_json
@@ -30,8 +31,6 @@ from robots.terms.situations.situation import Situation, situation
 
 if TYPE_CHECKING:
     import pandas as pd
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, kw_only=True)

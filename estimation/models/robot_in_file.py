@@ -6,8 +6,8 @@ from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from robots.common.arrays import Array
 from robots.common.errors import InputError
 from robots.common.plain import all_finite, number
 from robots.geometry.chain import Chain, Joint
@@ -15,8 +15,6 @@ from robots.joints.velocity_ramps import NO_RAMP, VelocityRamp
 from robots.limits import BOUNDS, Limits
 from robots.robot import Robot
 from robots.terms.situations.flange_body import FLANGE
-
-Array = NDArray[np.float64]
 
 _BY_JOINT = ("rotor_inertia", "gear_ratio", "torque_constant")
 

@@ -6,12 +6,10 @@ from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from estimation.monitoring.control_charts.level_filter import CORRELATION_TIME
 from estimation.uncertainty.quantiles import robust_deviation
-
-Array = NDArray[np.float64]
+from robots.common.arrays import Array
 
 # More points than this are averaged in groups before the search.
 MOST_POINTS = 1500

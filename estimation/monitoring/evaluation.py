@@ -21,10 +21,9 @@ from estimation.monitoring.windows.baseline import Baseline
 from estimation.monitoring.windows.heat import HeatState
 from estimation.monitoring.windows.projection import WINDOW_NOISE_ORDER, Colour, Window, project
 from estimation.monitoring.windows.window_rows import WindowRows, rows_of_window
+from robots.common.arrays import Array
 from robots.common.records import Record, read
 from robots.terms.base import force_unit
-
-Array = NDArray[np.float64]
 
 
 class Evaluation(Record):

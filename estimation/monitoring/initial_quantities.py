@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from estimation.monitoring.control_charts.charts import Chart
 from estimation.monitoring.control_charts.level_filter import LevelFilter
@@ -12,8 +11,7 @@ from estimation.monitoring.settings import MonitorSettings
 from estimation.monitoring.windows.baseline import Baseline
 from estimation.monitoring.windows.heat import HeatState
 from estimation.monitoring.windows.projection import Window
-
-Array = NDArray[np.float64]
+from robots.common.arrays import Array
 
 
 def initial_quantities(

@@ -9,7 +9,7 @@ from os import PathLike
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from estimation.models.model import model_from_dict
 from estimation.monitoring.evaluation import Evaluation
@@ -20,12 +20,11 @@ from estimation.monitoring.windows.baseline import Baseline, baseline_of, read_b
 from estimation.monitoring.windows.projection import SLIDING_SPEED_SHARE
 from estimation.monitoring.windows.stream_windows import StreamWindows
 from estimation.monitoring.windows.window_rows import settling
+from robots.common.arrays import Array
 from robots.common.errors import InputError
 from robots.common.files import write_atomic
 from robots.common.parallel import one_blas_thread
 from robots.common.records import Record, damage_refused, read, read_json
-
-Array = NDArray[np.float64]
 
 
 class Monitor(Record, format="robot-oed monitor", whole=True):

@@ -6,15 +6,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from estimation.monitoring.control_charts.change_fit import StepFit
 from estimation.monitoring.control_charts.quantities import Quantity, start_limit
 from estimation.monitoring.findings import Finding, Kind, relative
 from estimation.monitoring.windows.baseline import PAYLOAD
 from estimation.uncertainty.quantiles import NORMAL_95, chi2_limit
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

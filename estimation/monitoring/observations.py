@@ -11,8 +11,7 @@ from numpy.typing import NDArray
 from estimation.monitoring.control_charts.quantities import Quantity
 from estimation.monitoring.windows.heat import HeatState
 from estimation.monitoring.windows.projection import Window
-
-Array = NDArray[np.float64]
+from robots.common.arrays import Array
 
 
 @dataclass(frozen=True, eq=False)

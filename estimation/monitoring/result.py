@@ -8,11 +8,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
 from estimation.monitoring.change_points import ChangePoint, find_change_points
 from estimation.monitoring.findings import LIGHTS, Finding, Severity, when, worst
 from estimation.monitoring.log_row import UNFIT, LogRow
+from robots.common.arrays import Array
 from robots.common.errors import InputError
 from robots.common.files import write_atomic
 from robots.common.records import Finding as Remark
@@ -25,7 +25,6 @@ if TYPE_CHECKING:
 
     from estimation.monitoring.monitor import Monitor
 
-Array = NDArray[np.float64]
 
 RESULT, TABLE = "monitor.json", "trends.csv"
 REMEDY = "give the folder written by `oed monitor`"

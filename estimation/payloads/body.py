@@ -8,16 +8,15 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from robots.common.arrays import Array
 from robots.common.errors import InputError
 from robots.common.records import read, read_json
 from robots.consistency import normalised_eigenvalues
 from robots.geometry.inertia import BODY_PARAMETERS, check_body, inertial_parameters, symmetric
 from robots.terms.situations.flange_body import point_mass
 from robots.terms.situations.sensitivities import moved_body
-
-Array = NDArray[np.float64]
 
 FORMAT = "robot-oed payload"
 PAYLOAD_VERSION = 1

@@ -5,18 +5,17 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from estimation.payloads.intervals import AXES, Quantity
 from estimation.payloads.mounts import Mount
 from estimation.uncertainty.quantiles import NORMAL_95
+from robots.common.arrays import Array
 from robots.common.errors import InputError, NotIdentifiableError
 from robots.regressor import TorqueModel
 from robots.terms import RigidBody
 from robots.terms.situations.flange_body import payload_part
 from robots.terms.situations.sensitivities import moved_body
-
-Array = NDArray[np.float64]
 
 # Quantities without which a payload is refused, unless no motion of the robot shows them.
 SHOWABLE = ("mass", *(f"centre_{axis}" for axis in AXES))

@@ -16,13 +16,12 @@ from estimation.payloads.mounts import Mount
 from estimation.payloads.paths import PathMatch
 from estimation.regressions.preparation import Rows
 from estimation.uncertainty import Played
+from robots.common.arrays import Array
 from robots.common.stretches import chunks
 from robots.geometry.inertia import BODY_PARAMETERS
 from robots.regressor import TorqueModel
 from robots.signals import Motion
 from robots.terms.situations.sensitivities import moved_body
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)

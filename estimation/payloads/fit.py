@@ -6,16 +6,14 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from estimation.linear_algebra.scaled import floored_inverse
 from estimation.payloads.equations import Arm, Equations
 from estimation.regressions.moments import Moments
 from estimation.uncertainty import Part, covariance, with_repetitions
 from estimation.uncertainty.averages import AVERAGING_TIME
+from robots.common.arrays import Array
 from robots.geometry.inertia import BODY_PARAMETERS
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, kw_only=True)

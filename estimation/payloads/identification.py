@@ -6,7 +6,6 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from estimation.identifications.estimate import Estimate
 from estimation.identifications.identification import identify
@@ -25,13 +24,12 @@ from estimation.payloads.physical import PhysicalBody, physical_body
 from estimation.payloads.result import JointEvidence, PayloadEstimate
 from estimation.recordings import Recording, make_ready
 from estimation.regressions.preparation import Prepared, Rows, prepare_all, still_joints
+from robots.common.arrays import Array
 from robots.common.errors import InputError, NotIdentifiableError
 from robots.common.parallel import one_blas_thread
 from robots.common.progress import SILENT, Progress
 from robots.robot import Robot
 from robots.signals import Log
-
-Array = NDArray[np.float64]
 
 # Torque errors this many times those of the log without payload are in doubt.
 DOUBTFUL_ERROR_RATIO = 2.0

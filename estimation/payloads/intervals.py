@@ -5,13 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from estimation.payloads.body import central_inertia
 from estimation.uncertainty.quantiles import NORMAL_95
+from robots.common.arrays import Array
 from robots.common.plain import significant
-
-Array = NDArray[np.float64]
 
 AXES = "xyz"
 MOMENTS = ("Ixx", "Ixy", "Ixz", "Iyy", "Iyz", "Izz")

@@ -5,14 +5,13 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from robots.common.arrays import Array
 from robots.common.errors import InputError
 from robots.regressor import TorqueModel
 from robots.robot import Robot
 from robots.terms.situations.flange_body import link_columns, require_flange
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)

@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 from scipy.optimize import minimize_scalar
 
 from estimation.uncertainty.correlations import squared_differences
+from robots.common.arrays import Array
 
-Array = NDArray[np.float64]
 Indices = NDArray[np.intp]
 
 # Aligned logs have this share of the shorter one in common.

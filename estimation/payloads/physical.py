@@ -5,16 +5,14 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from estimation.linear_algebra.conic import ConicProgram
 from estimation.linear_algebra.log_determinant import LOG_DETERMINANT_VARIABLES, add_log_determinant
 from estimation.linear_algebra.scaled import floored_inverse
 from estimation.uncertainty.quantiles import chi2_limit
+from robots.common.arrays import Array
 from robots.consistency import BASIS, normalised_eigenvalues, pseudo_inertia
 from robots.geometry.inertia import BODY_PARAMETERS, inertial_parameters
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, kw_only=True)

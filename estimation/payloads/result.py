@@ -9,11 +9,12 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from estimation.payloads.body import DAMAGED, FORMAT, PAYLOAD_VERSION, Body, body_from_dict, read_payload_file
 from estimation.payloads.determination import determined
 from estimation.payloads.intervals import Quantity, quantities
+from robots.common.arrays import Array
 from robots.common.plain import two_digits
 from robots.common.records import Finding, Result, axes_for, findings_of
 from robots.terms.situations.sensitivities import moved_body
@@ -22,7 +23,6 @@ if TYPE_CHECKING:
     import pandas as pd
     from matplotlib.axes import Axes
 
-Array = NDArray[np.float64]
 
 FILE = "payload.json"
 TITLES = {"mass": "mass", **{f"centre_{axis}": f"centre of mass {axis}" for axis in "xyz"}}

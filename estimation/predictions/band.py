@@ -8,12 +8,11 @@ from numpy.typing import NDArray
 from estimation.comparisons.common_parameters import friction_table
 from estimation.models.model import Model
 from estimation.uncertainty.quantiles import NORMAL_95
+from robots.common.arrays import Array
 from robots.common.plain import two_digits
 from robots.common.stretches import chunks
 from robots.signals import Motion
 from robots.terms.base import length_unit
-
-Array = NDArray[np.float64]
 
 # Shares of the fitted speeds at which friction is slow, and holds a joint at rest.
 SLOW = np.array([0.05, 0.1, 0.2])

@@ -8,11 +8,11 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from estimation.estimators import ESTIMATORS
 from estimation.identifications.identification import identify
 from estimation.predictions.prediction import predict
+from robots.common.arrays import Array
 from robots.common.errors import InputError, OedError
 from robots.common.progress import SILENT, Progress
 from robots.common.records import plain
@@ -21,8 +21,6 @@ from robots.signals import Log
 
 if TYPE_CHECKING:
     import pandas as pd
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -20,6 +20,7 @@ from estimation.preprocessing import resample, rows_at_rest, smooth
 from estimation.preprocessing.smoothing import low_pass
 from estimation.regressions.preparation import torque_of
 from estimation.regressions.torque_meanings import as_joint_torque
+from robots.common.arrays import Array
 from robots.common.errors import InputError
 from robots.common.plain import joints_in_words, percent
 from robots.common.records import Finding, Result, axes_for, findings_of
@@ -31,8 +32,6 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
     from estimation.thermal import ThermalTorqueModel
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, kw_only=True)

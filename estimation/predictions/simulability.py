@@ -10,7 +10,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from estimation.closed_loops.closed_loop import inertia_matrices
 from estimation.exports.feasible import nearest_within_errors
@@ -18,14 +17,13 @@ from estimation.linear_algebra.conic import ConicProgram
 from estimation.models.model import Model
 from estimation.regressions.parameter_priors import link_spreads
 from robots.base_parameters import BaseParameters, find_base_parameters
+from robots.common.arrays import Array
 from robots.common.errors import InfeasibleError, InputError, SolverError
 from robots.common.records import Record
 from robots.consistency import BASIS, pseudo_inertia
 from robots.geometry.inertia import BODY_PARAMETERS
 from robots.plants.closed_loop import LEAST_INERTIA_SHARE
 from robots.signals import Log, Motion
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

@@ -9,10 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from estimation.preprocessing.resampling import Resampled
+from robots.common.arrays import Array
 from robots.common.records import Record
 from robots.signals import Motion
-
-Array = NDArray[np.float64]
 
 
 class Smoother(Record, ABC):

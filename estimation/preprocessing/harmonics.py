@@ -5,15 +5,13 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.linalg import cho_factor, cho_solve
 
 from estimation.preprocessing.base import Smoother
 from estimation.preprocessing.resampling import Resampled
+from robots.common.arrays import Array
 from robots.common.stretches import chunks
 from robots.signals import Motion
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

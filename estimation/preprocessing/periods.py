@@ -8,9 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from estimation.uncertainty.correlations import squared_differences
+from robots.common.arrays import Array
 from robots.common.stretches import spans
-
-Array = NDArray[np.float64]
 
 SHORTEST_MOTION_PERIOD = 0.5  # [s] shortest period
 

@@ -8,10 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline, PchipInterpolator
 
+from robots.common.arrays import Array
 from robots.common.errors import InputError
 from robots.common.stretches import spans
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

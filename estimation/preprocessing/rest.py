@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import maximum_filter1d, minimum_filter1d
 
-Array = NDArray[np.float64]
+from robots.common.arrays import Array
 
 
 def rows_at_rest(t: Array, q: Array, speed: Array | None = None) -> NDArray[np.bool_]:

@@ -5,16 +5,14 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.interpolate import BSpline
 from scipy.linalg import solveh_banded
 
 from estimation.preprocessing.base import Smoother
 from estimation.preprocessing.resampling import Resampled
 from estimation.preprocessing.smoothing import own_cutoff
+from robots.common.arrays import Array
 from robots.signals import Motion
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

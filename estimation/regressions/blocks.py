@@ -11,8 +11,7 @@ from numpy.typing import NDArray
 
 from estimation.regressions.moments import Moments, solve_all
 from estimation.regressions.parameter_priors import GaussianPrior
-
-Array = NDArray[np.float64]
+from robots.common.arrays import Array
 
 
 @dataclass(frozen=True, eq=False)

@@ -3,15 +3,13 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import nnls
 
 from estimation.regressions.moments import Moments
 from estimation.regressions.standard_parameters import nonnegative_rows
 from robots.base_parameters import BaseParameters
+from robots.common.arrays import Array
 from robots.terms import BendingFriction
-
-Array = NDArray[np.float64]
 
 
 def with_braking_friction(base: BaseParameters, moments: Moments, values: Array, weights: Array, ridge: float) -> Array:

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import numpy as np
-from numpy.typing import NDArray
 
 from estimation.regressions.moments import Moments
 from estimation.regressions.parameter_priors import (
@@ -17,11 +16,10 @@ from estimation.regressions.parameter_priors import (
 )
 from estimation.regressions.standard_parameters import mass_from_torque, reference_bodies
 from robots.base_parameters import BaseParameters
+from robots.common.arrays import Array
 from robots.regressor import TorqueModel
 from robots.terms import PositionTorque
 from robots.terms.rigid_body import SYMBOLS
-
-Array = NDArray[np.float64]
 
 # What a model lacks is alike for about so long [s] of a motion: rows closer than that do not inform twice.
 MODEL_ERROR_MEMORY = 0.1

@@ -12,9 +12,8 @@ from numpy.typing import NDArray
 from estimation.regressions.moments import Moments
 from robots.base_parameters import BaseParameters
 from robots.batch import BatchFunction, batch_function
+from robots.common.arrays import Array
 from robots.regressor import TorqueModel
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

@@ -10,8 +10,7 @@ from numpy.typing import NDArray
 from estimation.linear_algebra.positive import solve_nearly_positive, solve_positive
 from estimation.linear_algebra.scaled import LEAST_RIDGE, inverse_root, lengths
 from estimation.regressions.parameter_priors import GaussianPrior
-
-Array = NDArray[np.float64]
+from robots.common.arrays import Array
 
 
 @dataclass(frozen=True)

@@ -10,10 +10,9 @@ from scipy.linalg import solve_triangular
 
 from estimation.linear_algebra.scaled import LEAST_RIDGE, lengths
 from robots.base_parameters import BaseParameters
+from robots.common.arrays import Array
 from robots.terms import Column
 from robots.terms.rigid_body import SYMBOLS
-
-Array = NDArray[np.float64]
 
 # Friction, rotor and offset of a joint may make so many times its torque: descriptions rarely state them.
 OWN_TORQUE_RATIO = 3.0

@@ -12,12 +12,11 @@ from numpy.typing import NDArray
 
 from estimation.logs.known_setup import Load, load_of
 from estimation.preprocessing import Cycle, LowPass, Resampled, Smoother, find_cycle, resample, rows_at_rest, smooth
+from robots.common.arrays import Array
 from robots.common.errors import InputError
 from robots.common.parallel import threaded
 from robots.robot import Robot
 from robots.signals import Log, Motion
-
-Array = NDArray[np.float64]
 
 # Below this share of a joint's RMS speed its friction is not known to have a sign: those rows are left out of its fit.
 SIGN_SPEED_SHARE = 0.008

@@ -8,17 +8,13 @@ from functools import reduce
 from operator import add
 from typing import NamedTuple, Protocol
 
-import numpy as np
-from numpy.typing import NDArray
-
 from estimation.preprocessing.base import Smoother
 from estimation.regressions.moments import Moments
 from robots.base_parameters import BaseParameters
+from robots.common.arrays import Array
 from robots.common.stretches import chunks
 from robots.robot import Robot
 from robots.signals import Log, Motion
-
-Array = NDArray[np.float64]
 
 
 class FittedRows(Protocol):

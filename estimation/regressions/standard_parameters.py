@@ -11,13 +11,12 @@ from numpy.typing import NDArray
 from estimation.regressions.moments import Moments
 from estimation.regressions.regression_data import RegressionData
 from robots.base_parameters import BaseParameters
+from robots.common.arrays import Array
 from robots.consistency import inertial_from_pseudo, pseudo_inertia
 from robots.geometry.inertia import BODY_PARAMETERS
 from robots.geometry.usual_arms import usual_body
 from robots.regressor import TorqueModel
 from robots.robot import Robot
-
-Array = NDArray[np.float64]
 
 # Speeds, as shares of the largest, at which friction must not drive the joint, and from which on it must not fall.
 SPEEDS = np.linspace(0.0, 1.0, 13)

@@ -7,18 +7,16 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from estimation.logs.known_setup import robot_for_log
 from estimation.logs.torque_source import KEY, parse_meaning
 from estimation.preprocessing import LowPass, resample, smooth
+from robots.common.arrays import Array
 from robots.common.errors import AssumedValueWarning, InputError
 from robots.regressor import TorqueModel
 from robots.robot import Robot
 from robots.signals import Log
 from robots.terms import RigidBody
-
-Array = NDArray[np.float64]
 
 
 def as_joint_torque(robot: Robot, log: Log, meaning: str | None = None, *, estimate: bool = True) -> Log:

@@ -8,7 +8,6 @@ from functools import partial
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from estimation.identifications.identification import identify
 from estimation.linear_algebra.scaled import LEAST_RIDGE, solve_ridge
@@ -22,14 +21,13 @@ from estimation.thermal.runs.extraction import join_pieces, piece_on_bins, ratio
 from estimation.thermal.runs.thermal_run import ThermalRun
 from estimation.thermal.thermal_fit import fit_thermal
 from estimation.thermal.torque import ThermalTorqueModel, error_band
+from robots.common.arrays import Array
 from robots.common.errors import InputError, NotIdentifiableError
 from robots.common.forks import forked
 from robots.common.parallel import one_blas_thread
 from robots.common.progress import SILENT, Progress
 from robots.robot import Robot
 from robots.signals import Log
-
-Array = NDArray[np.float64]
 
 # The fits of rigid body and heat take turns until no friction changes by more than this share.
 SETTLED_FRICTION_CHANGE, MOST_ALTERNATIONS = 1e-4, 12

@@ -5,15 +5,13 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from estimation.logs.known_setup import HEAT, require_plain
 from estimation.preprocessing import resample, smooth
 from estimation.thermal.torque import ThermalTorqueModel
+from robots.common.arrays import Array
 from robots.common.errors import InputError
 from robots.signals import Log
-
-Array = NDArray[np.float64]
 
 
 def start_temperatures(

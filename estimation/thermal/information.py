@@ -3,11 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from estimation.linear_algebra.scaled import LEAST_RIDGE, solve_ridge
-
-Array = NDArray[np.float64]
+from robots.common.arrays import Array
 
 
 def inverse_of(information: Array) -> Array:

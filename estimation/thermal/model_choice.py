@@ -14,11 +14,10 @@ from estimation.thermal.results.estimate import ThermalEstimate
 from estimation.thermal.runs.run_temperatures import run_temperatures
 from estimation.thermal.runs.thermal_run import ThermalRun, named_apart
 from estimation.thermal.thermal_fit import fit_thermal
+from robots.common.arrays import Array
 from robots.common.errors import InputError, OedError
 from robots.common.progress import SILENT, Progress
 from robots.thermal import THERMAL_MODELS, ThermalModel
-
-Array = NDArray[np.float64]
 
 HELD_OUT = ("runs", "end")
 

@@ -7,19 +7,18 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from estimation.models.model import Model
 from estimation.preprocessing import resample, smooth
 from estimation.regressions.preparation import torque_of
 from estimation.thermal.runs.condensed import Condensed
 from estimation.uncertainty.quantiles import band_of
+from robots.common.arrays import Array
 from robots.common.errors import InputError
 from robots.common.records import Record
 from robots.signals import Motion
 from robots.thermal import ThermalModel, ThermalPath, build_thermal_model, simulate_motion
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

@@ -6,12 +6,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.signal import lfilter
 
 from estimation.uncertainty.correlations import lagged_products
-
-Array = NDArray[np.float64]
+from robots.common.arrays import Array
 
 HIGHEST_NOISE_ORDER = 40
 

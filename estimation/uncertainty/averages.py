@@ -8,9 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from robots.common.arrays import Array
 from robots.common.stretches import chunks
-
-Array = NDArray[np.float64]
 
 # Rows are averaged over so much time [s], which leaves out the noise above 25 Hz.
 AVERAGING_TIME = 0.02

@@ -8,8 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from estimation.uncertainty.sandwich import at_least
-
-Array = NDArray[np.float64]
+from robots.common.arrays import Array
 
 
 def block_numbers(rows: int, count: int) -> NDArray[np.intp]:

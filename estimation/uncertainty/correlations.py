@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.fft import irfft, next_fast_len, rfft
 
-Array = NDArray[np.float64]
+from robots.common.arrays import Array
 
 
 def lagged_products(x: Array, lags: int) -> Array:

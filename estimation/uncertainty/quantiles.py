@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from scipy.special import bdtr, betaincinv, chdtri, ndtri, stdtrit
 
-Array = NDArray[np.float64]
+from robots.common.arrays import Array
 
 NORMAL_95 = float(ndtri(0.975))
 """Half-width of a two-sided 95 % interval of a normal variable, in standard deviations: 1.96."""

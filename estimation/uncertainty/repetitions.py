@@ -7,12 +7,10 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from estimation.uncertainty.correlations import squared_differences
 from estimation.uncertainty.sandwich import Part, at_least, covariance
-
-Array = NDArray[np.float64]
+from robots.common.arrays import Array
 
 # Fewer rows a repetition do not show a noise's colour.
 FEWEST_REPEATED_ROWS = 100

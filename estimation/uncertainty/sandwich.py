@@ -12,9 +12,8 @@ from scipy.signal import lfilter
 from estimation.linear_algebra.scaled import lengths
 from estimation.uncertainty.autoregressive import HIGHEST_NOISE_ORDER, Noise, autocovariance, fit_noise, taps
 from estimation.uncertainty.averages import Averages
+from robots.common.arrays import Array
 from robots.common.stretches import chunks
-
-Array = NDArray[np.float64]
 
 # Above so many rows the fit absorbs too little of the noise to matter.
 MOST_CORRECTED = 30_000

@@ -7,8 +7,8 @@ from os import PathLike
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
+from robots.common.arrays import Array
 from robots.common.errors import InputError
 from robots.common.records import Record, damage_refused, read_json
 from robots.common.tables.table_files import read_table
@@ -16,8 +16,6 @@ from robots.common.tables.table_files import read_table
 FORMAT, CASE_FORMAT, BENCHMARK_VERSION = "oed-benchmark", "oed-benchmark-case", 1
 REMEDY = "get the file again"
 MANIFEST, CASE, LOG, UNSEEN = "benchmark.json", "case.json", "log.csv", "unseen.csv"
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, kw_only=True)

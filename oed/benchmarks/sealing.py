@@ -14,16 +14,14 @@ from pathlib import Path
 from typing import Any, BinaryIO
 
 import numpy as np
-from numpy.typing import NDArray
 
 from oed.benchmarks.folders import BENCHMARK_VERSION, Benchmark
+from robots.common.arrays import Array
 from robots.common.errors import InputError
 from robots.common.files import existing_file
 
 SEALED_FORMAT = "oed-benchmark-truth"
 ANSWERS = "answers.json"
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -7,7 +7,6 @@ from concurrent.futures import Executor
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from oed.campaigns.checking import TorqueCheck, checked
 from oed.campaigns.clearances import CollisionFreeRanges
@@ -25,13 +24,12 @@ from oed.experiments.checks import velocity_share
 from oed.experiments.safety_checks.freedom import freedom_of
 from oed.trajectories import PiecewisePolynomial
 from robots.collision import Surroundings
+from robots.common.arrays import Array
 from robots.common.errors import InputError
 from robots.common.parallel import one_blas_thread
 from robots.common.progress import SILENT, Progress
 from robots.robot import Robot
 from robots.thermal import KnownThermal, known_thermal
-
-Array = NDArray[np.float64]
 
 
 @one_blas_thread()

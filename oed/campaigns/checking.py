@@ -5,17 +5,15 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from oed.campaigns.stages import Stage
 from oed.trajectories.sequence import ACCELERATION_TOLERANCE, POSITION_TOLERANCE, VELOCITY_TOLERANCE
+from robots.common.arrays import Array
 from robots.common.errors import InfeasibleError, InputError
 from robots.limits import Margin, symmetric_margins
 from robots.regressor import TorqueModel, default_model
 from robots.robot import Robot
 from robots.signals import Motion
-
-Array = NDArray[np.float64]
 
 
 class TorqueCheck:

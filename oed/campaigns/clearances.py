@@ -10,10 +10,9 @@ from numpy.typing import NDArray
 from scipy.stats import qmc
 
 from robots.collision import CollisionModel, check_motion
+from robots.common.arrays import Array
 from robots.limits import Limits
 from robots.signals import Motion
-
-Array = NDArray[np.float64]
 
 
 class CollisionFreeRanges:

@@ -6,15 +6,14 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from oed.campaigns.stages import Stage
 from oed.campaigns.timetable import Slot
+from robots.common.arrays import Array
 from robots.robot import Robot
 from robots.thermal import KnownThermal
 from robots.thermal import friction_power as power_of
-
-Array = NDArray[np.float64]
 
 POWER_BIN = 5.0
 """Time over which the friction power is averaged [s]: short against the fastest time constant, some two minutes."""

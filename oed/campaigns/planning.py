@@ -9,7 +9,6 @@ from functools import cached_property
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 
 from oed.campaigns.checking import TorqueCheck
 from oed.campaigns.clearances import CollisionFreeRanges
@@ -27,12 +26,11 @@ from oed.trajectories import (
     vertical_axis_pose,
 )
 from oed.trajectories.stage_defaults import LONGEST_PLATEAU
+from robots.common.arrays import Array
 from robots.common.errors import InfeasibleError
 from robots.limits import Limits
 from robots.robot import Robot
 from robots.signals import Motion
-
-Array = NDArray[np.float64]
 
 SOFTER = (1.0, 0.85, 0.7, 0.5, 0.35, 0.2)
 """Shares of the acceleration and jerk limits that are tried in turn to keep the torque limits; speed is not reduced."""

@@ -10,7 +10,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from oed.campaigns.checking import TorqueCheck, checked
 from oed.campaigns.heat import Temperatures, expected_temperatures, stage_heat
@@ -22,6 +21,7 @@ from oed.experiments.safety_checks.freedom import collides, freedom_text
 from oed.experiments.safety_checks.margins import assumption_findings
 from oed.exports import read_trajectory, write_trajectory
 from robots.collision import Surroundings
+from robots.common.arrays import Array
 from robots.common.errors import InputError
 from robots.common.files import sha256
 from robots.common.records import Finding, axes_for, damage_refused, findings_of, plain, read_json, write_json
@@ -34,7 +34,6 @@ if TYPE_CHECKING:
     import pandas as pd
     from matplotlib.axes import Axes
 
-Array = NDArray[np.float64]
 
 CAMPAIGN = "campaign.json"
 

@@ -7,14 +7,11 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from robots.common.errors import InputError
 from robots.common.records import Record
 from robots.limits import Margin
 from robots.signals import Motion
-
-Array = NDArray[np.float64]
 
 STAGE_KINDS = ("power_on", "excitation", "friction", "warm_up")
 

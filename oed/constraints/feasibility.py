@@ -6,7 +6,7 @@ from functools import partial
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from scipy.optimize import least_squares, minimize
 
 from oed.constraints.geometric import CollisionLimit, GeometricLimits
@@ -14,10 +14,9 @@ from oed.constraints.tool import ToolBox
 from oed.constraints.torque import TorqueLimit
 from robots.collision import CollisionModel, Plane
 from robots.collision.pairs import random_poses
+from robots.common.arrays import Array
 from robots.common.errors import InfeasibleError, InputError
 from robots.robot import Robot
-
-Array = NDArray[np.float64]
 
 DRAWN_POSES = 4000  # poses from which the tool's nearest approach to its box is sought
 SEARCH_STARTS = 6

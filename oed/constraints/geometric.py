@@ -8,15 +8,15 @@ from functools import cached_property
 
 import casadi
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from oed.constraints.pointwise import PointwiseLimit
 from robots.batch import BatchFunction, batch_function
 from robots.collision import CollisionModel, Frames, symbolic_frames
+from robots.common.arrays import Array
 from robots.common.errors import InputError
 from robots.robot import Robot
 
-Array = NDArray[np.float64]
 Rows = tuple[casadi.SX, casadi.SX]  # g (m, 1) and its gradient (m, n)
 
 

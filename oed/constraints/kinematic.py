@@ -9,10 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from oed.constraints.between_samples import tightened_bounds
+from robots.common.arrays import Array
 from robots.common.errors import InfeasibleError, InputError
 from robots.limits import Limits
-
-Array = NDArray[np.float64]
 
 QUANTITIES = ("q", "dq", "ddq", "dddq")
 

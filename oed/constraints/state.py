@@ -8,15 +8,13 @@ from functools import cached_property
 
 import casadi
 import numpy as np
-from numpy.typing import NDArray
 
 from oed.constraints.pointwise import PointwiseLimit
 from robots.batch import BatchFunction, batch_function
 from robots.collision import Frames, symbolic_frames
+from robots.common.arrays import Array
 from robots.common.errors import InputError
 from robots.robot import Robot
-
-Array = NDArray[np.float64]
 
 
 class StateLimit(ABC):

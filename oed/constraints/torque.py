@@ -7,15 +7,14 @@ from typing import Any
 
 import casadi
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from oed.constraints.pointwise import PointwiseLimit
 from robots.batch import batch_function
+from robots.common.arrays import Array
 from robots.common.errors import InfeasibleError, InputError
 from robots.plants import PlantEffect
 from robots.regressor import TorqueModel
-
-Array = NDArray[np.float64]
 
 
 class TorqueLimit(PointwiseLimit):

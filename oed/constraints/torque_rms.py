@@ -6,13 +6,12 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from oed.constraints.torque import TorqueLimit, refuse_holding
+from robots.common.arrays import Array
 from robots.plants import PlantEffect
 from robots.regressor import TorqueModel
-
-Array = NDArray[np.float64]
 
 
 class TorqueRms:

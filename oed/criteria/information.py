@@ -6,12 +6,10 @@ from collections.abc import Sequence
 from copy import copy
 
 import numpy as np
-from numpy.typing import NDArray
 
 from robots.batch import batch_function
+from robots.common.arrays import Array
 from robots.regressor import TorqueModel
-
-Array = NDArray[np.float64]
 
 
 class Information:

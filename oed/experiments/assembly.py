@@ -5,14 +5,13 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from oed.retiming import plan_move
 from oed.trajectories import PiecewisePolynomial, Segment, Sequence, Trajectory, velocity_reaching_stroke
+from robots.common.arrays import Array
 from robots.common.errors import InputError
 from robots.limits import Limits
-
-Array = NDArray[np.float64]
 
 
 def assemble(

@@ -7,7 +7,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from oed.criteria import Criterion
 from oed.criteria import criterion as choose_criterion
@@ -28,6 +27,7 @@ from oed.experiments.searches.islands import search_islands
 from oed.experiments.searches.search import Found
 from oed.trajectories import count_periods
 from robots.base_parameters import BaseParameters, find_base_parameters
+from robots.common.arrays import Array
 from robots.common.errors import InfeasibleError
 from robots.common.parallel import one_blas_thread
 from robots.common.progress import SILENT, Progress
@@ -37,8 +37,6 @@ from robots.regressor import default_model
 from robots.robot import Robot
 from robots.signals import Motion
 from robots.terms.situations.flange_body import carrying, payload_part
-
-Array = NDArray[np.float64]
 
 
 @one_blas_thread()

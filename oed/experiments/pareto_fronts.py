@@ -16,6 +16,7 @@ from oed.criteria import criterion as choose_criterion
 from oed.experiments.designing import design
 from oed.experiments.quality import excitation_findings
 from oed.experiments.results.result import Design
+from robots.common.arrays import Array
 from robots.common.errors import InputError
 from robots.common.records import Finding, Result, axes_for
 from robots.robot import Robot
@@ -24,7 +25,6 @@ if TYPE_CHECKING:
     import pandas as pd
     from matplotlib.axes import Axes
 
-Array = NDArray[np.float64]
 
 PARETO = "pareto.json"
 

@@ -7,7 +7,7 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from oed.criteria import criterion as choose_criterion
 from oed.experiments.checks import usable_limits
@@ -20,14 +20,13 @@ from oed.retiming import Retimed, retime_with_stops
 from oed.retiming import retime as retime_by_toppra
 from robots.base_parameters import find_base_parameters
 from robots.collision import Surroundings
+from robots.common.arrays import Array
 from robots.common.errors import InputError
 from robots.limits import Limits
 from robots.regressor import TorqueModel
 from robots.robot import Robot
 from robots.signals import Motion
 from robots.terms import FrictionTerm
-
-Array = NDArray[np.float64]
 
 METHODS = ("toppra", "ruckig")
 

@@ -10,15 +10,13 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from robots.common.arrays import Array
 from robots.common.errors import InputError, ShorterWayWarning
 from robots.common.files import write_atomic
 from robots.common.plain import joints_in_words
 from robots.common.tables.table_files import Table, read_table, write_table
 from robots.signals import Motion
-
-Array = NDArray[np.float64]
 
 QUANTITIES = ("q", "dq", "ddq")
 RATES = {"q": "", "dq": "/s", "ddq": "/s2"}

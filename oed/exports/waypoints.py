@@ -6,15 +6,14 @@ import warnings
 from os import PathLike
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from oed.exports.trajectory_csv import JOINT_COLUMN, read_lengths
+from robots.common.arrays import Array
 from robots.common.errors import InputError, ShorterWayWarning
 from robots.common.plain import joints_in_words, several
 from robots.common.tables.table_files import Table, read_table
 from robots.robot import Robot
-
-Array = NDArray[np.float64]
 
 POSITION_ROUNDING = 1e-6
 """What a file rounds [rad or m]."""

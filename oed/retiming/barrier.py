@@ -7,12 +7,10 @@ length of the path. All iterates keep the limits; a solve that ends early is sti
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.linalg import LinAlgError, solveh_banded
 
 from oed.retiming.timing_problem import TimingProblem
-
-Array = NDArray[np.float64]
+from robots.common.arrays import Array
 
 
 def shorten(problem: TimingProblem, coefficients: Array, *, first_weight: float = 1.0) -> Array:

@@ -5,13 +5,11 @@ from __future__ import annotations
 import dataclasses
 
 import numpy as np
-from numpy.typing import NDArray
 
+from robots.common.arrays import Array
 from robots.common.errors import InfeasibleError, InputError
 from robots.limits import ACCELERATION_PER_VELOCITY, JERK_PER_ACCELERATION, Limits, finite_jerk
 from robots.signals import Motion
-
-Array = NDArray[np.float64]
 
 
 def finite_limits(limits: Limits) -> Limits:

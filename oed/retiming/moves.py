@@ -11,14 +11,13 @@ from typing import Any
 
 import numpy as np
 import ruckig
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from oed.retiming.limits import finite_limits, limit_usage, require_inside
+from robots.common.arrays import Array
 from robots.common.errors import InfeasibleError, InputError, SolverError
 from robots.limits import Limits
 from robots.signals import Motion
-
-Array = NDArray[np.float64]
 
 STANDSTILL = 1e-10
 """Distance below which two poses are one [rad], a hundred-thousandth of a fine encoder's step."""

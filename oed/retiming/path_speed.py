@@ -8,7 +8,6 @@ from typing import Any
 
 import numpy as np
 import toppra
-from numpy.typing import NDArray
 from toppra.algorithm import TOPPRA
 from toppra.constraint import (
     DiscretizationType,
@@ -21,10 +20,10 @@ from toppra.constraint import (
 
 from oed.retiming.limits import too_weak_to_hold
 from oed.retiming.paths import PathPiece
+from robots.common.arrays import Array
 from robots.common.errors import InfeasibleError
 from robots.limits import Limits
 
-Array = NDArray[np.float64]
 InverseDynamics = Callable[[Array, Array, Array], Array]
 Friction = Callable[[Array], Array]
 

@@ -5,17 +5,16 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.interpolate import PPoly
 
 from oed.retiming.barrier import inside, shorten
 from oed.retiming.limits import limit_usage
 from oed.retiming.speed_law import SpeedGrid, SpeedLaw
 from oed.retiming.timing_problem import Friction, InverseDynamics, TimingProblem
+from robots.common.arrays import Array
 from robots.limits import Limits, finite_jerk
 from robots.signals import Motion
 
-Array = NDArray[np.float64]
 Torque = Callable[[Motion], Array | None]
 
 ORDERS = {"velocity": 1.0, "acceleration": 2.0, "jerk": 3.0, "torque": 2.0}

@@ -6,13 +6,12 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.interpolate import PPoly
 
 from oed.retiming.speed_law import Indices, SpeedGrid
+from robots.common.arrays import Array
 from robots.limits import Limits
 
-Array = NDArray[np.float64]
 InverseDynamics = Callable[[Array, Array, Array], Array]
 Friction = Callable[[Array], Array]
 

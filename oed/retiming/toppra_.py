@@ -15,11 +15,10 @@ from oed.retiming.refinement import ORDERS, Torque, refine
 from oed.retiming.result import KEPT_LIMIT_USE, Retimed
 from oed.retiming.timing import TimeLaw, kinematics
 from oed.retiming.timing_problem import Friction, InverseDynamics
+from robots.common.arrays import Array
 from robots.common.errors import InfeasibleError, InputError
 from robots.limits import Limits
 from robots.signals import Motion
-
-Array = NDArray[np.float64]
 
 OVERSHOOT = (
     "the smooth path swings out between its points: add points near the limit, or stop at each (--method ruckig)"

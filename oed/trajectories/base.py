@@ -6,12 +6,11 @@ from abc import ABC, abstractmethod
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from robots.common.arrays import Array
 from robots.common.errors import InputError
 from robots.signals import Motion
-
-Array = NDArray[np.float64]
 
 WHOLE_PERIOD_TOLERANCE = 1e-6
 """How far a duration may lie from a multiple of the controller's period, as a fraction of that period."""

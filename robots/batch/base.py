@@ -7,11 +7,9 @@ from collections.abc import Callable
 
 import casadi
 import numpy as np
-from numpy.typing import NDArray
 
+from robots.common.arrays import Array
 from robots.common.errors import InputError
-
-Array = NDArray[np.float64]
 
 
 class BatchFunction(ABC):

@@ -5,14 +5,12 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
 
 from robots.collision.capsules import Capsule, frozen_vector
+from robots.common.arrays import Array
 from robots.common.errors import InputError
 from robots.description import CollisionDescription
 from robots.geometry.chain import homogeneous, rotation_from_rpy
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

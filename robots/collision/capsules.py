@@ -7,13 +7,12 @@ from collections.abc import Iterable
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from robots.common.arrays import Array
 from robots.common.errors import InputError
 from robots.description import CapsuleDescription
 from robots.geometry.chain import Chain
-
-Array = NDArray[np.float64]
 
 
 def frozen_vector(value: ArrayLike, what: str) -> Array:

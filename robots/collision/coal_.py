@@ -5,15 +5,14 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from robots.collision.boxes import Box, Obstacle, Plane
 from robots.collision.capsules import Capsule
 from robots.collision.drawn.shapes import coal
 from robots.collision.model import CollisionModel
 from robots.collision.pairs import poses_of
-
-Array = NDArray[np.float64]
+from robots.common.arrays import Array
 
 
 class CoalChecker:

@@ -29,9 +29,9 @@ from dataclasses import dataclass
 
 import casadi
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from robots.common.arrays import Array
+
 Segment = tuple[casadi.SX, casadi.SX]  # its two ends, (3, 1) each, in the base frame [m]
 
 

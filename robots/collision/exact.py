@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from robots.common.arrays import Array
 
 
 def segment_segment(a0: Array, a1: Array, b0: Array, b1: Array) -> Array:

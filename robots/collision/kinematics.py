@@ -5,13 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import casadi
-import numpy as np
-from numpy.typing import NDArray
 
+from robots.common.arrays import Array
 from robots.geometry.chain import Chain
 from robots.geometry.symbolic import cleaned, symbolic_placement
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)

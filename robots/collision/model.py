@@ -9,7 +9,7 @@ from functools import cached_property
 
 import casadi
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from robots.batch import BatchFunction, batch_function
 from robots.collision import distance
@@ -19,11 +19,10 @@ from robots.collision.distance import Contact, Segment
 from robots.collision.drawn.shapes import DrawnBodies
 from robots.collision.kinematics import Frames, symbolic_frames
 from robots.collision.pairs import Pair, choose_pairs, clearances, poses_of
+from robots.common.arrays import Array
 from robots.common.errors import InputError
 from robots.geometry.chain import Chain
 from robots.limits import Limits
-
-Array = NDArray[np.float64]
 
 SMOOTHING = 0.002
 """Default of how much too small a smooth clearance may be [m]."""

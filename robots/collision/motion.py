@@ -3,15 +3,13 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from robots.collision.model import CollisionModel, body_names
 from robots.collision.pairs import body_clearance, distinct_rows, poses_of
 from robots.collision.report import CollisionReport
 from robots.collision.travel import pieces_of, reach_of_pairs, require_joints
+from robots.common.arrays import Array
 from robots.signals import Motion
-
-Array = NDArray[np.float64]
 
 SAMPLES_AT_A_TIME = 8192  # samples at a time: hours at 4 ms must not fill the memory
 

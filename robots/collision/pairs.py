@@ -11,10 +11,9 @@ from numpy.typing import NDArray
 from robots.collision import exact
 from robots.collision.boxes import Box, Obstacle, Plane
 from robots.collision.capsules import Capsule
+from robots.common.arrays import Array
 from robots.geometry.chain import Chain
 from robots.limits import Limits
-
-Array = NDArray[np.float64]
 
 SAMPLED_POSES = 1000  # of which a pair must leave one free to be worth watching
 TOUCHING_DISTANCE = 0.015  # m; bodies that no pose takes farther apart touch by construction

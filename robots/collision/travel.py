@@ -9,10 +9,9 @@ from numpy.typing import NDArray
 
 from robots.collision.model import CollisionModel
 from robots.collision.pairs import Pair
+from robots.common.arrays import Array
 from robots.common.errors import InputError
 from robots.signals import Motion
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)

@@ -6,11 +6,9 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 
+from robots.common.arrays import Array
 from robots.drives.base import DriveParameter, Member
-
-Array = NDArray[np.float64]
 
 LONGEST = 0.25
 """Longest delay [s] that is searched: a controller over a network."""

@@ -11,14 +11,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from robots.batch import BatchFunction, batch_function, builds_expressions
+from robots.common.arrays import Array
 from robots.common.errors import InputError
 from robots.drives.base import Instant
 from robots.drives.drive import Drive
 from robots.drives.dry_friction import dry_velocities
 from robots.robot import MASSES_REMEDY, Robot
 from robots.terms import RigidBody
-
-Array = NDArray[np.float64]
 
 PASSES = 2
 """Times that a step's smooth torques are evaluated again: each brings the velocity at its end h / T nearer, T the time

@@ -6,14 +6,12 @@ from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from robots.common.arrays import Array
 from robots.common.errors import SolverError
 from robots.drives.delay import HeldCommand
 from robots.drives.dynamics import BODY, DriveDynamics
 from robots.robot import Robot
-
-Array = NDArray[np.float64]
 
 UNSTABLE = 1e3
 """Positions [rad or m] beyond which a loop counts as unstable."""

@@ -7,11 +7,11 @@ from dataclasses import dataclass, field
 from typing import Any, Literal, NamedTuple, get_args
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from robots.common.arrays import Array
 from robots.common.errors import InputError
 
-Array = NDArray[np.float64]
 Kind = Literal["revolute", "prismatic"]
 
 _ROTATION_ROUNDING = 1e-15  # below it an entry of a rotation is rounding: cos(90 deg) in floating point is 6e-17, not 0

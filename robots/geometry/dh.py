@@ -7,12 +7,12 @@ from dataclasses import dataclass
 from typing import Literal, get_args
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from robots.common.arrays import Array
 from robots.common.errors import InputError
 from robots.geometry.chain import Chain, Joint, Kind, homogeneous
 
-Array = NDArray[np.float64]
 Convention = Literal["standard", "modified"]
 
 

@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from robots.common.arrays import Array
 from robots.common.errors import InputError
-
-Array = NDArray[np.float64]
 
 BODY_PARAMETERS = 10  # m, mPx, mPy, mPz, Ixx, Ixy, Ixz, Iyy, Iyz, Izz
 _UPPER = np.triu_indices(3)  # (xx, xy, xz, yy, yz, zz), the order of our inertial parameters

@@ -4,11 +4,9 @@ from __future__ import annotations
 
 import casadi
 import numpy as np
-from numpy.typing import NDArray
 
+from robots.common.arrays import Array
 from robots.geometry.chain import Joint
-
-Array = NDArray[np.float64]
 
 
 def cleaned(values: Array) -> Array:

@@ -8,8 +8,8 @@ from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from robots.common.arrays import Array
 from robots.common.errors import InputError
 from robots.geometry.chain import Chain, Joint, LinkPlace, joint_motion
 from robots.geometry.inertia import BODY_PARAMETERS, body_doubts, check_body, inertial_parameters
@@ -17,8 +17,6 @@ from robots.geometry.urdf_limits import JointBounds, joint_bounds, limits_of
 from robots.geometry.urdf_selection import Selection, nearest, select
 from robots.geometry.urdf_xml import UrdfElements, UrdfJoint, UrdfLink, read_elements
 from robots.limits import Limits
-
-Array = NDArray[np.float64]
 
 
 class UrdfChain(NamedTuple):

@@ -5,12 +5,10 @@ from __future__ import annotations
 from xml.etree import ElementTree
 
 import numpy as np
-from numpy.typing import NDArray
 
+from robots.common.arrays import Array
 from robots.common.errors import InputError
 from robots.geometry.chain import homogeneous, rotation_from_quaternion, rotation_from_rpy
-
-Array = NDArray[np.float64]
 
 
 class UrdfReader:

@@ -10,11 +10,10 @@ from xml.etree import ElementTree
 import numpy as np
 from numpy.typing import NDArray
 
+from robots.common.arrays import Array
 from robots.common.errors import InputError
 from robots.geometry.urdf_reader import UrdfReader
 from robots.geometry.xacro_ import find_package, split_arguments, urdf_bytes
-
-Array = NDArray[np.float64]
 
 _SIZES = {"box": (("size", 3),), "cylinder": (("radius", 1), ("length", 1)), "sphere": (("radius", 1),)}
 _SIZES["capsule"] = _SIZES["cylinder"]

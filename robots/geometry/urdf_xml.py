@@ -9,8 +9,8 @@ from typing import Literal, get_args
 from xml.etree import ElementTree
 
 import numpy as np
-from numpy.typing import NDArray
 
+from robots.common.arrays import Array
 from robots.common.errors import InputError
 from robots.geometry.chain import Kind
 from robots.geometry.inertia import symmetric
@@ -19,7 +19,6 @@ from robots.geometry.urdf_reader import UrdfReader
 from robots.geometry.urdf_schema import unused_parts
 from robots.geometry.xacro_ import split_arguments, urdf_bytes
 
-Array = NDArray[np.float64]
 JointType = Literal["revolute", "continuous", "prismatic", "fixed", "floating", "planar"]
 
 # Elements whose values are used here; meshes and plugins are ignored.

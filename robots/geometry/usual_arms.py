@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from robots.common.arrays import Array
 from robots.geometry.chain import Chain
 from robots.geometry.inertia import inertial_parameters
 from robots.limits import Limits
-
-Array = NDArray[np.float64]
 
 # Mass of an arm [kg] = MASS payload^BY_PAYLOAD reach^BY_REACH: least squares over the data sheets of 27 arms of 2 to
 # 210 kg payload and 0.5 to 2.7 m reach, which scatter about it by a factor of 1.8.

@@ -6,15 +6,13 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from robots.common.arrays import Array
 from robots.geometry.chain import Chain, Joint, joint_motion
 from robots.geometry_errors.state import ArmState
 from robots.geometry_errors.terms import Column, ErrorTerm
 from robots.geometry_errors.twists import adjoint, exponential, inverse, right_jacobian
 from robots.robot import Robot
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

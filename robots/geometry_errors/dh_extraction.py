@@ -5,12 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from robots.common.arrays import Array
 from robots.geometry.chain import Chain, Kind, homogeneous, joint_motion
 from robots.geometry.dh import Convention
-
-Array = NDArray[np.float64]
 
 PARALLEL = 0.05  # sine of the angle between axes, below which their common normal may be far away
 MEET = 0.01  # m; axes that pass each other nearer count as meeting, so that errors of a millimetre turn no table round

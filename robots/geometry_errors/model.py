@@ -7,8 +7,8 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
+from robots.common.arrays import Array
 from robots.common.errors import InputError
 from robots.geometry_errors.arm import ArmColumns, ErroneousArm
 from robots.geometry_errors.measurements import Setup
@@ -16,8 +16,6 @@ from robots.geometry_errors.measurements.setup import known_setup, setup_paramet
 from robots.geometry_errors.poses import MeasuredPoses
 from robots.geometry_errors.terms import ErrorParameter, ErrorTerm
 from robots.robot import Robot
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

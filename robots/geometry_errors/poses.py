@@ -9,12 +9,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from robots.common.arrays import Array
 from robots.common.errors import InputError
 from robots.geometry_errors.measurements import Measurement
 from robots.geometry_errors.state import ArmState, gravity_loads
 from robots.robot import Robot
-
-Array = NDArray[np.float64]
 
 STILL = 1e-3
 """Steps between poses that are no motion of a joint [rad or m]."""

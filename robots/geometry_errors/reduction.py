@@ -6,9 +6,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from robots.common.arrays import Array
 
 RANK_TOLERANCE = 1e-6
 """Share of a scaled column that has to be new: rounding leaves 1e-12, a motion of a hundredth of a degree 1e-4."""

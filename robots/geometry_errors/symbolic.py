@@ -9,6 +9,7 @@ import casadi
 import numpy as np
 from numpy.typing import NDArray
 
+from robots.common.arrays import Array
 from robots.geometry.symbolic import cleaned, symbolic_placement
 from robots.geometry_errors.measurements import Measurement, Setup
 from robots.geometry_errors.measurements.base import Scene
@@ -16,8 +17,6 @@ from robots.geometry_errors.measurements.setup import tangents
 from robots.geometry_errors.state import ArmState
 from robots.geometry_errors.terms import ErrorTerm
 from robots.robot import Robot
-
-Array = NDArray[np.float64]
 
 
 class SymbolicArm:

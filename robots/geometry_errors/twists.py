@@ -6,9 +6,9 @@ A twist is ``(v, w)``: a shift [m] and a turn [rad], both in the axes of the fra
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-Array = NDArray[np.float64]
+from robots.common.arrays import Array
 
 SMALL = 1e-4  # rad; below it series are exact to rounding, and quotients of sines are not
 TERMS = 24  # of the series of the right Jacobian: exact to rounding for turns of up to pi

@@ -6,16 +6,15 @@ from collections.abc import Mapping
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from robots.common.arrays import Array
 from robots.common.errors import InputError
 from robots.geometry_errors.measurements import Measurement, Setup
 from robots.geometry_errors.model import GeometryModel
 from robots.geometry_errors.poses import MeasuredPoses, approaches
 from robots.geometry_errors.terms import TERMS
 from robots.robot import Robot
-
-Array = NDArray[np.float64]
 
 TURNS = np.pi  # positions of joints without limits are drawn within so much [rad]
 

@@ -5,11 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from robots.common.arrays import Array
 from robots.common.errors import InputError
-
-Array = NDArray[np.float64]
 
 NO_RAMP = {"lower": -1e6, "upper": 1e6, "offset": 0.0, "deceleration": 1e6, "reserve": 0.0}
 """Values of a joint that has no such limit."""

@@ -6,15 +6,13 @@ from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from robots.common.arrays import Array
 from robots.common.errors import InputError
 from robots.geometry.chain import homogeneous, joint_motion, rotation_from_quaternion
 from robots.geometry.urdf_limits import UrdfLimit
 from robots.geometry.urdf_xml import UrdfElements, UrdfJoint, UrdfLink
 from robots.mujoco_models.actuators import effort_limit
-
-Array = NDArray[np.float64]
 
 FREE, BALL, SLIDE, HINGE = range(4)  # mjtJoint
 

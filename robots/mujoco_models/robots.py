@@ -7,8 +7,8 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from robots.common.arrays import Array
 from robots.common.errors import InputError
 from robots.description_notes import lacking
 from robots.geometry.chain import Chain
@@ -18,8 +18,6 @@ from robots.mujoco_models.actuators import added_by_actuators
 from robots.mujoco_models.elements import FREE, HINGE, SLIDE, MujocoNames, linear_couplings, loose_bodies, read_model
 from robots.mujoco_models.files import compile_mjcf, mujoco_library, read_xml
 from robots.robot import Robot
-
-Array = NDArray[np.float64]
 
 
 def robot_from_mjcf(

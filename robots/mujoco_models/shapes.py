@@ -8,14 +8,12 @@ from pathlib import Path
 from typing import Any, Literal
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.spatial import ConvexHull, QhullError
 
+from robots.common.arrays import Array
 from robots.geometry.urdf_shapes import UrdfShape
 from robots.mujoco_models.elements import MujocoNames, pose
 from robots.mujoco_models.files import compile_mjcf, mujoco_library
-
-Array = NDArray[np.float64]
 
 KINDS = {2: "sphere", 3: "capsule", 5: "cylinder", 6: "box"}
 ELLIPSOID, MESH = 4, 7

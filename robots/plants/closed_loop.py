@@ -7,9 +7,9 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from robots.common.arrays import Array
+
 Beyond = Callable[[Array, Array, Array], tuple[Array, Array]]
 
 # The last pass may change the loop's torque by this share of it.

@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING
 
 import casadi
 import numpy as np
-from numpy.typing import NDArray
 
+from robots.common.arrays import Array
 from robots.common.errors import InputError
 from robots.robot import Robot
 from robots.terms.effects import EFFECTS, Effect, Situation, StaticEffect
@@ -18,8 +18,6 @@ from robots.terms.situations.of_model import rotor_inertias
 
 if TYPE_CHECKING:
     from robots.regressor import TorqueModel
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, kw_only=True)

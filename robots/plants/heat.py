@@ -7,8 +7,8 @@ from dataclasses import dataclass, field
 from typing import Any, Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
+from robots.common.arrays import Array
 from robots.common.errors import InputError
 from robots.regressor import TorqueModel
 from robots.robot import Robot
@@ -16,7 +16,6 @@ from robots.signals import Motion
 from robots.thermal import ThermalModel, build_thermal_model, known_thermal
 from robots.thermal.motion import PAUSE_STEPS
 
-Array = NDArray[np.float64]
 Thermometers = Literal["none", "ambient", "all"]
 
 

@@ -8,8 +8,8 @@ from difflib import get_close_matches
 from typing import Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
+from robots.common.arrays import Array
 from robots.common.errors import InputError
 from robots.plants.effects import PlantEffect
 from robots.plants.heat import PlantHeat, Warmth, heat_piece, reference_friction
@@ -19,8 +19,6 @@ from robots.robot import Robot
 from robots.signals import Log, Motion
 from robots.terms.effect_bases.gear_load import ExtraGearLoad, LoadSource
 from robots.terms.effects import Situation, situation
-
-Array = NDArray[np.float64]
 
 
 class Beyond(Protocol):

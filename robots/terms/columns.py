@@ -5,9 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from robots.common.arrays import Array
 
 
 def side_by_side(columns: Iterable[Array]) -> Array:

@@ -8,16 +8,15 @@ from dataclasses import dataclass
 from typing import Any, ClassVar
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from scipy.linalg import expm
 
+from robots.common.arrays import Array
 from robots.common.errors import InputError
 from robots.common.parallel import one_blas_thread
 from robots.common.records import Record
 from robots.thermal.checks import checked_ambient, checked_power, checked_steps
 from robots.thermal.parameters import Inputs, ThermalParameter
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, kw_only=True)

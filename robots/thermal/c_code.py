@@ -5,12 +5,10 @@ from __future__ import annotations
 import re
 
 import numpy as np
-from numpy.typing import NDArray
 
+from robots.common.arrays import Array
 from robots.common.errors import InputError
 from robots.thermal.online import OnlineFriction
-
-Array = NDArray[np.float64]
 
 
 def generate_c(online: OnlineFriction, *, name: str = "joint") -> str:

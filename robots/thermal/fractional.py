@@ -10,15 +10,14 @@ from typing import Any, ClassVar, NamedTuple
 
 import casadi
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from robots.common.arrays import Array
 from robots.common.errors import InputError
 from robots.thermal.base import ThermalModel
 from robots.thermal.checks import checked_power, checked_steps
 from robots.thermal.mittag_leffler import mittag_leffler
 from robots.thermal.parameters import ALPHA, BETA, Inputs, ThermalParameter, capacity, exchange
-
-Array = NDArray[np.float64]
 
 
 class _Grid(NamedTuple):

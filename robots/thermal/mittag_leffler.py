@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from scipy.special import expit
 
+from robots.common.arrays import Array
 from robots.common.errors import InputError
-
-Array = NDArray[np.float64]
 
 
 def mittag_leffler(x: ArrayLike, order: float) -> Array:

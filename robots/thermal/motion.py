@@ -5,12 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from robots.common.arrays import Array
 from robots.common.errors import InputError
 from robots.thermal.base import ThermalModel
-
-Array = NDArray[np.float64]
 
 # A step of so many median steps is a pause between logs, in which the joint rests.
 PAUSE_STEPS = 20.0

@@ -15,8 +15,8 @@ from typing import Any
 import pytest
 
 from robots.common import errors
+from robots.common.arrays import Array
 from robots.common.errors import InputError
-from robots.signals import FloatArray
 
 PACKAGES = ("robots", "estimation", "oed")
 PARTS = (
@@ -214,7 +214,7 @@ def test_methods_have_a_source(name):
     assert re.search(source, doc, re.MULTILINE)
 
 
-def incomplete(q: FloatArray, weights: FloatArray, speed: float) -> FloatArray:  # noqa: D417
+def incomplete(q: Array, weights: Array, speed: float) -> Array:  # noqa: D417
     """Weighs.
 
     Args:

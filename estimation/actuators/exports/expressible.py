@@ -5,11 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from estimation.actuators.result import Actuators
-
-Array = NDArray[np.float64]
+from robots.common.arrays import Array
 
 UNLIMITED = 1e5
 """Torque limits [N m] from which on there is none."""

@@ -8,10 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from robots.common.arrays import Array
 from robots.geometry_errors.measurements import Markers
 from robots.geometry_errors.model import GeometryModel, Prediction
-
-Array = NDArray[np.float64]
 
 CAUSES = {
     "joint_zero": "zero",

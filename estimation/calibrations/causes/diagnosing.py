@@ -14,14 +14,13 @@ from estimation.calibrations.causes.findings import CauseFinding
 from estimation.calibrations.fit import GeometryFit, scaled_rows
 from estimation.calibrations.weighting import Weights
 from estimation.uncertainty.quantiles import student_95
+from robots.common.arrays import Array
 from robots.common.records import Record
 from robots.geometry_errors.model import GeometryModel, Prediction
 from robots.geometry_errors.poses import MeasuredPoses
 from robots.geometry_errors.terms import TERMS
 from robots.geometry_errors.terms.base import shown_unit
 from robots.robot import Robot
-
-Array = NDArray[np.float64]
 
 ALPHA = 0.001
 """Probability that a robot without errors has a cause named."""

@@ -8,12 +8,12 @@ from xml.etree import ElementTree
 
 import numpy as np
 import yaml
-from numpy.typing import NDArray
 
 from estimation.calibrations.result import Calibration
 from estimation.exports.mjcf.contents import Contents
 from estimation.exports.mjcf.new_model import new_model
 from estimation.exports.urdf import inertial_element, joint_element, numbers, roll_pitch_yaw
+from robots.common.arrays import Array
 from robots.common.config import read_config
 from robots.description import RobotDescription, Same
 from robots.geometry.chain import Joint
@@ -23,7 +23,6 @@ from robots.loading import CATALOG, catalogue
 from robots.robot import Robot
 from robots.version import VERSION
 
-Array = NDArray[np.float64]
 Element = ElementTree.Element
 
 UNKNOWN_MASS = 1e-3  # kg; a simulator needs a mass for each body that moves

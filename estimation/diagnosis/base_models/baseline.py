@@ -7,7 +7,6 @@ from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
-from numpy.typing import NDArray
 
 from estimation.diagnosis.base_models.payload_and_gravity import base_regressor, build_situation, friction_signs
 from estimation.diagnosis.recordings.directions import SHARP, sharpest_sign_velocity
@@ -25,12 +24,11 @@ from estimation.regressions.parameter_priors import (
 )
 from estimation.regressions.standard_parameters import mass_from_torque, reference_bodies
 from robots.base_parameters import BaseParameters, find_base_parameters
+from robots.common.arrays import Array
 from robots.regressor import default_model
 from robots.robot import Robot
 from robots.terms import FrictionTerm
 from robots.terms.effects import Situation
-
-Array = NDArray[np.float64]
 
 # Widths v0 [rad/s or m/s] of the Coulomb friction tanh(dq / v0) that are tried. They reach up to `WIDEST`, or for a
 # fast joint up to the share `SHARE` of its largest speed.

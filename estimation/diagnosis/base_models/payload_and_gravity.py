@@ -6,11 +6,11 @@ from dataclasses import replace
 from itertools import groupby
 
 import numpy as np
-from numpy.typing import NDArray
 
 from estimation.diagnosis.recordings.recording import Recording
 from estimation.diagnosis.recordings.thinning import decimate, evaluate_at_full_rate
 from robots.base_parameters import BaseParameters
+from robots.common.arrays import Array
 from robots.regressor import TorqueModel, default_model
 from robots.robot import Robot
 from robots.terms.effects import Situation
@@ -18,8 +18,6 @@ from robots.terms.situations.flange_body import with_body
 from robots.terms.situations.joining import join_situations
 from robots.terms.situations.of_model import sign_of, velocity_scale
 from robots.terms.situations.situation import Finer, situation, with_finer
-
-Array = NDArray[np.float64]
 
 
 def subtract_known_payload(robot: Robot, recording: Recording) -> Recording:

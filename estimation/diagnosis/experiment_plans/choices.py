@@ -5,14 +5,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
-import numpy as np
-from numpy.typing import NDArray
-
 from estimation.diagnosis.experiment_plans.experiment_grams import Grams
 from estimation.diagnosis.experiment_plans.experiment_motions import MAKERS, MotionRange, Stage
+from robots.common.arrays import Array
 from robots.terms.effects import EXPERIMENTS
-
-Array = NDArray[np.float64]
 
 ENOUGH = 0.99
 """Probability from which the simplest experiment is chosen. Models of causes hold to some per cent, and the probability

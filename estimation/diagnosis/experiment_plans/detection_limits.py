@@ -6,7 +6,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
 
 from estimation.diagnosis.hypothesis_tests.hypotheses import Hypothesis, all_hypotheses
 from estimation.diagnosis.hypothesis_tests.joint_agreement import per_joint_evidence
@@ -20,13 +19,12 @@ from estimation.diagnosis.hypothesis_tests.power import (
 from estimation.diagnosis.hypothesis_tests.problem import Group, Problem
 from estimation.diagnosis.hypothesis_tests.scan import Entry
 from estimation.diagnosis.hypothesis_tests.scoring import accept, visible_root
+from robots.common.arrays import Array
 from robots.common.forks import forked
 from robots.common.records import Record, read_null_as
 from robots.terms.base import force_unit, length_unit
 from robots.terms.effect_bases.capabilities import AtReversals, Persistence
 from robots.terms.effects import EFFECTS
-
-Array = NDArray[np.float64]
 
 HIDDEN = "not detectable at any size: the base model absorbs it in this motion"
 UNSURE = "not detectable at any size: it acts only at rest or near reversals, where the friction sign is unknown"

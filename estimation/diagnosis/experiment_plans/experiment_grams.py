@@ -9,7 +9,6 @@ from itertools import product
 from typing import Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
 from estimation.diagnosis.base_models.payload_and_gravity import base_regressor
 from estimation.diagnosis.experiment_plans.experiment_motions import Stage
@@ -20,6 +19,7 @@ from estimation.diagnosis.noise_models.masked_rows import no_masked_rows
 from estimation.diagnosis.noise_models.whitening import Whitening
 from estimation.linear_algebra.scaled import inverse_root
 from robots.base_parameters import find_base_parameters
+from robots.common.arrays import Array
 from robots.regressor import TorqueModel
 from robots.signals import Motion
 from robots.terms.effect_bases.heat import HeatEffect
@@ -28,8 +28,6 @@ from robots.terms.effects.base_tilt import level_axes
 from robots.terms.situations.flange_body import point_mass, with_body
 from robots.terms.situations.joining import join_situations
 from robots.terms.situations.situation import Situation
-
-Array = NDArray[np.float64]
 
 SOON, LATER = 2.0, 3600.0
 """Times from the logs to the experiment [s]: the robot is still warm, or has cooled. Which one holds is not known."""

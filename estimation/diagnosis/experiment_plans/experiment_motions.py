@@ -12,11 +12,10 @@ from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 
 from estimation.diagnosis.recordings.recording import Recording
+from robots.common.arrays import Array
 from robots.robot import Robot
 from robots.signals import Motion
 from robots.terms.effects.base_tilt import level_axes
-
-Array = NDArray[np.float64]
 
 REFERENCE = 40.0
 """Longest part of a logged motion that experiments repeat [s]."""

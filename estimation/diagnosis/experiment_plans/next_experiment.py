@@ -12,7 +12,6 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from estimation.diagnosis.experiment_plans.choices import (
     ENOUGH,
@@ -31,13 +30,12 @@ from estimation.diagnosis.experiment_plans.experiment_grams import ARM, Cause, G
 from estimation.diagnosis.experiment_plans.experiment_motions import MADE, MAKERS, VARIED, Stage, motion_range
 from estimation.diagnosis.hypothesis_tests.hypotheses import Hypothesis
 from estimation.diagnosis.hypothesis_tests.problem import Problem
+from robots.common.arrays import Array
 from robots.common.forks import forked
 from robots.common.records import Record
 from robots.robot import Robot
 from robots.signals import Motion
 from robots.terms.effects import EXPERIMENTS
-
-Array = NDArray[np.float64]
 
 VARIANTS = 4
 """Number of motions tried for the best kind."""

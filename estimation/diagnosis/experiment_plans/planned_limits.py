@@ -21,13 +21,12 @@ from estimation.diagnosis.recordings.directions import SHARP, SURELY, sharpest_s
 from estimation.diagnosis.recordings.recording import Recording
 from estimation.regressions.parameter_priors import GaussianPrior
 from robots.base_parameters import find_base_parameters
+from robots.common.arrays import Array
 from robots.common.errors import InputError
 from robots.plants.sensors import Sensors
 from robots.regressor import TorqueModel
 from robots.signals import Motion
 from robots.terms.effects import EFFECTS
-
-Array = NDArray[np.float64]
 
 ORDER = 12
 """Order of the prediction filter. A sum of white and first-order noise has no exact finite one."""

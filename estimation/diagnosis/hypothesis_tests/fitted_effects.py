@@ -14,9 +14,8 @@ from estimation.diagnosis.calibration import CLOSE_RIVAL_BIC, RARE_ODDS
 from estimation.diagnosis.hypothesis_tests.hypotheses import Hypothesis
 from estimation.diagnosis.hypothesis_tests.problem import Group, Problem
 from estimation.diagnosis.hypothesis_tests.scoring import Accepted, accept
+from robots.common.arrays import Array
 from robots.terms.effect_bases.capabilities import Persistence
-
-Array = NDArray[np.float64]
 
 # An effect acts where its torque exceeds this share of its maximum.
 ACTS = 0.02

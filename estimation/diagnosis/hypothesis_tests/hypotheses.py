@@ -6,13 +6,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from estimation.diagnosis.noise_models.whitening import acting
+from robots.common.arrays import Array
 from robots.robot import Robot
 from robots.terms.effects import Effect, JointEffect, Situation
-
-Array = NDArray[np.float64]
 
 LARGEST = 1e15
 """Largest value of a column, in its unit: more is a response that diverges."""

@@ -11,8 +11,7 @@ from estimation.diagnosis.calibration import OTHER_FORMULA_ERROR, SHARED_FORMULA
 from estimation.diagnosis.hypothesis_tests.hypotheses import Hypothesis
 from estimation.diagnosis.hypothesis_tests.problem import Problem
 from estimation.diagnosis.hypothesis_tests.scoring import Accepted, score
-
-Array = NDArray[np.float64]
+from robots.common.arrays import Array
 
 
 @dataclass(frozen=True, eq=False)

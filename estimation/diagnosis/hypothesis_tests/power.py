@@ -5,14 +5,12 @@ from __future__ import annotations
 from functools import lru_cache
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import brentq
 from scipy.stats import ncx2, norm
 
 from estimation.diagnosis.calibration import CLOSE_RIVAL_BIC, POWER
 from estimation.uncertainty.quantiles import chi2_limit, normal_quantile
-
-Array = NDArray[np.float64]
+from robots.common.arrays import Array
 
 DIRECTIONS = 32
 """Number of coefficient directions at which an effect with several columns is judged."""

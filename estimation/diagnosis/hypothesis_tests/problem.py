@@ -18,12 +18,12 @@ from estimation.diagnosis.recordings.recording import Recording
 from estimation.diagnosis.reversals.reversal_timing import ReversalTiming
 from estimation.linear_algebra.orthonormal import orthonormal
 from estimation.regressions.parameter_priors import GaussianPrior, inflate_conflicting_prior
+from robots.common.arrays import Array
 from robots.terms.effect_bases.capabilities import AboveBand, AtReversals, Reading
 from robots.terms.effect_bases.gear_load import ExtraGearLoad, with_gear_load
 from robots.terms.effects import Effect, Situation
 from robots.terms.situations.flange_body import with_body
 
-Array = NDArray[np.float64]
 Small = NDArray[np.float32]
 
 ROUNDED = 1e-5  # share of a column's energy below which its unmasked part is only rounding

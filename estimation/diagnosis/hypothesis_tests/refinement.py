@@ -7,7 +7,6 @@ from dataclasses import replace
 from functools import cache
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import minimize
 
 from estimation.diagnosis.calibration import ABSENT_CHI2, MAX_REVERSAL_CHI2, REVERSAL_FORMULA_ERROR
@@ -16,9 +15,8 @@ from estimation.diagnosis.hypothesis_tests.hypotheses import Hypothesis
 from estimation.diagnosis.hypothesis_tests.joint_agreement import per_joint_evidence
 from estimation.diagnosis.hypothesis_tests.problem import Problem
 from estimation.diagnosis.hypothesis_tests.scoring import Accepted, score
+from robots.common.arrays import Array
 from robots.terms.effect_bases.capabilities import AtReversals, Reading
-
-Array = NDArray[np.float64]
 
 # Evaluations per shape parameter.
 EFFORT = 20

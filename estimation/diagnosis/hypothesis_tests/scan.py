@@ -10,16 +10,14 @@ from functools import cached_property, partial
 from typing import TypeVar
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.special import gammaincc
 
 from estimation.diagnosis.hypothesis_tests.hypotheses import Hypothesis
 from estimation.diagnosis.hypothesis_tests.problem import Group, Problem
 from estimation.diagnosis.hypothesis_tests.scoring import Accepted, score
 from estimation.diagnosis.noise_models.whitening import acting
+from robots.common.arrays import Array
 from robots.common.forks import forked
-
-Array = NDArray[np.float64]
 
 # Longer grids are not scanned completely: the effect proposes points. The p-value still counts the whole grid.
 LONG = 60

@@ -15,6 +15,7 @@ from estimation.diagnosis.hypothesis_tests.hypotheses import Hypothesis
 from estimation.diagnosis.hypothesis_tests.problem import Problem
 from estimation.diagnosis.hypothesis_tests.refinement import refine
 from estimation.diagnosis.hypothesis_tests.scoring import Accepted, accept
+from robots.common.arrays import Array
 from robots.common.parallel import threaded
 from robots.terms.effect_bases.capabilities import Persistence
 
@@ -77,7 +78,6 @@ def _open(problem: Problem, member: FittedEffect, beside: Accepted) -> set[int]:
     return {k for k, form in more if form.local_bic_gain > MIN_BIC_GAIN}
 
 
-Array = NDArray[np.float64]
 Small = NDArray[np.float32]
 
 # Spacing of the window edges [s] in the coarse and the fine search, and their reach beyond the known window [s].

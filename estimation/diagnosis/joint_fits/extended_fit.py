@@ -26,9 +26,8 @@ from estimation.models.model import Model
 from estimation.regressions.moments import Moments
 from estimation.uncertainty.blocks import widened_by_blocks
 from estimation.uncertainty.quantiles import NORMAL_95
+from robots.common.arrays import Array
 from robots.terms.effect_bases.capabilities import AboveBand, AtReversals
-
-Array = NDArray[np.float64]
 
 FAINT = 1e-7  # directions with less than FAINT**1.5 of the largest eigenvalue are not determined
 # A column with a smaller norm counts as zero, because its inverse square would overflow.

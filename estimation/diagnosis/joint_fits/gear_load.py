@@ -6,7 +6,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from estimation.diagnosis.calibration import MIN_BIC_GAIN
 from estimation.diagnosis.hypothesis_tests.fitted_effects import FittedEffect, set_bic_gain
@@ -14,11 +13,10 @@ from estimation.diagnosis.hypothesis_tests.hypotheses import Hypothesis
 from estimation.diagnosis.hypothesis_tests.problem import Problem
 from estimation.diagnosis.hypothesis_tests.refinement import refine
 from estimation.diagnosis.hypothesis_tests.scoring import accept
+from robots.common.arrays import Array
 from robots.terms.effect_bases.capabilities import GearLoad
 from robots.terms.effect_bases.gear_load import ExtraGearLoad, LoadPath, LoadSource
 from robots.terms.effects import EFFECTS
-
-Array = NDArray[np.float64]
 
 # Share of a gear's own load from which another load counts.
 MIN_GEAR_LOAD = 0.01

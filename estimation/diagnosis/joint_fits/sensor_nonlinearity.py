@@ -6,16 +6,14 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from estimation.diagnosis.hypothesis_tests.fitted_effects import FittedEffect, accept_all_but
 from estimation.diagnosis.hypothesis_tests.problem import Problem
 from estimation.diagnosis.hypothesis_tests.refinement import clip_shape, refine
 from estimation.diagnosis.joint_fits.total_torque import JointFit
+from robots.common.arrays import Array
 from robots.terms.effect_bases.capabilities import Reading
 from robots.terms.effect_bases.static import StaticJointEffect
-
-Array = NDArray[np.float64]
 
 STEPS, HALVINGS = 20, 6
 """Gauss-Newton iterations, and step halvings in each of them."""

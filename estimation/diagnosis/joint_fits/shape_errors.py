@@ -7,7 +7,6 @@ from dataclasses import replace
 from functools import partial
 
 import numpy as np
-from numpy.typing import NDArray
 
 from estimation.diagnosis.calibration import MIN_BIC_GAIN
 from estimation.diagnosis.hypothesis_tests.fitted_effects import FittedEffect
@@ -15,10 +14,9 @@ from estimation.diagnosis.hypothesis_tests.problem import Problem
 from estimation.diagnosis.hypothesis_tests.refinement import climb
 from estimation.diagnosis.hypothesis_tests.scoring import Accepted, score
 from estimation.uncertainty.quantiles import CHI2_95, NORMAL_95
+from robots.common.arrays import Array
 from robots.common.stretches import spans
 from robots.terms.effect_bases.capabilities import Reading
-
-Array = NDArray[np.float64]
 
 # Drop of the explained chi-square to which a profile is followed.
 DROP = 2.0

@@ -5,15 +5,13 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import minimize_scalar
 
 from estimation.diagnosis.hypothesis_tests.fitted_effects import FittedEffect, accept_all_but
 from estimation.diagnosis.hypothesis_tests.problem import Problem
 from estimation.diagnosis.hypothesis_tests.scoring import Score, score
 from estimation.regressions.parameter_priors import GaussianPrior
-
-Array = NDArray[np.float64]
+from robots.common.arrays import Array
 
 # Logarithms of the prior energies that are tried, in units of the noise variance.
 ENERGIES = np.linspace(-2.0, 25.0, 109)

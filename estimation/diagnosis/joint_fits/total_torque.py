@@ -6,7 +6,6 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from estimation.diagnosis.base_models.payload_and_gravity import build_situation
 from estimation.diagnosis.hypothesis_tests.fitted_effects import FittedEffect
@@ -16,12 +15,10 @@ from estimation.diagnosis.joint_fits.extended_fit import reversal_columns
 from estimation.diagnosis.noise_models.noise_nuisance_basis import is_short
 from estimation.diagnosis.recordings.recording import Recording
 from estimation.regressions.moments import Moments
+from robots.common.arrays import Array, Flags
 from robots.terms.effect_bases.capabilities import AtReversals, Reading
 from robots.terms.effect_bases.gear_load import with_gear_load
 from robots.terms.effects import Situation
-
-Array = NDArray[np.float64]
-Flags = NDArray[np.bool_]
 
 ROUNDS = 4
 """Gauss-Newton iterations of the total torque."""

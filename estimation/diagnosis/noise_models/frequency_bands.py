@@ -14,8 +14,8 @@ from scipy.signal import firwin, welch
 
 from estimation.diagnosis.calibration import MAX_BIAS_CHI2, MAX_MOTION_ERROR
 from estimation.diagnosis.recordings.recording import Recording
+from robots.common.arrays import Array
 
-Array = NDArray[np.float64]
 Small = NDArray[np.float32]
 
 # Length of the windows of spectra [s], and the fewest rows of one. Power densities below `QUIETEST` are zero.

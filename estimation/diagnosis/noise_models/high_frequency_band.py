@@ -19,8 +19,7 @@ from estimation.diagnosis.noise_models.noise_spectrum import remove_lines
 from estimation.diagnosis.noise_models.whitening import Whitening
 from estimation.diagnosis.recordings.recording import Recording, rest_rows
 from estimation.linear_algebra.orthonormal import orthonormal
-
-Array = NDArray[np.float64]
+from robots.common.arrays import Array
 
 # Time [s] over which the noise level is averaged to find bursts.
 BURST = 0.4

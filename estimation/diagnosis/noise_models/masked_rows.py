@@ -10,9 +10,8 @@ from numpy.typing import NDArray
 from scipy.ndimage import binary_dilation
 
 from estimation.linear_algebra.free_torque import FreeTorque, Real
+from robots.common.arrays import Array
 from robots.common.stretches import spans
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)

@@ -32,8 +32,7 @@ from estimation.diagnosis.noise_models.noise_spectrum import (
 from estimation.diagnosis.noise_models.whitening import Whitening, free_columns
 from estimation.diagnosis.recordings.recording import Recording, rest_rows
 from estimation.uncertainty.quantiles import NORMAL_MEDIAN, robust_deviation
-
-Array = NDArray[np.float64]
+from robots.common.arrays import Array
 
 # Standard deviations at which innovations are clipped; t-distributed noise of five degrees of freedom rarely exceeds
 # them.

@@ -13,8 +13,7 @@ from estimation.diagnosis.noise_models.frequency_bands import Band
 from estimation.diagnosis.recordings.recording import Recording
 from estimation.linear_algebra.orthonormal import orthonormal
 from estimation.linear_algebra.scaled import inverse_root
-
-Array = NDArray[np.float64]
+from robots.common.arrays import Array
 
 # Numbers of knots: over the range of position, and over time for friction. Knots of speed, as shares of the largest.
 POSITIONS, TIMES = 8, 5

@@ -6,15 +6,13 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.fft import next_fast_len
 from scipy.ndimage import median_filter
 
 from estimation.diagnosis.calibration import LINE_FALSE_ALARM
 from estimation.diagnosis.noise_models.noise_nuisance_basis import NuisanceProjection
 from estimation.uncertainty.autoregressive import HIGHEST_NOISE_ORDER, Noise, fit_noise, levinson
-
-Array = NDArray[np.float64]
+from robots.common.arrays import Array
 
 # Share of the variance added to the diagonal: otherwise whitening would amplify an empty band.
 LOADING = 0.01

@@ -15,9 +15,9 @@ from estimation.diagnosis.noise_models.masked_rows import MaskedRows
 from estimation.linear_algebra.free_torque import FreeTorque, Real, span_of
 from estimation.regressions.moments import Moments
 from estimation.uncertainty.autoregressive import taps
+from robots.common.arrays import Array
 from robots.common.stretches import spans
 
-Array = NDArray[np.float64]
 Small = NDArray[np.float32]
 
 # Approximate number of rows that are checked first for a column that is not zero.

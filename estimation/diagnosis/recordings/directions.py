@@ -10,10 +10,8 @@ from scipy.ndimage import maximum_filter1d
 
 from estimation.diagnosis.calibration import CREEP_SPEED, CREEP_TIME, MIN_SHARP_SPEED_SIGMAS, MIN_SPEED_SIGMAS
 from estimation.regressions.preparation import SIGN_SPEED_SHARE
+from robots.common.arrays import Array, Flags
 from robots.common.stretches import spans
-
-Array = NDArray[np.float64]
-Flags = NDArray[np.bool_]
 
 # Width v0 [rad/s or m/s] of the sharpest friction sign that is tried; for a slow joint, as a share of its largest
 # speed. Rows slower than `SURELY` times that do not count: at a sudden reversal the model's friction is not defined

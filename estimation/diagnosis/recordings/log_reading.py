@@ -18,12 +18,11 @@ from estimation.diagnosis.recordings.thinning import decimate_recording, keep_cl
 from estimation.preprocessing import Cycle
 from estimation.recordings.rows.columns import lattice_step
 from estimation.regressions.preparation import Prepared, prepare, still_joints
+from robots.common.arrays import Array
 from robots.common.errors import InputError
 from robots.common.forks import forked
 from robots.robot import Robot
 from robots.signals import Log
-
-Array = NDArray[np.float64]
 
 # Rows beyond which logs are low-passed and decimated by an integer: more rows only cost time.
 MOST_ROWS = 20_000

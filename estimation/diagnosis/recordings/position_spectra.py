@@ -6,18 +6,16 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.signal import welch
 
 from estimation.diagnosis.recordings.smoothed_motion import low_pass_gain, smooth_motion
 from estimation.linear_algebra.orthonormal import orthonormal
 from estimation.preprocessing import Resampled, between_rows
 from estimation.regressions.preparation import Prepared
+from robots.common.arrays import Array
 from robots.regressor import default_model
 from robots.robot import Robot
 from robots.terms.situations.flange_body import with_body
-
-Array = NDArray[np.float64]
 
 # Power over the encoder noise from which a frequency counts as motion.
 STANDS_OUT = 3.0

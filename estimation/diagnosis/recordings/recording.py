@@ -13,9 +13,8 @@ from scipy.ndimage import maximum_filter1d
 
 from estimation.diagnosis.calibration import REST_TIME, REVERSAL_MARGIN
 from estimation.preprocessing import Cycle
+from robots.common.arrays import Array
 from robots.common.stretches import spans
-
-Array = NDArray[np.float64]
 
 PER_ROW = (
     "t",

@@ -14,9 +14,8 @@ from scipy.special import binom
 
 from estimation.preprocessing import Cycle
 from estimation.preprocessing.smoothing import butterworth, differentiate
+from robots.common.arrays import Array
 from robots.common.stretches import spans
-
-Array = NDArray[np.float64]
 
 ORDER = 8
 # The position before a log begins is unknown, and a filter's guess of it rings for about ten periods of the cut-off.

@@ -8,16 +8,13 @@ from functools import lru_cache
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.ndimage import maximum_filter1d
 from scipy.signal import firwin, upfirdn
 
 from estimation.diagnosis.recordings.recording import Recording
 from estimation.preprocessing import Cycle
+from robots.common.arrays import Array, Flags
 from robots.common.stretches import spans
-
-Array = NDArray[np.float64]
-Flags = NDArray[np.bool_]
 
 # Half-length of the low-pass before decimation, in rows after decimation: unknown torque in some rows must not ring far
 # beyond them. `WINDOW` is the parameter beta of its Kaiser window, which attenuates aliases to about a hundredth.

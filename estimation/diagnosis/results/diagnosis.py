@@ -7,7 +7,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
 from estimation.diagnosis.experiment_plans.detection_limits import Limit, summarise_limits
 from estimation.diagnosis.experiment_plans.next_experiment import NextExperiment
@@ -24,6 +23,7 @@ from estimation.diagnosis.results.standing import standing_of, standing_text, st
 from estimation.diagnosis.simulations.simulation_result import Simulation
 from estimation.diagnosis.validations.extended_model import all_row_errors
 from estimation.models.model import Model, load_model
+from robots.common.arrays import Array
 from robots.common.records import Finding as Remark
 from robots.common.records import Result, axes_for, effect_code, findings_of, read, read_json
 from robots.terms.base import length_unit
@@ -32,7 +32,6 @@ if TYPE_CHECKING:
     import pandas as pd
     from matplotlib.axes import Axes
 
-Array = NDArray[np.float64]
 
 DIAGNOSIS, MODEL = "diagnosis.json", "model.json"
 Verdict = Literal["none", "named", "ambiguous", "unexplained"]

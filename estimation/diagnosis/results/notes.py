@@ -22,12 +22,11 @@ from estimation.diagnosis.hypothesis_tests.problem import Problem
 from estimation.diagnosis.recordings.recording import cut_recording
 from estimation.diagnosis.validations.held_out_errors import HeldOutResult
 from estimation.diagnosis.validations.validated_findings import Change, ChangedFinding
+from robots.common.arrays import Array
 from robots.terms.base import force_unit
 from robots.terms.discrepancies.patterns import PREFIX
 from robots.terms.effects import EFFECTS
 from robots.terms.effects.current_clipping import FLAT_TOP_CHANCE, CurrentClipping
-
-Array = NDArray[np.float64]
 
 # Findings for which positions outside the fitted range are reported.
 PLACED = ("spring", "unexplained")

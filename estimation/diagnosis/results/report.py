@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from estimation.diagnosis.base_models.prepared_logs import PreparedLogs
 from estimation.diagnosis.calibration import CLOSE_RIVAL_BIC
@@ -33,9 +32,8 @@ from estimation.diagnosis.validations.gear_compliance import MeasuredCompliance
 from estimation.diagnosis.validations.name_comparison import ComparedNames
 from estimation.diagnosis.validations.residual_shares import residual_shares
 from estimation.diagnosis.validations.validated_findings import Decision, Reason, ValidatedFindings
+from robots.common.arrays import Array
 from robots.robot import Robot
-
-Array = NDArray[np.float64]
 
 SHOWN = 4000  # approximate number of rows of the curves kept for plots
 

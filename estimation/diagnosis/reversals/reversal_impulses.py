@@ -16,8 +16,7 @@ from estimation.diagnosis.recordings.recording import Recording
 from estimation.diagnosis.recordings.smoothed_motion import low_pass_gain
 from estimation.preprocessing import Cycle
 from robots.base_parameters import BaseParameters
-
-Array = NDArray[np.float64]
+from robots.common.arrays import Array
 
 # Fewest reversals for an average, and least acceleration of one over their median: slow reversals have no sharp pulse.
 FEWEST, SLOWEST = 12, 0.2

@@ -6,7 +6,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from estimation.diagnosis.base_models.baseline import Baseline
 from estimation.diagnosis.base_models.payload_and_gravity import base_torque
@@ -20,9 +19,8 @@ from estimation.diagnosis.reversals.reversal_impulses import (
     impulse_columns,
     shift_reversals,
 )
+from robots.common.arrays import Array
 from robots.common.forks import forked
-
-Array = NDArray[np.float64]
 
 ROUNDS = 3
 # Fewest distinct reversals for an estimate of their scatter.

@@ -6,7 +6,6 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.ndimage import maximum_filter1d
 from scipy.signal import correlate
 
@@ -15,6 +14,7 @@ from estimation.diagnosis.hypothesis_tests.fitted_effects import FittedEffect
 from estimation.diagnosis.hypothesis_tests.joint_agreement import per_joint_evidence
 from estimation.diagnosis.hypothesis_tests.problem import Group, Problem
 from estimation.diagnosis.hypothesis_tests.scoring import Accepted, accept, score
+from robots.common.arrays import Array
 
 # p-value over the false-alarm threshold below which an effect is certain, on joints without other effects.
 SURE = 0.2
@@ -125,8 +125,6 @@ def _joints_agree(problem: Problem, candidate: FittedEffect, members: Sequence[F
         evidence.gain(surely=True) - candidate.degrees * float(np.log(problem.rows * len(evidence.gram))) > MIN_BIC_GAIN
     )
 
-
-Array = NDArray[np.float64]
 
 # Number of positions between two white rows at which a shock is searched.
 BETWEEN = 9

@@ -18,10 +18,9 @@ from estimation.diagnosis.noise_models.noise_nuisance_basis import is_short
 from estimation.diagnosis.noise_models.whitening import Whitening
 from estimation.diagnosis.recordings.recording import Recording
 from estimation.diagnosis.recordings.thinning import shift_motion
+from robots.common.arrays import Array
 from robots.terms.effect_bases.capabilities import AtReversals
 from robots.terms.effect_bases.gear_load import with_gear_load
-
-Array = NDArray[np.float64]
 
 # Change of the log of the noise from which the search is repeated.
 MIN_NOISE_CHANGE = 0.03

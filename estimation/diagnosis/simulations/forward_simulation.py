@@ -6,7 +6,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.signal import butter, sosfiltfilt
 
 from estimation.diagnosis.base_models.payload_and_gravity import build_situation
@@ -17,6 +16,7 @@ from estimation.diagnosis.simulations.simulation_result import Curves, Simulatio
 from estimation.diagnosis.validations.gain_intervals import model_columns
 from estimation.diagnosis.validations.held_out_errors import HeldOutResult, found_in_one_log_only, split_runs
 from estimation.regressions.moments import Moments
+from robots.common.arrays import Array
 from robots.plants.closed_loop import Driven, Loop, Reference, Tangent, drive
 from robots.regressor import TorqueModel
 from robots.terms.discrepancies.patterns import PREFIX
@@ -26,8 +26,6 @@ from robots.terms.effect_bases.static import StaticJointEffect
 from robots.terms.situations.flange_body import with_body
 from robots.terms.situations.of_model import sign_of
 from robots.terms.situations.situation import Situation
-
-Array = NDArray[np.float64]
 
 # Cut-off of the simulated deviation on which effects depend, over the loop's bandwidth. Above it the deviation is noise
 # of the driving torque, and its derivatives would disturb the effects.

@@ -6,12 +6,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
 
+from robots.common.arrays import Array
 from robots.common.records import Record
 from robots.plants.closed_loop import Loop
-
-Array = NDArray[np.float64]
 
 # Ratio of controller corrections with and without findings above which the summary reports a deterioration.
 WORSE = 1.05

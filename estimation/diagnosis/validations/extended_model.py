@@ -6,7 +6,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from estimation.diagnosis.base_models.baseline import SCALES
 from estimation.diagnosis.base_models.prepared_logs import PreparedLogs
@@ -23,6 +22,7 @@ from estimation.models.model import Model
 from estimation.predictions.prediction import Prediction, predict
 from estimation.regressions.preparation import torque_of
 from estimation.uncertainty.quantiles import band_of
+from robots.common.arrays import Array
 from robots.common.plain import all_finite, number
 from robots.signals import Log
 from robots.terms import FrictionTerm
@@ -99,8 +99,6 @@ def _provenance(problem: Problem, prepared: PreparedLogs, false_alarm: float, se
         "gravities": [list(gravity) for gravity in problem.baseline.base.gravities],
     }
 
-
-Array = NDArray[np.float64]
 
 # Length [s] of the stretch, in the middle of the longest log, on which settings are chosen; number of cut-offs tried.
 STRETCH, POINTS = 30.0, 5

@@ -19,9 +19,8 @@ from estimation.regressions.parameter_priors import GaussianPrior
 from estimation.uncertainty.blocks import moving_block_sums
 from estimation.uncertainty.correlations import correlation_rows
 from estimation.uncertainty.quantiles import CHI2_95, TAIL_95
+from robots.common.arrays import Array
 from robots.common.plain import several
-
-Array = NDArray[np.float64]
 
 PARTS = 5  # stretches into which a log is split
 RESAMPLES = 500  # bootstrap samples of an interval

@@ -17,14 +17,13 @@ from estimation.models.extension import Extension
 from estimation.uncertainty.blocks import block_numbers, jackknife_errors
 from estimation.uncertainty.correlations import effective_rows
 from estimation.uncertainty.quantiles import student_95
+from robots.common.arrays import Array
 from robots.signals import Log
 from robots.terms.base import force_unit, length_unit
 from robots.terms.effect_bases.parameters import DAMPING_RATIO
 from robots.terms.effect_bases.unknown_rotor import KNOWN_ROTOR
 from robots.terms.effects import EFFECTS
 from robots.terms.situations.situation import Situation
-
-Array = NDArray[np.float64]
 
 EFFECT = "joint_elasticity"
 ALIGNED = 2  # iterations of the encoder delay

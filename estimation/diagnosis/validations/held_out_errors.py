@@ -7,7 +7,6 @@ from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 
 from estimation.diagnosis.base_models.payload_and_gravity import base_regressor, subtract_known_payload
 from estimation.diagnosis.calibration import MIN_JOINT_GAIN, ONE_LOG_ENERGY
@@ -25,11 +24,10 @@ from estimation.diagnosis.validations.gain_intervals import (
     held_out_errors,
 )
 from estimation.regressions.parameter_priors import GaussianPrior
+from robots.common.arrays import Array
 from robots.robot import Robot
 from robots.signals import Log
 from robots.terms.effects import Situation
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)

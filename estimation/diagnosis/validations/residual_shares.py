@@ -3,11 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from estimation.diagnosis.hypothesis_tests.problem import Problem
-
-Array = NDArray[np.float64]
+from robots.common.arrays import Array
 
 # Number of repetitions below which a log is not split.
 FEWEST = 3

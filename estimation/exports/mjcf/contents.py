@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
 
 from estimation.exports.feasible import NEAREST, nearest_feasible
 from estimation.exports.friction import NAMED_DIFFERENCE, LinearFriction, linear_friction
@@ -14,13 +13,12 @@ from estimation.exports.standard import REMEDY, standard_and_rotors
 from estimation.exports.unstated import unstated_terms
 from estimation.models.extension import Extension
 from estimation.models.model import Model
+from robots.common.arrays import Array
 from robots.common.errors import InfeasibleError
 from robots.consistency import pseudo_inertia
 from robots.robot import Robot
 from robots.terms.effects.payload_change import carrier
 from robots.terms.situations.situation import situation
-
-Array = NDArray[np.float64]
 
 SPRING_POSITIONS = 50
 

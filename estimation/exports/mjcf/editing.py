@@ -9,11 +9,11 @@ from typing import Any, NamedTuple
 from xml.etree import ElementTree
 
 import numpy as np
-from numpy.typing import NDArray
 
 from estimation.exports.mjcf.contents import Contents
 from estimation.exports.mjcf.xml_elements import inertial, insert, no_inertial, payload_body, tendons
 from estimation.exports.remainders import remainder
+from robots.common.arrays import Array
 from robots.common.errors import InputError
 from robots.geometry.chain import homogeneous
 from robots.geometry.inertia import inertial_parameters
@@ -23,7 +23,6 @@ from robots.mujoco_models.files import compile_mjcf, mujoco_library, read_xml
 from robots.robot import Robot
 from robots.terms.situations.sensitivities import moved_body
 
-Array = NDArray[np.float64]
 Element = ElementTree.Element
 
 FRICTION_TIME_STEPS = 2.0  # time constant of dry friction in time steps, the smallest that MuJoCo accepts

@@ -6,13 +6,12 @@ from collections.abc import Iterable
 from xml.etree import ElementTree
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from estimation.exports.mjcf.couplings import Coupling
+from robots.common.arrays import Array
 from robots.geometry.inertia import symmetric
 
-Array = NDArray[np.float64]
 Element = ElementTree.Element
 
 

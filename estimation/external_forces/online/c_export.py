@@ -7,7 +7,7 @@ from pathlib import Path
 
 import casadi
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from estimation.exports.c_code import check_prefix, generated
 from estimation.external_forces.residuals.dynamics import dynamics_of
@@ -19,8 +19,6 @@ from estimation.models.model import Model
 from robots.common.errors import InputError
 from robots.common.files import write_atomic
 from robots.version import VERSION
-
-Array = NDArray[np.float64]
 
 
 def export_observer(

@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from estimation.external_forces.residuals.dynamics import Dynamics, covariance_root
 from estimation.external_forces.thresholds.error_models import ErrorModel
-
-Array = NDArray[np.float64]
+from robots.common.arrays import Array
 
 
 class StepFunction:

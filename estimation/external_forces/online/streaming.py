@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from estimation.external_forces.online.step_functions import StepErrors, StepFunction
 from estimation.external_forces.residuals.dynamics import dynamics_of
@@ -16,11 +16,10 @@ from estimation.external_forces.residuals.signals import SETTLING_CONSTANTS
 from estimation.external_forces.thresholds.calibrations import Calibration
 from estimation.external_forces.wrenches import tool_load
 from estimation.models.model import Model
+from robots.common.arrays import Array
 from robots.common.errors import InputError
 from robots.thermal import ThermalModel
 from robots.thermal.online import OnlineFriction
-
-Array = NDArray[np.float64]
 
 HEAT_STEP = 1.0
 """Time over which the friction's power is averaged [s]: short against the time constants of a joint."""

@@ -8,17 +8,16 @@ from functools import cached_property, lru_cache
 
 import casadi
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from estimation.models.model import Model
 from robots.batch import BatchFunction, batch_function, builds_expressions
 from robots.collision.kinematics import symbolic_frames
+from robots.common.arrays import Array
 from robots.common.errors import InputError
 from robots.common.stretches import chunks
 from robots.regressor import TorqueModel
 from robots.terms.situations.flange_body import require_flange, with_body
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)

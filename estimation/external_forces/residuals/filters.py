@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.signal import lfilter
 
-Array = NDArray[np.float64]
+from robots.common.arrays import Array
 
 
 def time_constant(bandwidth: float) -> float:

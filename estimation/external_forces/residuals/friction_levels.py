@@ -6,8 +6,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from estimation.external_forces.residuals.filters import filtered
-
-Array = NDArray[np.float64]
+from robots.common.arrays import Array
 
 FRICTION_MEMORY = 30.0
 """Time constant of the level [s]: joints heat up in minutes, a push lasts a fraction of a second."""

@@ -17,10 +17,9 @@ from estimation.models.model import Model
 from estimation.predictions.checked_motions import smoother_of
 from estimation.predictions.prediction import Prediction
 from estimation.preprocessing import Smoother
+from robots.common.arrays import Array
 from robots.common.errors import InputError
 from robots.signals import Log
-
-Array = NDArray[np.float64]
 
 # Time constants that a log must last.
 SHORTEST_LOG_CONSTANTS = 10.0

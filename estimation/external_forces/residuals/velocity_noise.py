@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from estimation.uncertainty.quantiles import robust_deviation
+from robots.common.arrays import Array
 from robots.signals import Log, Motion
 from robots.terms.friction import STANDING_SPEED
-
-Array = NDArray[np.float64]
 
 # The sign of the friction is open below so many standard deviations of the noise.
 NOISE_SIGMAS = 3.0

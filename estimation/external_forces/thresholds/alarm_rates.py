@@ -7,9 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from robots.common.arrays import Array
 from robots.common.errors import InputError
-
-Array = NDArray[np.float64]
 
 # Shares of the samples below the levels above which peaks count. All high ones with enough independent peaks are tried;
 # of the lower ones the first that has enough, where no high one has.

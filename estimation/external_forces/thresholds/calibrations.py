@@ -5,9 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 from pathlib import Path
 
-import numpy as np
-from numpy.typing import NDArray
-
 from estimation.external_forces.localisation import Localiser
 from estimation.external_forces.options import Velocity
 from estimation.external_forces.residuals.filters import time_constant
@@ -15,10 +12,9 @@ from estimation.external_forces.residuals.signals import SETTLING_CONSTANTS
 from estimation.external_forces.thresholds.alarm_rates import AlarmThreshold
 from estimation.external_forces.thresholds.error_models import ErrorModel
 from estimation.external_forces.thresholds.rate_checks import RateCheck
+from robots.common.arrays import Array
 from robots.common.errors import InputError
 from robots.common.records import Record, read_json
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

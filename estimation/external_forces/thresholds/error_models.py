@@ -12,10 +12,9 @@ from scipy.optimize import nnls
 from estimation.exports.friction import linear_friction
 from estimation.external_forces.residuals.velocity_noise import NOISE_SIGMAS, SLIDING
 from estimation.models.model import Model
+from robots.common.arrays import Array
 from robots.common.records import Record
 from robots.terms.friction import STANDING_SPEED
-
-Array = NDArray[np.float64]
 
 # Widths of the reversals that are compared, as shares of a joint's highest speed.
 WIDTHS = np.geomspace(1e-3, 0.3, 16)

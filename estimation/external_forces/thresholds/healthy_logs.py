@@ -21,11 +21,9 @@ from estimation.external_forces.thresholds.observations import lag_of, observe, 
 from estimation.external_forces.thresholds.rate_checks import RateCheck
 from estimation.models.model import Model
 from estimation.uncertainty.quantiles import robust_deviation
+from robots.common.arrays import Array, Flags
 from robots.common.errors import InputError
 from robots.common.stretches import joined_spans
-
-Array = NDArray[np.float64]
-Flags = NDArray[np.bool_]
 
 # Rows that stand for a longer log: for the levels of the localisation, and where a repeated motion is sought.
 MOST_HEALTHY_ROWS = 20_000

@@ -6,15 +6,13 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from estimation.external_forces.residuals.filters import filtered, time_constant
 from estimation.external_forces.residuals.friction_levels import contact_weight
 from estimation.external_forces.residuals.signals import Signals
 from estimation.external_forces.thresholds.calibrations import Calibration
 from estimation.external_forces.thresholds.error_models import ErrorModel
-
-Array = NDArray[np.float64]
+from robots.common.arrays import Array
 
 
 @dataclass(frozen=True, eq=False)

@@ -10,8 +10,6 @@ from estimation.gate.finding import Finding
 from estimation.recordings.rows.columns import Columns
 from robots.common.stretches import ends
 
-Array = NDArray[np.float64]
-
 # A torque is clipped at an extreme value if it holds it in a run of so many rows, in so many times the rows of the step
 # next to it, ...
 CLIPPED_RUN, CLIPPED_PILE = 5, 8.0

@@ -17,9 +17,8 @@ from estimation.gate.meanings.signs import sign_findings
 from estimation.gate.meanings.torques import likely_meaning, scale_of, torque_findings
 from estimation.gate.quick_fits.reading import Reading
 from estimation.gate.quick_fits.whole_fit import LIKE_A_CONSTANT
+from robots.common.arrays import Array
 from robots.common.plain import joints_in_words, percent, two_digits
-
-Array = NDArray[np.float64]
 
 
 def meanings(context: Context) -> list[Finding]:

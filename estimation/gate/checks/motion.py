@@ -12,11 +12,10 @@ from estimation.gate.context import Context
 from estimation.gate.finding import Finding
 from estimation.recordings.rows.motion import HARDLY, travel_shares
 from estimation.recordings.rows.wraps import Wraps
+from robots.common.arrays import Array
 from robots.common.plain import percent, several
 from robots.common.stretches import spans
 from robots.robot import Robot
-
-Array = NDArray[np.float64]
 
 
 def travel(context: Context) -> list[Finding]:

@@ -11,9 +11,8 @@ from estimation.gate.context import Context
 from estimation.gate.finding import Finding
 from estimation.recordings.rows.columns import Columns
 from estimation.recordings.rows.motion import beyond_limits
+from robots.common.arrays import Array
 from robots.robot import Robot
-
-Array = NDArray[np.float64]
 
 # Share of the moving joints that must be beyond their limits before another unit is considered.
 AGREE = 0.5

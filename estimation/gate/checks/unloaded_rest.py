@@ -10,10 +10,9 @@ from estimation.gate.finding import Finding
 from estimation.gate.quick_fits.fitted import Fitted
 from estimation.gate.quick_fits.joint_columns import OWN
 from estimation.gate.quick_fits.rigid_body import gravity_rows
+from robots.common.arrays import Array
 from robots.common.plain import joints_in_words, two_digits
 from robots.common.stretches import joined_spans
-
-Array = NDArray[np.float64]
 
 # Share of the fitted weight that the torque at rest has at most, and of the largest torque that this weight has at
 # least.

@@ -7,9 +7,8 @@ from numpy.typing import NDArray
 
 from estimation.gate.context import Context
 from estimation.gate.finding import Finding
+from robots.common.arrays import Array
 from robots.robot import Robot
-
-Array = NDArray[np.float64]
 
 # A column disagrees with the derivative below this correlation, ...
 LIKE = 0.9

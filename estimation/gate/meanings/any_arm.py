@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from estimation.gate.quick_fits.fitted import Fitted
 from estimation.gate.quick_fits.joint_columns import OWN
 from estimation.gate.quick_fits.joint_fit import FOLDS
 from estimation.gate.quick_fits.whole_fit import WholeFit
-
-Array = NDArray[np.float64]
+from robots.common.arrays import Array
 
 # Rows of the fit, and weight of each further joint in a product of sines and cosines: with 0.15 to 0.6 the errors on
 # measured logs are the same within a tenth.

@@ -7,14 +7,12 @@ from dataclasses import dataclass
 from itertools import combinations, permutations
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import minimize_scalar
 
 from estimation.gate.meanings.comparison import STANDARD, Comparison
 from estimation.gate.quick_fits.reading import Reading, coupled, exchanged, scaled
+from robots.common.arrays import Array
 from robots.robot import Robot
-
-Array = NDArray[np.float64]
 
 # A direction of gravity within this angle [rad] of the described one is the described one.
 SAME = 0.03

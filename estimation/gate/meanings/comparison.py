@@ -6,7 +6,6 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import minimize
 
 from estimation.gate.quick_fits.cutoff_choice import CHOICE_ROWS
@@ -16,9 +15,8 @@ from estimation.gate.quick_fits.joint_fit import Rows
 from estimation.gate.quick_fits.reading import Reading, moved, with_torques
 from estimation.gate.quick_fits.rigid_body import gravity_rows
 from estimation.gate.quick_fits.whole_fit import RIDGES, WholeFit, fit_all
+from robots.common.arrays import Array
 from robots.robot import Robot
-
-Array = NDArray[np.float64]
 
 # Rows and ridge by which most candidates are excluded before CHOICE_ROWS decide.
 FEW_ROWS, RIDGE = 300, 1e-5

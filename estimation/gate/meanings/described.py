@@ -16,8 +16,7 @@ from estimation.gate.quick_fits.joint_fit import OWN_RIDGE
 from estimation.gate.quick_fits.rigid_body import HEAVY, LINK, gravity_rows
 from estimation.linear_algebra.scaled import solve_ridge
 from estimation.regressions.parameter_priors import link_spreads
-
-Array = NDArray[np.float64]
+from robots.common.arrays import Array
 
 # Relative errors of a description that are tried, with equal weight, at each joint: of a measured model to a guess.
 # Joint torques may be described much worse. A multiple of such a description would be anything.

@@ -7,13 +7,11 @@ from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.special import logsumexp
 
 from estimation.gate.meanings.described import FACTORS, JointEvidence
 from robots.robot import Robot
 
-Array = NDArray[np.float64]
 Factor = Callable[[JointEvidence], float]
 
 # Gears of a drive that are possible where none is stated.

@@ -17,9 +17,8 @@ from estimation.gate.quick_fits.fitted import Fitted
 from estimation.gate.quick_fits.reading import Reading
 from estimation.gate.quick_fits.whole_fit import POORLY_EXPLAINED, WholeFit
 from estimation.recordings.rows.motion import HARDLY, beyond_limits, travel_shares
+from robots.common.arrays import Array
 from robots.robot import Robot
-
-Array = NDArray[np.float64]
 
 # Held-out error over the torque's standard deviation (geometric mean of the joints), below which columns and units are
 # right, and below which gravity is right as well.

@@ -7,16 +7,14 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
 from estimation.gate.quick_fits.excerpts import Excerpt, cutoffs, excerpts_of, stretch, stretches
 from estimation.gate.quick_fits.joint_fit import Rows
 from estimation.gate.quick_fits.whole_fit import fit_all
 from estimation.recordings.rows.row_flags import Cleaned
+from robots.common.arrays import Array
 from robots.robot import Robot
 from robots.signals import Log
-
-Array = NDArray[np.float64]
 
 # Rows from which the cut-off is chosen, and the fewest that are fitted.
 CHOICE_ROWS, FEWEST_ROWS = 1500, 60

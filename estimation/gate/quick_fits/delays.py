@@ -11,8 +11,7 @@ from numpy.typing import NDArray
 from estimation.gate.quick_fits.joint_fit import OWN_RIDGE, JointFit, Rows
 from estimation.linear_algebra.scaled import solve_ridge
 from estimation.uncertainty.blocks import correlated_errors
-
-Array = NDArray[np.float64]
+from robots.common.arrays import Array
 
 # Delays up to so many samples or so many seconds are tried, whichever is longer.
 SAMPLES, SECONDS = 8.0, 0.04

@@ -13,9 +13,8 @@ from scipy.interpolate import CubicSpline
 
 from estimation.preprocessing import rows_at_rest
 from estimation.preprocessing.smoothing import differentiate, low_pass
+from robots.common.arrays import Array
 from robots.signals import Log
-
-Array = NDArray[np.float64]
 
 # Most rows of a log that are used, and number of stretches to which they are distributed in a longer log.
 ROWS, STRETCHES = 24_000, 12

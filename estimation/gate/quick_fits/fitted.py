@@ -5,7 +5,6 @@ from __future__ import annotations
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
 from estimation.gate.quick_fits.cutoff_choice import CHOICE_ROWS, Smoothed
 from estimation.gate.quick_fits.delays import Delay, estimate_delays
@@ -14,8 +13,7 @@ from estimation.gate.quick_fits.joint_physics import JointPhysics, joint_physics
 from estimation.gate.quick_fits.reading import Reading, as_read
 from estimation.gate.quick_fits.whole_fit import LIKE_A_CONSTANT, fit_all
 from estimation.recordings.rows.row_flags import Cleaned
-
-Array = NDArray[np.float64]
+from robots.common.arrays import Array
 
 
 class Fitted:

@@ -8,9 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from estimation.gate.quick_fits.rigid_body import gravity_rows
+from robots.common.arrays import Array
 from robots.robot import Robot
 
-Array = NDArray[np.float64]
 Places = NDArray[np.intp]
 
 # Width of the smoothed sign(dq), over the joint's RMS speed.

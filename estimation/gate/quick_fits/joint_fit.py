@@ -16,9 +16,9 @@ from estimation.gate.quick_fits.rigid_body import joint_rows, rigid_body, used_c
 from estimation.linear_algebra.scaled import solve_ridge
 from estimation.regressions.blocks import Blocks
 from estimation.uncertainty.blocks import block_numbers, correlated_errors
+from robots.common.arrays import Array
 from robots.robot import Robot
 
-Array = NDArray[np.float64]
 Places = NDArray[np.intp]
 
 # Ridge of the fit of a single joint: its motion excites some combinations of parameters hardly.

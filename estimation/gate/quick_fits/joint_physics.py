@@ -5,14 +5,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from estimation.gate.quick_fits.joint_columns import OWN
 from estimation.gate.quick_fits.joint_fit import JointFit, Rows
 from estimation.gate.quick_fits.rigid_body import joint_rows, rigid_body, used_columns
+from robots.common.arrays import Array
 from robots.robot import Robot
-
-Array = NDArray[np.float64]
 
 # Number of poses over which the inertia is averaged.
 POSES = 64

@@ -11,9 +11,9 @@ from numpy.typing import NDArray
 from estimation.gate.quick_fits.excerpts import Excerpt
 from estimation.gate.quick_fits.joint_fit import Rows
 from estimation.gate.quick_fits.rigid_body import joint_rows, rigid_body, used_columns
+from robots.common.arrays import Array
 from robots.robot import Robot
 
-Array = NDArray[np.float64]
 Places = NDArray[np.intp]
 
 

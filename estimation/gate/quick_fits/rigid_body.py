@@ -9,11 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from robots.batch import BatchFunction, batch_function
+from robots.common.arrays import Array
 from robots.regressor import TorqueModel
 from robots.robot import Robot
 from robots.terms import RigidBody
-
-Array = NDArray[np.float64]
 
 # Parameters of a link; gravity acts on the first four, mass and first moments.
 LINK, HEAVY = 10, 4

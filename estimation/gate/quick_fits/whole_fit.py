@@ -6,11 +6,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from estimation.regressions.blocks import Blocks
-
-Array = NDArray[np.float64]
+from robots.common.arrays import Array
 
 # Candidates for the ridge, added to the diagonal of the Gram matrix of columns with unit length. Cross-validation
 # chooses.

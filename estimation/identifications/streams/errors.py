@@ -5,15 +5,13 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from estimation.identifications.assembly import Figures
 from estimation.identifications.fit import SANDWICH_ROWS, SANDWICH_STRETCHES
 from estimation.regressions.preparation import Rows
 from estimation.uncertainty.quantiles import BAND_SHARE
+from robots.common.arrays import Array
 from robots.signals import Motion
-
-Array = NDArray[np.float64]
 
 # Bins of the errors' sizes, equal steps of their logarithm: a quantile is known to 0.1 %.
 ERROR_BINS, ERROR_DECADES = 20_000, 9.0

@@ -7,17 +7,15 @@ from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 
 from estimation.identifications.streams.survey import Segment, Survey
 from estimation.logs.parquet_streams import LogStream
 from estimation.preprocessing import LowPass, smooth
 from estimation.regressions.preparation import OVERLAP_PERIODS, SMOOTHED_ROWS, TREMBLE_SHARE, Prepared, Rows, prepare
 from estimation.regressions.torque_meanings import as_joint_torque
+from robots.common.arrays import Array
 from robots.robot import Robot
 from robots.signals import Motion
-
-Array = NDArray[np.float64]
 
 
 class Pieces:

@@ -16,11 +16,10 @@ from estimation.identifications.identification import usual_speeds
 from estimation.logs.parquet_streams import PAUSE, LogStream
 from estimation.regressions.preparation import prepare
 from estimation.regressions.torque_meanings import as_joint_torque
+from robots.common.arrays import Array
 from robots.common.errors import InputError
 from robots.robot import Robot
 from robots.signals import Log
-
-Array = NDArray[np.float64]
 
 # Rows that the gate checks at a time.
 SURVEYED_ROWS = 500_000

@@ -5,14 +5,12 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 import numpy as np
-from numpy.typing import NDArray
 
 from estimation.logs.columns import refuse_text
 from estimation.logs.mappings.mapping import LogMapping
+from robots.common.arrays import Array
 from robots.common.errors import InputError
 from robots.common.tables.table import Column, Table
-
-Array = NDArray[np.float64]
 
 # Condition number from which readings do not determine the joints.
 SINGULAR = 1e6

@@ -11,17 +11,15 @@ from pathlib import Path
 import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
-from numpy.typing import NDArray
 
 from estimation.logs.campaigns import MAPPING, in_natural_order
 from estimation.logs.mappings.mapping import LogMapping, read_mapping
 from estimation.logs.parquet_streams.parquet_parts import Part, open_part
 from estimation.logs.torque_source import parse_meaning
+from robots.common.arrays import Array
 from robots.common.errors import InputError
 from robots.common.files import sha256
 from robots.signals import Log
-
-Array = NDArray[np.float64]
 
 # A log of more rows is not read into memory unless the user asks for it: at 0.75 GB per 10^6 rows of six joints it
 # would take 4 GB.

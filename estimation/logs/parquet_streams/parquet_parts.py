@@ -9,18 +9,16 @@ from pathlib import Path
 import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
-from numpy.typing import NDArray
 
 from estimation.logs.columns import parse_name, refuse_text, unit_factors
 from estimation.logs.joint_numbers import renamed_joints
 from estimation.logs.mappings.mapped_tables import count_joints, map_table, mapped_sources, stated_columns
 from estimation.logs.mappings.mapping import LogMapping
 from estimation.logs.mappings.suggestions import PLAIN_REMEDY, remedy_for_columns
+from robots.common.arrays import Array
 from robots.common.errors import InputError
 from robots.common.tables.table import Table
 from robots.common.tables.table_files import parquet_column, stored_in
-
-Array = NDArray[np.float64]
 
 # Signals that an identification uses, and those of a mapping that it does not.
 FIELDS = ("t", "q", "tau", "current")

@@ -8,13 +8,11 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from estimation.logs.readers.joint_names import places
+from robots.common.arrays import Array
 from robots.common.errors import InputError
 from robots.signals import UNKNOWN_PAUSE, Log
-
-Array = NDArray[np.float64]
 
 STATE, ACTION = "observation.state", "action"
 FULL, SLACK = 100.0, 1.0

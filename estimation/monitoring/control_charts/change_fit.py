@@ -10,8 +10,7 @@ from scipy.linalg import solve_triangular
 
 from estimation.monitoring.control_charts.level_filter import CORRELATION_TIME
 from estimation.uncertainty.quantiles import CHI2_95
-
-Array = NDArray[np.float64]
+from robots.common.arrays import Array
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

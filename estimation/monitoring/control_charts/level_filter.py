@@ -3,11 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from robots.common.arrays import Array
 from robots.common.records import Record
-
-Array = NDArray[np.float64]
 
 # Correlation time of the model error [s], about that of a change of the motion or of the temperature.
 CORRELATION_TIME = 300.0

@@ -13,9 +13,8 @@ from estimation.monitoring.control_charts.charts import Chart
 from estimation.monitoring.control_charts.level_filter import LevelFilter
 from estimation.monitoring.settings import PAUSE_SECONDS
 from estimation.uncertainty.quantiles import chi2_limit
+from robots.common.arrays import Array
 from robots.common.records import Record
-
-Array = NDArray[np.float64]
 
 Group = Literal["friction", "offset", "payload", "common", "residual"]
 

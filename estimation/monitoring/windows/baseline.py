@@ -14,14 +14,13 @@ from numpy.typing import ArrayLike, NDArray
 
 from estimation.models.model import Model, load_model
 from estimation.thermal import ThermalTorqueModel, thermal_from_dict
+from robots.common.arrays import Array
 from robots.common.errors import InputError
 from robots.common.records import read_json
 from robots.robot import Robot
 from robots.terms.effect_bases.capabilities import Persistence
 from robots.terms.situations.flange_body import FLANGE, link_columns, with_body
 from robots.terms.situations.sensitivities import moved_body
-
-Array = NDArray[np.float64]
 
 PAYLOAD = ("payload_mass", "payload_mx", "payload_my", "payload_mz")
 """Directions of a payload: its mass [kg] and first moments [kg m] in the flange's frame."""

@@ -3,17 +3,15 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from estimation.monitoring.settings import PAUSE_SECONDS, Heat
 from estimation.monitoring.windows.baseline import Baseline
 from estimation.monitoring.windows.unlogged_work import DUTY_SPREAD, JOINT_SPREAD, UnloggedWork
+from robots.common.arrays import Array
 from robots.common.errors import InputError
 from robots.common.records import Record
 from robots.thermal import ThermalModel
 from robots.thermal.online import Step, discretise
-
-Array = NDArray[np.float64]
 
 # Time constants of a joint [s]: the means of Table 8 of the thesis, of six joints at full duty.
 FAST_TIME_CONSTANT, SLOW_TIME_CONSTANT = 138.0, 1467.0

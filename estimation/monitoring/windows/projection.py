@@ -11,8 +11,7 @@ from estimation.linear_algebra.scaled import inverse
 from estimation.monitoring.windows.baseline import Directions
 from estimation.uncertainty.autoregressive import autocovariance, levinson, whitened
 from estimation.uncertainty.quantiles import NORMAL_MEDIAN
-
-Array = NDArray[np.float64]
+from robots.common.arrays import Array
 
 WINDOW_NOISE_ORDER = 12
 # Rows below this share of the usual speed say more of presliding than of friction.

@@ -6,12 +6,10 @@ from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from robots.common.arrays import Array
 from robots.common.errors import InputError
 from robots.common.records import Record
-
-Array = NDArray[np.float64]
 
 # A window with rests ends after so many times its length of motion at the latest.
 LONGEST_WINDOW = 6.0

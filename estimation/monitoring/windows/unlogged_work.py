@@ -5,11 +5,9 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
+from robots.common.arrays import Array
 from robots.common.records import Record
-
-Array = NDArray[np.float64]
 
 # Prior standard deviation of the duty. Its mean is zero: a pause is a rest.
 DUTY_SPREAD = 0.5

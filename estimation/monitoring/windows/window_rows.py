@@ -5,14 +5,13 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from estimation.monitoring.windows.baseline import Baseline, Directions
 from estimation.predictions.checked_motions import smoother_of
 from estimation.preprocessing import resample, smooth
+from robots.common.arrays import Array
 from robots.common.errors import InputError
-
-Array = NDArray[np.float64]
 
 
 def settling(cutoff: float) -> float:

@@ -8,9 +8,9 @@ from typing import ClassVar
 from xml.etree import ElementTree
 
 import numpy as np
-from numpy.typing import NDArray
 
 from estimation.payloads.body import Body
+from robots.common.arrays import Array
 
 
 class PayloadExport(ABC):
@@ -71,9 +71,6 @@ class Franka(PayloadExport):
             "inertia": body.inertia.ravel(order="F").tolist(),
         }
         return json.dumps(data, indent=2, allow_nan=False) + "\n"
-
-
-Array = NDArray[np.float64]
 
 
 class Kuka(PayloadExport):

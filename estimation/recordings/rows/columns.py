@@ -8,10 +8,9 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from robots.common.arrays import Array
 from robots.robot import Robot
 from robots.signals import Log
-
-Array = NDArray[np.float64]
 
 # A torque varies by rounding only if its range is below this share of its size, or below this value [N m, N or A].
 ROUNDING = 1e-9

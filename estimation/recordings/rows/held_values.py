@@ -11,10 +11,10 @@ from numpy.typing import NDArray
 from estimation.recordings.rows.columns import Columns
 from estimation.recordings.rows.motion import moving_rows
 from estimation.recordings.rows.timing import FEWEST
+from robots.common.arrays import Array
 from robots.common.stretches import ends
 from robots.signals import Log
 
-Array = NDArray[np.float64]
 Rows = NDArray[np.intp]
 
 # A column jumps by a step above this many times its 99th percentile; that is estimated from some of the steps.

@@ -9,9 +9,8 @@ from numpy.typing import NDArray
 
 from estimation.logs.clocks import uniform_times
 from estimation.recordings.rows.timing import FEWEST, measure_timing
+from robots.common.arrays import Array
 from robots.signals import Log
-
-Array = NDArray[np.float64]
 
 # A stall is a step above this many median steps and below this time [s]. Steps below RUSH median steps follow it, for
 # the rows that waited in a queue.

@@ -7,10 +7,9 @@ from numpy.typing import NDArray
 
 from estimation.recordings.rows.columns import Columns
 from estimation.regressions.preparation import TREMBLE_SHARE
+from robots.common.arrays import Array
 from robots.robot import Robot
 from robots.signals import Log
-
-Array = NDArray[np.float64]
 
 # A row is in motion if a joint changes within this time before and after it [s], by this share of its travel.
 AROUND, CHANGE = 0.05, 1e-3

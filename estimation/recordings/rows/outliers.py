@@ -11,9 +11,9 @@ from scipy.interpolate import CubicSpline
 
 from estimation.recordings.rows.columns import Columns
 from estimation.recordings.rows.timing import FEWEST
+from robots.common.arrays import Array
 from robots.signals import Log
 
-Array = NDArray[np.float64]
 Rows = NDArray[np.intp]
 
 # A row is an outlier if it leaves its neighbours and returns by more than this many times the median of such moves, ...

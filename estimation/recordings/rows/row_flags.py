@@ -14,10 +14,8 @@ from estimation.recordings.rows.columns import Columns, ImpossibleValue, impossi
 from estimation.recordings.rows.motion import standing_joints
 from estimation.recordings.rows.one_log import Recorded
 from estimation.recordings.rows.timing import FEWEST, Timing, measure_timing
+from robots.common.arrays import Array, Flags
 from robots.signals import Log
-
-Array = NDArray[np.float64]
-Flags = NDArray[np.bool_]
 
 
 @dataclass(frozen=True)

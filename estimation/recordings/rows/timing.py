@@ -9,8 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from estimation.recordings.rows.columns import Columns
-
-Array = NDArray[np.float64]
+from robots.common.arrays import Array
 
 # Fewer rows than this give no derivatives.
 FEWEST = 20

@@ -7,7 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from robots.common.arrays import Array
+
 Rows = NDArray[np.intp]
 
 # Turns in the units that positions come in: degrees that were taken for radians, and radians.

@@ -6,18 +6,16 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
 from estimation.models.model import Model
 from estimation.thermal.results.estimate import ThermalEstimate
 from estimation.thermal.torque import ThermalTorqueModel
+from robots.common.arrays import Array
 from robots.common.records import Finding, Result, axes_for, findings_of
 
 if TYPE_CHECKING:
     import pandas as pd
     from matplotlib.axes import Axes
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

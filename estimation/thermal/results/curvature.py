@@ -5,16 +5,14 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
 from estimation.thermal.runs.run_temperatures import run_temperatures
 from estimation.thermal.runs.thermal_run import ThermalRun
 from estimation.thermal.transcriptions.search import Search
 from estimation.thermal.transcriptions.transcription import Solution
+from robots.common.arrays import Array
 from robots.thermal import ThermalModel
-
-Array = NDArray[np.float64]
 
 # Heat and friction of the exponential fall depend on each other; their iteration ends at this relative change.
 SETTLED_FALL, MOST_FALL_ROUNDS = 1e-7, 30

@@ -11,9 +11,8 @@ from numpy.typing import NDArray
 from estimation.thermal.results.curvature import CurvedFit, curved_factor, curved_slope, curved_steady_state
 from estimation.thermal.transcriptions.information import Information
 from estimation.uncertainty.quantiles import NORMAL_95
+from robots.common.arrays import Array
 from robots.thermal import ThermalModel
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from estimation.thermal.results.derived import SPAN, Quantity
+from robots.common.arrays import Array
 from robots.common.errors import InputError
 from robots.common.records import Finding, Result, axes_for, findings_of, read, read_json
 from robots.thermal import ThermalModel, build_thermal_model
@@ -19,8 +20,6 @@ from robots.thermal import ThermalModel, build_thermal_model
 if TYPE_CHECKING:
     import pandas as pd
     from matplotlib.axes import Axes
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

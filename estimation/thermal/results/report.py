@@ -18,9 +18,8 @@ from estimation.thermal.transcriptions.search import Search, first_ambient
 from estimation.thermal.transcriptions.solve import solve
 from estimation.thermal.transcriptions.transcription import Solution, Transcription
 from estimation.uncertainty.quantiles import normal_quantile
+from robots.common.arrays import Array
 from robots.thermal import ThermalModel
-
-Array = NDArray[np.float64]
 
 
 def report(search: Search, solution: Solution, warm: tuple[int, ...], *, bounds: bool = True) -> ThermalEstimate:

@@ -12,10 +12,9 @@ from estimation.models.model import Model
 from estimation.preprocessing import resample, smooth
 from estimation.regressions.preparation import SIGN_SPEED_SHARE, torque_of
 from estimation.thermal.runs.extraction import SEPARATE_RUN_GAP, bins
+from robots.common.arrays import Array
 from robots.common.stretches import chunks
 from robots.signals import Log
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

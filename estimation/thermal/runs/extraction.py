@@ -14,10 +14,9 @@ from estimation.models.model import Model
 from estimation.preprocessing import resample, smooth
 from estimation.regressions.preparation import SIGN_SPEED_SHARE, torque_of
 from estimation.thermal.runs.thermal_run import ThermalRun
+from robots.common.arrays import Array
 from robots.common.errors import InputError, NotIdentifiableError
 from robots.signals import Log
-
-Array = NDArray[np.float64]
 
 # Logs that lie further apart are fitted as runs of their own, each with its own start [s].
 SEPARATE_RUN_GAP = 6.0 * 3600.0

@@ -9,9 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from estimation.thermal.runs.thermal_run import ThermalRun
+from robots.common.arrays import Array
 from robots.thermal import ThermalModel
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

@@ -5,12 +5,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from estimation.thermal.runs.thermal_run import ThermalRun
+from robots.common.arrays import Array
 from robots.thermal import ThermalModel
-
-Array = NDArray[np.float64]
 
 
 def run_temperatures(

@@ -8,10 +8,9 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from robots.common.arrays import Array
 from robots.common.errors import InputError
 from robots.thermal import ThermalModel
-
-Array = NDArray[np.float64]
 
 # Readings of a joint or its surroundings beyond these [degC] are in another unit, or broken.
 COLDEST, HOTTEST = -60.0, 160.0

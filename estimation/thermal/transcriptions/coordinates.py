@@ -11,9 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from estimation.thermal.runs.thermal_run import ThermalRun
+from robots.common.arrays import Array
 from robots.thermal import ThermalModel, ThermalParameter
-
-Array = NDArray[np.float64]
 
 # Temperatures are counted from T0 in tens of degrees.
 DEGREES_PER_COORDINATE = 10.0

@@ -12,8 +12,7 @@ from estimation.thermal.runs.measurements import Row
 from estimation.thermal.transcriptions.noise import split
 from estimation.thermal.transcriptions.transcription import Solution, Transcription
 from estimation.uncertainty import Part, covariance, white_noise_covariance
-
-Array = NDArray[np.float64]
+from robots.common.arrays import Array
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

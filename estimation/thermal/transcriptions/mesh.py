@@ -7,12 +7,10 @@ from itertools import pairwise
 
 import casadi
 import numpy as np
-from numpy.typing import NDArray
 from scipy.sparse import csr_matrix
 
 from estimation.thermal.runs.thermal_run import ThermalRun
-
-Array = NDArray[np.float64]
+from robots.common.arrays import Array
 
 COLLOCATION_DEGREE = 3
 

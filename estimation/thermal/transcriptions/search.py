@@ -6,7 +6,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from estimation.thermal.runs.thermal_run import ThermalRun
 from estimation.thermal.transcriptions.coordinates import DEGREES_PER_COORDINATE, from_coordinate
@@ -16,10 +15,9 @@ from estimation.thermal.transcriptions.noise import NoiseLevels, estimate_levels
 from estimation.thermal.transcriptions.solve import solve
 from estimation.thermal.transcriptions.structure import Structure
 from estimation.thermal.transcriptions.transcription import Solution, Transcription
+from robots.common.arrays import Array
 from robots.common.errors import SolverError
 from robots.thermal import ThermalModel
-
-Array = NDArray[np.float64]
 
 
 @dataclass

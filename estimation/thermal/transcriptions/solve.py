@@ -9,8 +9,7 @@ from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
 from estimation.thermal.transcriptions.transcription import Solution, Transcription
-
-Array = NDArray[np.float64]
+from robots.common.arrays import Array
 
 
 def solve(

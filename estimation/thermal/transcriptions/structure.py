@@ -12,8 +12,6 @@ from estimation.thermal.runs.thermal_run import ThermalRun
 from robots.common.errors import InputError, NotIdentifiableError
 from robots.thermal import ThermalModel
 
-Array = NDArray[np.float64]
-
 
 @dataclass(frozen=True, kw_only=True)
 class Structure:

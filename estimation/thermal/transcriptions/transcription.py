@@ -16,10 +16,9 @@ from estimation.thermal.runs.measurements import rows_of
 from estimation.thermal.runs.thermal_run import ThermalRun
 from estimation.thermal.transcriptions.coordinates import DEGREES_PER_COORDINATE, Layout, from_coordinate
 from estimation.thermal.transcriptions.mesh import COLLOCATION_DEGREE, Mesh, MeshSettings, build_mesh, radau
+from robots.common.arrays import Array
 from robots.common.errors import SolverError
 from robots.thermal import Inputs, ThermalModel
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

@@ -7,10 +7,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from types import MappingProxyType
 
-import numpy as np
-from numpy.typing import NDArray
-
-Array = NDArray[np.float64]
+from robots.common.arrays import Array
 
 VERDICTS = ("nothing", "effects", "unexplained")
 

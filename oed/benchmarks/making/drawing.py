@@ -6,15 +6,13 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from oed.benchmarks.making.strata import PAIRED_SIZE, Task
 from oed.benchmarks.taxonomy import known_parameters
 from oed.benchmarks.truth.cases import Case, Hidden, draw_case
 from oed.benchmarks.truth.machines import Machine
+from robots.common.arrays import Array
 from robots.common.errors import InfeasibleError
-
-Array = NDArray[np.float64]
 
 OUTSIDE = "outside"
 """The name of a hidden effect that no name of the taxonomy fits."""

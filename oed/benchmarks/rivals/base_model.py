@@ -11,7 +11,7 @@ from scipy.linalg import lstsq
 from scipy.ndimage import maximum_filter1d
 from scipy.signal import butter, sosfiltfilt
 
-Array = NDArray[np.float64]
+from robots.common.arrays import Array
 
 FIT_BAND = 5.0  # of the low-pass of torque and columns before the fit [Hz]: above it, accelerations are poorly known
 LOW_PASS_ORDER = 4  # of the low-passes

@@ -4,12 +4,8 @@ from __future__ import annotations
 
 from pathlib import Path
 
-import numpy as np
-from numpy.typing import NDArray
-
 from oed.benchmarks.folders import read_columns
-
-Array = NDArray[np.float64]
+from robots.common.arrays import Array
 
 
 def read_motion(file: Path, joints: int, *, torque: bool) -> tuple[Array, Array, Array]:

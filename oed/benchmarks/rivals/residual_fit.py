@@ -9,7 +9,6 @@ from pathlib import Path
 import numpy as np
 import pinocchio as pin
 import yaml
-from numpy.typing import NDArray
 from scipy.linalg import lstsq, qr, solve_toeplitz
 from scipy.signal import lfilter
 from scipy.stats import f as f_distribution
@@ -26,8 +25,7 @@ from oed.benchmarks.rivals.base_model import (
     motion_of,
 )
 from oed.benchmarks.rivals.logs import read_motion
-
-Array = NDArray[np.float64]
+from robots.common.arrays import Array
 
 LEAST_RESIDUAL_SHARE = 0.02
 """Share of the torque RMS that an effect explains at least; chosen on a dozen cases without an effect."""

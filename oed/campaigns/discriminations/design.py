@@ -10,7 +10,7 @@ import re
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from estimation.diagnosis.experiment_plans.experiment_motions import MAKERS, VARIED
 from estimation.diagnosis.experiment_plans.next_experiment import VARIANTS
@@ -27,6 +27,7 @@ from oed.experiments.checks import velocity_share
 from oed.experiments.options import LimitOptions
 from oed.experiments.safety_checks.safety import choose_safety
 from robots.base_parameters import find_base_parameters
+from robots.common.arrays import Array
 from robots.common.errors import InfeasibleError, InputError, NotIdentifiableError
 from robots.common.progress import SILENT, Progress
 from robots.geometry.urdf_selection import nearest
@@ -34,8 +35,6 @@ from robots.plants import Sensors
 from robots.regressor import default_model
 from robots.robot import Robot
 from robots.terms.effects import EFFECTS, EXPERIMENTS
-
-Array = NDArray[np.float64]
 
 NOISE_SHARE = 0.02
 """Noise as a share of each joint's torque RMS, where it is not stated."""

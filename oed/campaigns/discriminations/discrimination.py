@@ -9,7 +9,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from estimation.diagnosis.hypothesis_tests.power import resolving_energy
 from oed.campaigns.discriminations.motions import Run
@@ -19,13 +18,12 @@ from oed.experiments.safety_checks.freedom import freedom_findings, freedom_of, 
 from oed.experiments.safety_checks.margins import missing_limits
 from oed.exports import write_trajectory
 from robots.collision import Surroundings
+from robots.common.arrays import Array
 from robots.common.plain import percent
 from robots.common.records import Finding, Record, findings_of
 from robots.robot import Robot
 from robots.signals import Motion
 from robots.version import VERSION
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -10,7 +10,7 @@ from collections.abc import Sequence as Items
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from scipy.interpolate import CubicSpline
 
 from estimation.diagnosis.experiment_plans.experiment_motions import MotionRange
@@ -23,12 +23,11 @@ from oed.trajectories import FourierSeries, PiecewisePolynomial, Segment, Sequen
 from oed.trajectories.base import round_up
 from oed.trajectories.fourier import rest_basis
 from robots.base_parameters import BaseParameters
+from robots.common.arrays import Array
 from robots.common.errors import InfeasibleError
 from robots.limits import Limits, Margin
 from robots.robot import Robot
 from robots.signals import Motion
-
-Array = NDArray[np.float64]
 
 USED_LIMIT_SHARE = 0.9
 """Share of each limit that stages use: the rest is for what a controller makes of the samples."""

@@ -6,7 +6,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from estimation.diagnosis.base_models.baseline import FAINT
 from estimation.diagnosis.experiment_plans.experiment_grams import Grams
@@ -16,9 +15,8 @@ from estimation.diagnosis.hypothesis_tests.problem import Problem
 from estimation.linear_algebra.orthonormal import orthonormal
 from oed.campaigns.discriminations.discrimination import DiscriminationScore
 from oed.campaigns.discriminations.motions import Run
+from robots.common.arrays import Array
 from robots.common.errors import NotIdentifiableError
-
-Array = NDArray[np.float64]
 
 EVALUATION_STEP = 0.01
 """About the step [s] at which effects are evaluated; the white part of the noise is averaged over it."""

@@ -6,7 +6,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from estimation.diagnosis.experiment_plans.choices import repeat_stages
 from estimation.diagnosis.experiment_plans.experiment_motions import MAKERS, Stage, backwards
@@ -14,13 +13,12 @@ from estimation.diagnosis.experiment_plans.next_experiment import NextExperiment
 from oed.campaigns.discriminations.motions import ExperimentBuilder
 from robots.base_parameters import find_base_parameters
 from robots.collision import CollisionModel, check_motion
+from robots.common.arrays import Array
 from robots.common.errors import InfeasibleError
 from robots.regressor import default_model
 from robots.robot import Robot
 from robots.signals import Motion
 from robots.terms.effects import EXPERIMENTS
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

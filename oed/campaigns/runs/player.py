@@ -10,7 +10,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from oed.campaigns.clearances import CollisionFreeRanges
 from oed.controllers import Endpoint, StreamOptions, StreamResult, stream
@@ -19,13 +18,12 @@ from oed.controllers.recording.pose import read_pose
 from oed.retiming import plan_move
 from oed.trajectories import PiecewisePolynomial
 from robots.collision import CollisionModel, check_motion
+from robots.common.arrays import Array
 from robots.common.errors import InfeasibleError
 from robots.common.progress import SILENT, Progress
 from robots.limits import Limits
 from robots.robot import Robot
 from robots.signals import Motion
-
-Array = NDArray[np.float64]
 
 INTERRUPTED = "interrupted"
 

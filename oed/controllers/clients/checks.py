@@ -3,15 +3,13 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from oed.controllers.errors import ControllerError
 from oed.controllers.options import Endpoint, StreamOptions
 from oed.exports.simple_message import Status
 from oed.exports.simple_message.kinds import MANUAL
+from robots.common.arrays import Array
 from robots.common.errors import InputError
-
-Array = NDArray[np.float64]
 
 
 def check_status(status: Status | None, place: str) -> None:

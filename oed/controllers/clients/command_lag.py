@@ -3,11 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from robots.common.arrays import Array
 from robots.signals import Motion
-
-Array = NDArray[np.float64]
 
 LAG_STEP = 0.002
 """Step of the lags that are compared [s]."""

@@ -6,13 +6,11 @@ import time
 from collections.abc import Callable
 
 import numpy as np
-from numpy.typing import NDArray
 
 from oed.controllers.errors import ControllerError
 from oed.controllers.recording.recorder import Recorder
+from robots.common.arrays import Array
 from robots.signals import Motion
-
-Array = NDArray[np.float64]
 
 STANDING_TIME = 0.3
 """How long the robot must stand at the end [s]."""

@@ -5,15 +5,12 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable, Iterator
 
-import numpy as np
-from numpy.typing import NDArray
-
 from oed.controllers.clients.command_lag import CommandLag
 from oed.controllers.clients.traffic import Traffic
 from oed.controllers.errors import ControllerError
 from oed.exports.simple_message import FullPoint, Point
+from robots.common.arrays import Array
 
-Array = NDArray[np.float64]
 Watch = Callable[[], None]
 Advance = Callable[[int], None]
 

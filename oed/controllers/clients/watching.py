@@ -6,14 +6,12 @@ from abc import ABC, abstractmethod
 from collections import deque
 
 import numpy as np
-from numpy.typing import NDArray
 
 from oed.controllers.errors import ControllerError
+from robots.common.arrays import Array
 from robots.common.errors import InputError
 from robots.robot import Robot
 from robots.signals import Motion
-
-Array = NDArray[np.float64]
 
 USUAL_ANGLE_TOLERANCE = 0.05
 """Usual tolerance of a joint that turns [rad]."""

@@ -4,18 +4,14 @@ from __future__ import annotations
 
 import time
 
-import numpy as np
-from numpy.typing import NDArray
-
 from oed.controllers.errors import ControllerError
 from oed.controllers.interrupts import signals_held
 from oed.controllers.links import open_link
 from oed.controllers.options import Endpoint
 from oed.controllers.recording.feedback import Layout
 from oed.controllers.recording.recorder import Recorder
+from robots.common.arrays import Array
 from robots.robot import Robot
-
-Array = NDArray[np.float64]
 
 
 def require_torque(layout: Layout, endpoint: Endpoint) -> None:

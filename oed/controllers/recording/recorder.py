@@ -10,7 +10,6 @@ from os import PathLike
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from oed.controllers.egm.messages import EgmForm
 from oed.controllers.errors import LinkError, ProtocolError, RecordingError
@@ -30,10 +29,9 @@ from oed.exports.simple_message import (
     Reply,
     Status,
 )
+from robots.common.arrays import Array
 from robots.common.errors import InputError, OedError
 from robots.robot import Robot
-
-Array = NDArray[np.float64]
 
 FEEDBACK_TRIAL_TIME = 0.3
 """How long kinds of feedback are looked at before the best is chosen [s]."""

@@ -5,12 +5,10 @@ from __future__ import annotations
 import warnings
 
 import numpy as np
-from numpy.typing import NDArray
 
+from robots.common.arrays import Array
 from robots.common.errors import InputError, OtherRobotWarning
 from robots.robot import Robot
-
-Array = NDArray[np.float64]
 
 
 def require_no_further_joints(unused: Array, robot: Robot) -> None:

@@ -6,12 +6,10 @@ from collections import deque
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from oed.controllers.virtual.faults.paths import PathFault
 from oed.controllers.virtual.robot import VirtualRobot
-
-Array = NDArray[np.float64]
+from robots.common.arrays import Array
 
 
 @dataclass(frozen=True, slots=True)

@@ -6,11 +6,9 @@ from dataclasses import dataclass
 from enum import Enum
 
 import numpy as np
-from numpy.typing import NDArray
 
 from oed.exports.simple_message import FullPoint, Point, Valid, WireFormat, shortest
-
-Array = NDArray[np.float64]
+from robots.common.arrays import Array
 
 
 class Outcome(Enum):

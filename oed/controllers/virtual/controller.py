@@ -7,7 +7,6 @@ import time
 from functools import partial
 
 import numpy as np
-from numpy.typing import NDArray
 
 from oed.controllers.virtual.faults.network import Network
 from oed.controllers.virtual.fixed_packets import FixedPackets
@@ -32,11 +31,10 @@ from oed.exports.simple_message import (
     Splitter,
     Valid,
 )
+from robots.common.arrays import Array
 from robots.common.errors import InputError
 from robots.plants import Plant, nominal_plant
 from robots.robot import Robot
-
-Array = NDArray[np.float64]
 
 NEEDED = Valid.TIME | Valid.POSITION
 """What a point must state."""

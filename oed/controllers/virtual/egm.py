@@ -8,7 +8,6 @@ import time
 from contextlib import suppress
 
 import numpy as np
-from numpy.typing import NDArray
 
 from oed.controllers.egm.messages import (
     GUIDING_RUNNING,
@@ -24,10 +23,9 @@ from oed.controllers.virtual.service import Service
 from oed.controllers.virtual_options import ControllerOptions
 from oed.exports.forms.base import require_joints
 from oed.exports.simple_message import MessageError
+from robots.common.arrays import Array
 from robots.joints.controller_axes import axes_of, joints_of
 from robots.robot import Robot
-
-Array = NDArray[np.float64]
 
 EGM_CYCLE = 0.004
 """Cycle of the controller [s]."""

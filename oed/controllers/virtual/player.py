@@ -6,15 +6,13 @@ from dataclasses import dataclass, replace
 from enum import Enum, IntEnum
 
 import numpy as np
-from numpy.typing import NDArray
 
 from oed.controllers.virtual.buffer import Outcome, PointBuffer
 from oed.controllers.virtual.faults.paths import PathFault
 from oed.controllers.virtual.robot import VirtualRobot
 from oed.controllers.virtual_options import ControllerOptions
 from oed.exports.simple_message import FullPoint, Point, Special
-
-Array = NDArray[np.float64]
+from robots.common.arrays import Array
 
 
 class Fault(IntEnum):

@@ -5,14 +5,12 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from robots.common.arrays import Array
 from robots.plants import Plant, PlantEffect
 from robots.plants.heat import HeatPiece, heat_piece, reference_friction
 from robots.signals import Motion
 from robots.terms.effect_bases.heat import HeatEffect
-
-Array = NDArray[np.float64]
 
 
 class VirtualRobot:

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from oed.experiments.drive_options import DriveDesignOptions
 from oed.experiments.drives.information import Loop, expected_errors
@@ -13,14 +12,13 @@ from oed.experiments.drives.result import DriveDesign, ExpectedError
 from oed.experiments.drives.segments import Wave, candidates, chirp, name_of, offspring
 from oed.experiments.safety_checks.freedom import UNCHECKED, collides, freedom_of, freedom_text
 from robots.collision import Surroundings
+from robots.common.arrays import Array
 from robots.common.errors import InfeasibleError, InputError, SolverError
 from robots.common.parallel import one_blas_thread
 from robots.common.progress import SILENT, Progress
 from robots.drives import Drive
 from robots.robot import Robot
 from robots.signals import Motion
-
-Array = NDArray[np.float64]
 
 SOUGHT = ("armature", "viscous", "coulomb", "torque_offset")
 PRIOR = 100.0

@@ -7,9 +7,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
 from oed.exports.trajectory_checks import UNKNOWN_COLLISIONS
+from robots.common.arrays import Array
 from robots.common.errors import InputError
 from robots.common.files import existing_file
 from robots.common.records import Finding, Result, axes_for, findings_of, read_json
@@ -19,7 +19,6 @@ if TYPE_CHECKING:
     import pandas as pd
     from matplotlib.axes import Axes
 
-Array = NDArray[np.float64]
 
 COMMANDS = "commands.csv"
 

@@ -6,9 +6,8 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from robots.common.arrays import Array
 
 KINDS = ("sine", "chirp", "square", "steps", "multisine", "ramps", "holds")
 BLEND = 0.1

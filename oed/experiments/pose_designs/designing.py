@@ -20,6 +20,7 @@ from oed.experiments.pose_designs.result import PoseDesign
 from oed.experiments.pose_options import PoseOptions
 from oed.experiments.safety_checks.freedom import collides, freedom_of
 from robots.collision import CollisionModel
+from robots.common.arrays import Array
 from robots.common.errors import InfeasibleError, InputError
 from robots.common.parallel import one_blas_thread
 from robots.common.progress import SILENT, Progress
@@ -27,8 +28,6 @@ from robots.geometry_errors.virtual import random_positions
 from robots.limits import Limits
 from robots.robot import Robot
 from robots.signals import Motion
-
-Array = NDArray[np.float64]
 
 CANDIDATES = 1000
 AGAIN = 1  # exchanges after poses have moved

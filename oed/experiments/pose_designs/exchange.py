@@ -5,11 +5,9 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import numpy as np
-from numpy.typing import NDArray
 
 from oed.criteria import Criterion
-
-Array = NDArray[np.float64]
+from robots.common.arrays import Array
 
 PASSES = 20
 SHORTLIST = 80  # candidates by the determinant whose criterion is computed; of log det itself all count

@@ -8,6 +8,7 @@ import casadi
 import numpy as np
 from numpy.typing import NDArray
 
+from robots.common.arrays import Array
 from robots.common.errors import InputError
 from robots.geometry_errors.measurements import Measurement, Setup
 from robots.geometry_errors.model import GeometryModel
@@ -17,8 +18,6 @@ from robots.geometry_errors.symbolic import SymbolicArm, symbolic_jacobian
 from robots.geometry_errors.terms import TERMS, ErrorParameter, error_term
 from robots.geometry_errors.virtual import random_positions
 from robots.robot import Robot
-
-Array = NDArray[np.float64]
 
 REFERENCE = 300
 """Random poses by which the errors that poses distinguish are chosen."""

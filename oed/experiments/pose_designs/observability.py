@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from oed.criteria import CRITERIA, Criterion
 from oed.criteria import criterion as choose_criterion
 from oed.criteria.base import floored, soft_maximum
+from robots.common.arrays import Array
 from robots.common.errors import InputError
-
-Array = NDArray[np.float64]
 
 SAME = {"o1": "d", "o2": "cond", "o3": "e"}
 """Indices that order designs of one number of poses as a criterion does."""

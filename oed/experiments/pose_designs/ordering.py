@@ -6,16 +6,14 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from oed.experiments.assembly import limits_between_samples
 from oed.retiming import PlannedMove, plan_move
 from oed.trajectories import PiecewisePolynomial, Segment, Sequence
 from robots.collision import CollisionModel
+from robots.common.arrays import Array
 from robots.common.errors import InfeasibleError
 from robots.limits import Limits
-
-Array = NDArray[np.float64]
 
 LOOK = 0.04  # rad or m between looks at a move while the order is sought; the whole motion is proved afterwards
 STRIDE, GROWTH = 0.4, 800  # rad or m of a branch, and branches of a detour

@@ -16,8 +16,7 @@ from oed.experiments.problems.objective import Objective
 from oed.experiments.problems.trap import Trap
 from robots.batch import batch_function
 from robots.collision import CollisionModel
-
-Array = NDArray[np.float64]
+from robots.common.arrays import Array
 
 ITERATIONS = 150  # of IPOPT, over all stages of the criterion
 HALVINGS = 6  # of a pose's way, until the exact limits hold

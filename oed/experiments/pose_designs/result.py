@@ -8,12 +8,12 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from oed.experiments.pose_designs.observability import observability_indices
 from oed.experiments.results.planned import OF_ROBOT, Planned
 from oed.experiments.safety_checks.freedom import freedom_text, is_free
 from oed.exports import write_trajectory
+from robots.common.arrays import Array
 from robots.common.records import Finding, axes_for, findings_of, read, read_json
 from robots.common.tables.table_files import write_table
 from robots.geometry_errors.terms import ErrorParameter
@@ -25,7 +25,6 @@ if TYPE_CHECKING:
     import pandas as pd
     from matplotlib.axes import Axes
 
-Array = NDArray[np.float64]
 
 DESIGN, POSES, TRAJECTORY = "design.json", "poses.csv", "trajectory.csv"
 SHOWN = {"m": ("mm", 1e3), "rad": ("mrad", 1e3), "px": ("px", 1.0)}

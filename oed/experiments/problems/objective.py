@@ -9,11 +9,9 @@ from typing import Protocol
 
 import casadi
 import numpy as np
-from numpy.typing import NDArray
 
 from oed.experiments.problems.trap import Trap
-
-Array = NDArray[np.float64]
+from robots.common.arrays import Array
 
 
 class Smooth(Protocol):

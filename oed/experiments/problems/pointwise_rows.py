@@ -6,8 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from oed.experiments.problems.problem import FourierProblem
+from robots.common.arrays import Array
 
-Array = NDArray[np.float64]
 Indices = NDArray[np.intp]
 States = tuple[Array, Array, Array]
 

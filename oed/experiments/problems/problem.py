@@ -7,16 +7,14 @@ from dataclasses import dataclass, field, fields, replace
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
 from oed.constraints import KinematicRows, PointwiseLimit, TorqueRms, kinematic_rows
 from oed.criteria import Criterion, Information, Weighting
 from oed.trajectories import Family, Fourier, Kinematics, Trajectory
 from robots.base_parameters import BaseParameters
+from robots.common.arrays import Array
 from robots.common.errors import InfeasibleError
 from robots.limits import Limits
-
-Array = NDArray[np.float64]
 
 # How far within each pointwise bound, in its own scale, a motion counts as feasible: a solver starts strictly inside.
 INNER_ROOM = 1e-3

@@ -4,11 +4,9 @@ from __future__ import annotations
 
 import casadi
 import numpy as np
-from numpy.typing import NDArray
 
 from oed.experiments.problems.problem import FourierProblem
-
-Array = NDArray[np.float64]
+from robots.common.arrays import Array
 
 
 class WorkingSet:

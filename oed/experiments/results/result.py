@@ -8,7 +8,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from oed.criteria import Criterion
 from oed.experiments.quality import Quality, excitation_findings
@@ -22,6 +21,7 @@ from oed.experiments.safety_checks.spatial_check import SpatialMargin
 from oed.experiments.searches.search import INTERRUPTED
 from oed.exports import write_trajectory
 from robots.base_parameters import BaseParameters
+from robots.common.arrays import Array
 from robots.common.records import Finding, findings_of
 from robots.limits import Margin
 from robots.plants import PlantEffect
@@ -32,8 +32,6 @@ from robots.version import VERSION
 if TYPE_CHECKING:
     import pandas as pd
     from matplotlib.axes import Axes
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, kw_only=True)

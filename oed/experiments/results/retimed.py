@@ -8,7 +8,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from oed.criteria import CRITERIA
 from oed.experiments.quality import Quality, design_model, excitation_findings
@@ -20,6 +19,7 @@ from oed.experiments.safety_checks.margins import assumption_findings, measured_
 from oed.exports import read_trajectory, write_trajectory
 from oed.retiming import Retimed
 from robots.base_parameters import BaseParameters, find_base_parameters
+from robots.common.arrays import Array
 from robots.common.errors import InputError
 from robots.common.plain import number
 from robots.common.records import Finding, Record, damage_refused, findings_of, read_json
@@ -32,8 +32,6 @@ from robots.version import VERSION
 if TYPE_CHECKING:
     import pandas as pd
     from matplotlib.axes import Axes
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

@@ -5,17 +5,15 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from robots.base_parameters import BaseParameters
+from robots.common.arrays import Array
 from robots.common.records import Finding, findings_of
 from robots.limits import ACCELERATION_PER_VELOCITY, JERK_PER_ACCELERATION, Limits, Margin, symmetric_margins
 from robots.plants import PlantEffect
 from robots.robot import Robot
 from robots.signals import Motion
 from robots.terms.effects import situation
-
-Array = NDArray[np.float64]
 
 _SUBSTITUTES = {
     "acceleration": f"{ACCELERATION_PER_VELOCITY:g}/s times the velocity limit",

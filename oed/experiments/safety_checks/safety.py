@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from oed.constraints import PointwiseLimit, StateLimits, TorqueLimit, TorqueRms, VelocityRampLimit
 from oed.constraints.feasibility import check_feasible, roomy_pose
@@ -17,12 +16,11 @@ from oed.trajectories import Sequence as Experiment
 from oed.trajectories import Trajectory
 from robots.base_parameters import BaseParameters
 from robots.collision import CollisionModel, CollisionReport, check_motion
+from robots.common.arrays import Array
 from robots.common.errors import InfeasibleError
 from robots.limits import Limits
 from robots.robot import Robot
 from robots.signals import Motion
-
-Array = NDArray[np.float64]
 
 # Shares of the limits of speed and its derivatives that strokes and moves try in turn to keep the torque limits.
 SLOWER = (1.0, 0.85, 0.7, 0.5, 0.35, 0.2)

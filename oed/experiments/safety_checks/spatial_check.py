@@ -5,13 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from oed.constraints import StateLimits
 from oed.constraints.geometric import GeometricLimits
 from robots.signals import Motion
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, kw_only=True)

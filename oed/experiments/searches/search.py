@@ -7,16 +7,14 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from oed.criteria import triangle
 from oed.experiments.problems.problem import FourierProblem
 from oed.experiments.solvers import Solved, Solver, Stage
 from oed.experiments.solvers.base import Tell
 from oed.trajectories import count_periods
+from robots.common.arrays import Array
 from robots.common.errors import InputError
-
-Array = NDArray[np.float64]
 
 # How far a hop throws the coefficients of a joint, in units of what brings it to its limits.
 THROWS = (0.15, 0.3, 0.6)

@@ -7,12 +7,8 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import ClassVar
 
-import numpy as np
-from numpy.typing import NDArray
-
 from oed.experiments.problems.problem import FourierProblem
-
-Array = NDArray[np.float64]
+from robots.common.arrays import Array
 
 # By how much a row may be passed, as a share of its bound, before it is added; less than that is shrunk away.
 PASSED = 1e-3

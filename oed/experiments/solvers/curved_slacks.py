@@ -7,8 +7,7 @@ from numpy.typing import NDArray
 
 from oed.experiments.problems.pointwise_rows import MARGIN_BETWEEN_SAMPLES, mean_gradients, row_gradients
 from oed.experiments.problems.problem import FourierProblem
-
-Array = NDArray[np.float64]
+from robots.common.arrays import Array
 
 # How close to its bound, in its own scale, a peak is a row of the solver from the start.
 NEAR = 0.05

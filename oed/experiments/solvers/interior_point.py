@@ -18,15 +18,13 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.linalg.lapack import dposv
 
 from oed.experiments.problems.problem import FourierProblem
 from oed.experiments.solvers.base import Solved, Solver, Stage, Tell, go_on
 from oed.experiments.solvers.curved_slacks import CurvedSlacks
 from oed.experiments.solvers.slacks import LinearSlacks, Slacks
-
-Array = NDArray[np.float64]
+from robots.common.arrays import Array
 
 ARMIJO = 1e-4
 HALVINGS = 12

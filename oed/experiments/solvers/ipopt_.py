@@ -8,7 +8,6 @@ from typing import Any, ClassVar
 
 import casadi
 import numpy as np
-from numpy.typing import NDArray
 
 from oed.experiments.problems.objective import Objective, Watch
 from oed.experiments.problems.pointwise_function import PointwiseFunction
@@ -17,8 +16,7 @@ from oed.experiments.problems.problem import FourierProblem
 from oed.experiments.problems.trap import Trap
 from oed.experiments.problems.working_set import WorkingSet
 from oed.experiments.solvers.base import PASSED, Solved, Solver, Stage, Tell, go_on
-
-Array = NDArray[np.float64]
+from robots.common.arrays import Array
 
 # IPOPT's last word when CasADi noticed Ctrl-C before Python did.
 INTERRUPTED = ("User_Requested_Stop", "NonIpopt_Exception_Thrown")

@@ -7,8 +7,7 @@ from numpy.typing import NDArray
 
 from oed.experiments.problems.problem import FourierProblem
 from oed.experiments.solvers.curved_slacks import CurvedSlacks
-
-Array = NDArray[np.float64]
+from robots.common.arrays import Array
 
 
 class LinearSlacks:

@@ -7,15 +7,13 @@ from dataclasses import dataclass
 from typing import Any, ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import OptimizeResult, minimize
 
 from oed.experiments.problems.pointwise_rows import PointwiseRows
 from oed.experiments.problems.problem import FourierProblem
 from oed.experiments.problems.working_set import WorkingSet
 from oed.experiments.solvers.base import PASSED, Solved, Solver, Stage, Tell, go_on
-
-Array = NDArray[np.float64]
+from robots.common.arrays import Array
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -6,15 +6,12 @@ from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from typing import ClassVar
 
-import numpy as np
-from numpy.typing import NDArray
-
 from oed.exports.options import ExportOptions
+from robots.common.arrays import Array
 from robots.common.errors import InputError
 from robots.robot import Robot
 from robots.signals import Motion
 
-Array = NDArray[np.float64]
 NANOSECONDS = 1_000_000_000  # of a second
 
 

@@ -9,13 +9,11 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from oed.reports.animations.bodies import Body
+from robots.common.arrays import Array
 from robots.geometry.chain import Chain
 from robots.limits import Limits, Margin
-
-Array = NDArray[np.float64]
 
 NEAR = 0.1
 """Reserve at which a limit lights up: the share that designs keep of torque limits by default."""

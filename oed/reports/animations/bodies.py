@@ -9,7 +9,6 @@ from pathlib import Path
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
 from oed.reports.animations.surfaces import (
     Surface,
@@ -23,11 +22,11 @@ from robots.collision.boxes import stated_scene
 from robots.collision.drawn.fitting import load_mesh
 from robots.collision.drawn.shapes import shapes_by_link
 from robots.collision.loading import RADIUS_FRACTION, stated_collision
+from robots.common.arrays import Array
 from robots.common.errors import AssumedValueWarning, InputError
 from robots.geometry.urdf_shapes import UrdfShape
 from robots.robot import Robot
 
-Array = NDArray[np.float64]
 Kind = Literal["mesh", "shape", "capsule", "obstacle", "plane"]
 
 TRIANGLES = 4000

@@ -11,13 +11,12 @@ from estimation.preprocessing import LowPass, resample, smooth
 from oed.reports.animations.animation import Animation
 from oed.reports.animations.bodies import bodies_of, checked_model
 from robots.collision import Capsule, CollisionModel, Surroundings
+from robots.common.arrays import Array
 from robots.common.errors import InputError
 from robots.limits import Margin, symmetric_margins
 from robots.regressor import default_model
 from robots.robot import Robot
 from robots.signals import Log, Motion
-
-Array = NDArray[np.float64]
 
 RATE = 25.0
 """Frames per second of the motion; the page draws straight lines between them."""

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from oed.experiments import Design
 from oed.experiments.quality import Quality
@@ -13,9 +12,8 @@ from oed.reports.pages.motions.motion_report import animation_section, tightest_
 from oed.reports.pictures.trajectory_pictures import margins_picture, motion_picture, spectrum_picture
 from oed.reports.rendering.page import Cell, Fact, Page, Section, Table, page_of
 from robots.collision import Surroundings
+from robots.common.arrays import Array
 from robots.limits import Margin
-
-Array = NDArray[np.float64]
 
 
 def design_page(design: Design) -> Page:

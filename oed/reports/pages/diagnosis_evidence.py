@@ -5,14 +5,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from estimation.diagnosis.findings import Finding
 from estimation.diagnosis.results.diagnosis import Diagnosis, Trace
 from oed.reports.rendering.joint_units import joint_units
+from robots.common.arrays import Array
 from robots.terms.base import length_unit
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

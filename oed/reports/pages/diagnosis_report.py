@@ -6,7 +6,6 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from estimation.diagnosis.calibration import CLOSE_RIVAL_BIC
 from estimation.diagnosis.results.actions import close_causes
@@ -24,10 +23,9 @@ from oed.reports.rendering.joint_units import joint_titles
 from oed.reports.rendering.page import Cell, Fact, Page, Section, Table, page_of
 from oed.reports.rendering.picture import Picture
 from oed.reports.rendering.provenance import recordings_of
+from robots.common.arrays import Array
 from robots.common.plain import percent, significant, two_digits
 from robots.signals import Log
-
-Array = NDArray[np.float64]
 
 SMALL = 1e-12
 """Smallest probability that is written: the tail of the noise distribution is unknown beyond it."""

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from estimation.identifications.estimate import Estimate
 from estimation.predictions.method_table import MethodTable
@@ -12,9 +11,8 @@ from oed.reports.pictures.torque_pictures import residual_picture, torque_pictur
 from oed.reports.rendering.page import Cell, Fact, Page, Section, Table, page_of
 from oed.reports.rendering.picture import Picture
 from oed.reports.rendering.provenance import recordings_of
+from robots.common.arrays import Array
 from robots.common.plain import significant, significant_error
-
-Array = NDArray[np.float64]
 
 # Pairs of parameters shown, and the correlation of their errors from which they are.
 PAIRS, CORRELATED = 12, 0.8

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from estimation.thermal import CampaignEstimate, ThermalChoice, ThermalEstimate
 from estimation.thermal.identification import ThermalIdentification
@@ -19,10 +18,9 @@ from oed.reports.pictures.thermal_pictures import (
 from oed.reports.rendering.page import Cell, Fact, Page, Section, Table, page_of
 from oed.reports.rendering.picture import Picture
 from oed.reports.rendering.provenance import recordings_from
+from robots.common.arrays import Array
 from robots.common.plain import significant, significant_error
 from robots.signals import Log
-
-Array = NDArray[np.float64]
 
 
 def thermal_result_page(result: ThermalIdentification) -> Page:

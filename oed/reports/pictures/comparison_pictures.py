@@ -12,7 +12,7 @@ from oed.reports.rendering.joint_units import joint_titles
 from oed.reports.rendering.palette import joint_role, sequence_role
 from oed.reports.rendering.panels import joint_bars, velocity_panel
 from oed.reports.rendering.picture import Line, Panel, Picture, Series
-from robots.signals import FloatArray
+from robots.common.arrays import Array
 
 SMALLEST_P = 1e-12
 """Smallest p-value that is drawn: the tail of the noise distribution is unknown beyond it."""
@@ -103,9 +103,9 @@ def significance_picture(
 
 
 def friction_runs_picture(
-    speeds: Sequence[FloatArray],
-    torques: Sequence[FloatArray],
-    errors: Sequence[FloatArray],
+    speeds: Sequence[Array],
+    torques: Sequence[Array],
+    errors: Sequence[Array],
     *,
     joints: Sequence[int],
     labels: Sequence[str],
@@ -143,10 +143,10 @@ def friction_runs_picture(
 
 
 def friction_difference_picture(
-    speeds: Sequence[FloatArray],
-    percents: Sequence[FloatArray],
-    pointwise: Sequence[FloatArray],
-    simultaneous: Sequence[FloatArray],
+    speeds: Sequence[Array],
+    percents: Sequence[Array],
+    pointwise: Sequence[Array],
+    simultaneous: Sequence[Array],
     *,
     joints: Sequence[int],
     kinds: Sequence[str],

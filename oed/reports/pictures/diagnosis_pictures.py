@@ -5,14 +5,13 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from estimation.uncertainty.quantiles import NORMAL_95
 from oed.reports.rendering.panels import ZERO, joint_bars
 from oed.reports.rendering.picture import Panel, Picture, Series
+from robots.common.arrays import Array
 from robots.common.errors import InputError
-
-Array = NDArray[np.float64]
 
 BINS = 60
 """Stretches of the coordinate, each of as many samples, whose mean is drawn."""

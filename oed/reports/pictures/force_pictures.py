@@ -13,7 +13,7 @@ from oed.reports.rendering.joint_units import joint_titles, joint_units
 from oed.reports.rendering.palette import sequence_role
 from oed.reports.rendering.panels import ZERO
 from oed.reports.rendering.picture import Line, Panel, Picture, Series, Span
-from robots.signals import FloatArray
+from robots.common.arrays import Array
 
 Windows = Sequence[tuple[float, float]]
 
@@ -133,7 +133,7 @@ def external_torque_picture(
     )
 
 
-def _banded(t: FloatArray, values: FloatArray, deviation: FloatArray, role: str) -> Series:
+def _banded(t: Array, values: Array, deviation: Array, role: str) -> Series:
     width = NORMAL_95 * np.where(np.isfinite(deviation), deviation, np.nan)
     return Series(x=t, y=values, error=width if np.isfinite(width).any() else None, role=role)
 

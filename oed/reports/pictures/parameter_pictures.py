@@ -11,9 +11,9 @@ from estimation.uncertainty.quantiles import NORMAL_95
 from oed.reports.rendering.palette import joint_role
 from oed.reports.rendering.panels import ZERO, joint_bars, velocity_panel
 from oed.reports.rendering.picture import Line, Panel, Picture, Series
+from robots.common.arrays import Array
 from robots.common.errors import InputError
 from robots.common.plain import significant, with_error
-from robots.signals import FloatArray
 
 FLAT = 5.0
 """Bars higher than others by this factor flatten them."""
@@ -86,7 +86,7 @@ def friction_picture(
     coefficients: ArrayLike,
     velocity: ArrayLike,
     *,
-    shapes: Callable[[int, FloatArray], FloatArray] | None = None,
+    shapes: Callable[[int, Array], Array] | None = None,
     covariances: ArrayLike | None = None,
     references: ArrayLike | None = None,
     joint_names: Sequence[str] | None = None,
@@ -160,7 +160,7 @@ def error_bars_picture(
     Raises:
         InputError: no errors, or lengths that differ.
     """
-    rows: dict[str, FloatArray] = {label: np.asarray(row, dtype=np.float64) for label, row in errors.items()}
+    rows: dict[str, Array] = {label: np.asarray(row, dtype=np.float64) for label, row in errors.items()}
     others = {label: np.asarray(row, dtype=np.float64) for label, row in (rivals or {}).items()}
     top = max((float(np.nanmax(row, initial=0.0)) for row in rows.values()), default=0.0)
     far = {label: row for label, row in others.items() if np.nanmax(row, initial=0.0) > FLAT * top}
@@ -183,7 +183,7 @@ def error_bars_picture(
     )
 
 
-def _stated(far: Mapping[str, FloatArray]) -> str:
+def _stated(far: Mapping[str, Array]) -> str:
     if not far:
         return ""
     texts = []
@@ -197,5 +197,5 @@ def _short(name: str) -> str:
     return name if len(name) <= LABEL_LENGTH else name[: LABEL_LENGTH - 1].rstrip(" +-") + "…"
 
 
-def _polynomial(dq: FloatArray) -> FloatArray:
+def _polynomial(dq: Array) -> Array:
     return np.column_stack([np.sign(dq), dq, dq * np.abs(dq), dq**3])

@@ -6,7 +6,6 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from estimation.thermal import RunFit, ThermalEstimate
 from estimation.uncertainty.quantiles import NORMAL_95
@@ -16,10 +15,10 @@ from oed.reports.rendering.palette import sequence_role
 from oed.reports.rendering.panels import velocity_panel
 from oed.reports.rendering.picture import Panel, Picture, Series
 from oed.reports.rendering.thinning import thin_indices
+from robots.common.arrays import Array
 from robots.signals import Log
 from robots.thermal import cold_friction
 
-Array = NDArray[np.float64]
 Fits = Sequence[ThermalEstimate | None]
 
 # Curves between cold and warm.

@@ -14,9 +14,9 @@ from oed.reports.rendering.joint_units import joint_titles, joint_units
 from oed.reports.rendering.palette import joint_role
 from oed.reports.rendering.panels import ZERO
 from oed.reports.rendering.picture import Band, Panel, Picture, Series
+from robots.common.arrays import Array
 from robots.common.errors import InputError
 from robots.common.plain import rounded_percent, significant
-from robots.signals import FloatArray
 
 BINS = 41
 LAGS = 200
@@ -115,7 +115,7 @@ def torque_picture(
     )
 
 
-def measured_line(t: FloatArray, values: FloatArray) -> tuple[Series, ...]:
+def measured_line(t: Array, values: Array) -> tuple[Series, ...]:
     """Draws a measured signal, if there is one.
 
     Args:
@@ -125,7 +125,7 @@ def measured_line(t: FloatArray, values: FloatArray) -> tuple[Series, ...]:
     return (Series(x=t, y=values, name="measured", role="measured"),) if np.isfinite(values).any() else ()
 
 
-def _view(residual: FloatArray, width: FloatArray | None) -> tuple[float, float] | None:
+def _view(residual: Array, width: Array | None) -> tuple[float, float] | None:
     """The range that shows the residual and the usual band; None where that is all there is.
 
     Friction at standstill makes the band many times wider, which would flatten the residual in motion.
@@ -138,7 +138,7 @@ def _view(residual: FloatArray, width: FloatArray | None) -> tuple[float, float]
     return (-half, half) if widths.max() > WIDE * half else None
 
 
-def _band_of(t: FloatArray, width: FloatArray | None) -> tuple[Series, ...]:
+def _band_of(t: Array, width: Array | None) -> tuple[Series, ...]:
     if width is None:
         return ()
     # Where it keeps its width, its corners are enough.
@@ -202,7 +202,7 @@ def residual_picture(
     )
 
 
-def _histogram(errors: FloatArray, title: str, unit: str, role: str) -> Panel:
+def _histogram(errors: Array, title: str, unit: str, role: str) -> Panel:
     known = errors[np.isfinite(errors)]
     if len(known) == 0:
         return Panel(title=f"{title} spread", note="no data")
@@ -212,7 +212,7 @@ def _histogram(errors: FloatArray, title: str, unit: str, role: str) -> Panel:
     edges = np.linspace(known.mean() - reach, known.mean() + reach, BINS + 1)
     density, _ = np.histogram(known, bins=edges)
     width = edges[1] - edges[0]
-    middle: FloatArray = 0.5 * (edges[1:] + edges[:-1])
+    middle: Array = 0.5 * (edges[1:] + edges[:-1])
     series = [Series(x=middle, y=density / (len(known) * width), kind="bars", role=role, opacity=0.75)]
     if deviation > 0.0:
         bell = np.exp(-0.5 * ((middle - known.mean()) / deviation) ** 2) / (deviation * np.sqrt(2.0 * np.pi))
@@ -222,9 +222,9 @@ def _histogram(errors: FloatArray, title: str, unit: str, role: str) -> Panel:
     )
 
 
-def _memory(errors: FloatArray, title: str, period: float, role: str) -> Panel:
+def _memory(errors: Array, title: str, period: float, role: str) -> Panel:
     lags = min(LAGS, len(errors) - 1)
-    times: FloatArray = period * np.arange(lags + 1, dtype=np.float64)
+    times: Array = period * np.arange(lags + 1, dtype=np.float64)
     correlation = autocorrelation(errors, lags, by_pairs=True)
     bound = NORMAL_95 / np.sqrt(max(int(np.isfinite(errors).sum()), 1))
     return Panel(
@@ -237,7 +237,7 @@ def _memory(errors: FloatArray, title: str, period: float, role: str) -> Panel:
     )
 
 
-def _against_velocity(errors: FloatArray, speeds: FloatArray, title: str, units: tuple[str, str], role: str) -> Panel:
+def _against_velocity(errors: Array, speeds: Array, title: str, units: tuple[str, str], role: str) -> Panel:
     known = np.isfinite(errors) & np.isfinite(speeds)
     errors, speeds = errors[known], speeds[known]
     title, x_label, y_label = f"{title} over velocity", f"velocity [{units[0]}]", f"residual [{units[1]}]"
@@ -261,7 +261,7 @@ def _against_velocity(errors: FloatArray, speeds: FloatArray, title: str, units:
     )
 
 
-def _widths(band: ArrayLike | None, shape: tuple[int, ...]) -> FloatArray | None:
+def _widths(band: ArrayLike | None, shape: tuple[int, ...]) -> Array | None:
     if band is None:
         return None
     widths = np.asarray(band, dtype=np.float64)
@@ -270,12 +270,12 @@ def _widths(band: ArrayLike | None, shape: tuple[int, ...]) -> FloatArray | None
     return np.broadcast_to(widths, shape)
 
 
-def _rms(values: FloatArray) -> float:
+def _rms(values: Array) -> float:
     known = values[np.isfinite(values)]
     return float(np.sqrt(np.mean(known**2))) if len(known) else float("nan")
 
 
-def _matrix(name: str, value: ArrayLike) -> FloatArray:
+def _matrix(name: str, value: ArrayLike) -> Array:
     array = np.asarray(value, dtype=np.float64)
     if array.ndim != 2:
         raise InputError(f"shape {array.shape}", column=name, allowed="shape (N, n)")

@@ -12,11 +12,12 @@ from oed.reports.rendering.joint_units import JointUnits, joint_titles, joint_un
 from oed.reports.rendering.palette import joint_role, sequence_role
 from oed.reports.rendering.panels import joint_bars
 from oed.reports.rendering.picture import Line, Panel, Picture, Series, Span
+from robots.common.arrays import Array
 from robots.common.errors import InputError
 from robots.common.plain import significant
 from robots.limits import Limits, Margin
 from robots.robot import Robot
-from robots.signals import FloatArray, Motion
+from robots.signals import Motion
 
 SEGMENT_ROLES = {
     "approach": "neutral",
@@ -198,7 +199,7 @@ def margins_picture(
     if not margins:
         raise InputError("no margins to show", allowed="one or more")
     count = max(margin.joint for margin in margins)
-    used: dict[str, FloatArray] = {}
+    used: dict[str, Array] = {}
     texts: dict[str, list[str]] = {}
     ranges = {
         joint: sum(margin.joint == joint and np.isfinite(margin.limit) for margin in margins if _is_position(margin))
@@ -249,7 +250,7 @@ def _limit_lines(limits: Limits | None, joint: int, quantity: str, units: JointU
     return tuple(Line(value=bound, label=significant(bound, digits=3)) for bound in shown)
 
 
-def _view(values: FloatArray, lines: tuple[Line, ...]) -> tuple[tuple[Line, ...], tuple[float, float] | None, str]:
+def _view(values: Array, lines: tuple[Line, ...]) -> tuple[tuple[Line, ...], tuple[float, float] | None, str]:
     """Gives the lines near the data, the y range that holds both, and a note about the lines that are far."""
     known = values[np.isfinite(values)]
     low, high = (float(known.min()), float(known.max())) if len(known) else (0.0, 0.0)
@@ -265,7 +266,7 @@ def _view(values: FloatArray, lines: tuple[Line, ...]) -> tuple[tuple[Line, ...]
     return near, (low - pad, high + pad), f"limit {', '.join(far)}" if far else ""
 
 
-def _matrix(name: str, value: ArrayLike, count: int) -> FloatArray:
+def _matrix(name: str, value: ArrayLike, count: int) -> Array:
     array = np.asarray(value, dtype=np.float64)
     if array.ndim != 2 or len(array) != count:
         raise InputError(f"shape {array.shape}", column=name, allowed=f"shape ({count}, n)")

@@ -5,13 +5,13 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
-from robots.signals import FloatArray
+from robots.common.arrays import Array
 
 PAUSE = 5.0
 """Steps of time longer than this many usual ones are pauses; the usual step is the median."""
 
 
-def break_at_pauses(t: ArrayLike, *signals: ArrayLike) -> tuple[FloatArray, ...]:
+def break_at_pauses(t: ArrayLike, *signals: ArrayLike) -> tuple[Array, ...]:
     """Puts a NaN into each signal wherever time pauses or goes back, as between two logs.
 
     Args:

@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from oed.reports.rendering.palette import colour, translucent
+from robots.common.arrays import Array
 from robots.common.errors import InputError
-from robots.signals import FloatArray
 
 Kind = Literal["lines", "markers", "bars", "steps"]
 Dash = Literal["solid", "dash", "dot"]
@@ -38,11 +38,11 @@ class Series:
         InputError: arrays of different lengths, or an unknown kind, dash or role.
     """
 
-    x: FloatArray
-    y: FloatArray
+    x: Array
+    y: Array
     name: str = ""
     kind: Kind = "lines"
-    error: FloatArray | None = None
+    error: Array | None = None
     role: str = "main"
     dash: Dash = "solid"
     opacity: float = 1.0
@@ -267,7 +267,7 @@ def legend_entries(picture: Picture) -> tuple[LegendEntry, ...]:
     return tuple(entries.values())
 
 
-def _vector(name: str, value: ArrayLike) -> FloatArray:
+def _vector(name: str, value: ArrayLike) -> Array:
     array = np.array(value, dtype=np.float64)
     if array.ndim != 1:
         raise InputError(f"shape {array.shape}", column=name, allowed="shape (N,)")

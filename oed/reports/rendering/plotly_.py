@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 from oed.reports.rendering.palette import GRID, INK, colour, translucent
 from oed.reports.rendering.picture import Band, Panel, Picture, Series, Span
 from oed.reports.rendering.thinning import POINTS, thin_indices
-from robots.signals import FloatArray
+from robots.common.arrays import Array
 
 if TYPE_CHECKING:
     # A page without pictures, and every other command, shall not wait for plotly.
@@ -150,12 +150,12 @@ def _slot(series: Series, panel: Panel) -> tuple[float, float]:
     return (bars.index(series) - 0.5 * len(bars)) * width, width
 
 
-def _ribbon(x: FloatArray, y: FloatArray, error: FloatArray, series: Series) -> dict[str, Any]:
+def _ribbon(x: Array, y: Array, error: Array, series: Series) -> dict[str, Any]:
     known = np.isfinite(y) & np.isfinite(error)
     starts = np.flatnonzero(known & ~np.concatenate([[False], known[:-1]]))
     ends = np.flatnonzero(known & ~np.concatenate([known[1:], [False]])) + 1
-    edge_x: list[FloatArray] = []
-    edge_y: list[FloatArray] = []
+    edge_x: list[Array] = []
+    edge_y: list[Array] = []
     gap = np.array([np.nan])
     # One closed outline for each stretch without a gap.
     for start, end in zip(starts, ends, strict=True):
@@ -300,7 +300,7 @@ def _log_ticks(shown: Sequence[ArrayLike]) -> dict[str, Any]:
     return {"tickvals": ticks, "ticktext": [f"{tick:.10g}" for tick in ticks]}
 
 
-def _compact(values: FloatArray) -> FloatArray:
+def _compact(values: Array) -> Array:
     # Seven digits are more than a screen shows, in half of the bytes.
     return values.astype(np.float32)
 

@@ -13,10 +13,9 @@ from scipy.optimize import minimize
 from scipy.spatial import ConvexHull, QhullError
 
 from robots.collision.drawn.shapes import mesh_tree
+from robots.common.arrays import Array
 from robots.common.errors import InputError
 from robots.geometry.urdf_shapes import UrdfShape, mesh_file
-
-Array = NDArray[np.float64]
 
 RIM_POINTS = 24  # points of a cylinder's rim; the polygon is drawn about it, so that it encloses the circle
 

@@ -5,15 +5,14 @@ from __future__ import annotations
 from xml.etree import ElementTree
 
 import numpy as np
-from numpy.typing import NDArray
 
+from robots.common.arrays import Array
 from robots.common.errors import InputError
 from robots.geometry.urdf import UrdfTree, read_urdf
 from robots.geometry.urdf_reader import UrdfReader
 from robots.geometry.xacro_ import is_description, urdf_bytes
 from robots.robot import Robot
 
-Array = NDArray[np.float64]
 Box = tuple[Array, Array]
 
 

@@ -7,18 +7,16 @@ from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
-from numpy.typing import NDArray
 
 from robots.collision.boxes import Box
 from robots.collision.capsules import Capsule, numbered
 from robots.collision.drawn.fitting import Balls, fit_capsule, shape_balls
 from robots.collision.drawn.shapes import BodyPair, DrawnBodies, left_out_pairs, shapes_of
 from robots.collision.pairs import SAMPLED_POSES, always_touching, body_clearance, distinct_rows, poses_of, random_poses
+from robots.common.arrays import Array
 from robots.common.errors import AssumedValueWarning, InputError
 from robots.geometry.urdf_shapes import UrdfShape
 from robots.robot import Robot
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

@@ -12,11 +12,11 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from robots.common.arrays import Array
 from robots.common.errors import InputError
 from robots.geometry.urdf_shapes import UrdfShape, drawn_shapes, mesh_file
 from robots.robot import Robot
 
-Array = NDArray[np.float64]
 BodyPair = frozenset[int]
 
 

@@ -9,10 +9,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from robots.common.arrays import Array
 from robots.common.errors import InputError
 from robots.common.tables.table import Table
-
-FloatArray = NDArray[np.float64]
 
 _FORM = re.compile(r"\s*(\d{4}-\d{2}-\d{2}[T ])?\d{2}:\d{2}:\d{2}([.,]\d+|:(\d{3}){1,3})?\s*(Z|[+-]\d{2}:?\d{2})?\s*")
 # Milli-, micro- or nanoseconds behind a colon, as 12:34:56:789.
@@ -28,11 +27,11 @@ _SHEET = re.compile(
 _MINUTES = re.compile(r"\s*(?P<minutes>\d{1,2}):(?P<seconds>\d{2}[.,]\d+)\s*")
 
 
-def seconds_since_1970(stamps: NDArray[np.datetime64]) -> FloatArray:
+def seconds_since_1970(stamps: NDArray[np.datetime64]) -> Array:
     """Gives stamps of time (N,) in seconds [s], to 0.2 us; NaN for a missing one."""
     whole = stamps.astype("datetime64[ns]")
     days = whole.astype("datetime64[D]")
-    since: FloatArray = (whole - days) / np.timedelta64(1, "s") + (days - np.datetime64(0, "D")) / np.timedelta64(
+    since: Array = (whole - days) / np.timedelta64(1, "s") + (days - np.datetime64(0, "D")) / np.timedelta64(
         1, "D"
     ) * SECONDS_PER_DAY
     return since
@@ -43,7 +42,7 @@ def is_time(text: object) -> bool:
     return isinstance(text, str) and (_FORM.fullmatch(text) is not None or _sheet_parts(text) is not None)
 
 
-def seconds_of(table: Table, name: str) -> FloatArray:
+def seconds_of(table: Table, name: str) -> Array:
     """Reads a column of times, with or without date and time zone; without a zone it is UTC.
 
     Dates are those of ISO 8601 or of spreadsheets. Of ``5/3/2024`` the first number is the day if another date of the
@@ -89,7 +88,7 @@ def _no_time(table: Table, name: str, row: int) -> InputError:
     )
 
 
-def _unwrapped(values: FloatArray, period: float) -> FloatArray:
+def _unwrapped(values: Array, period: float) -> Array:
     """Adds a day or an hour wherever a clock without dates begins again."""
     again = np.concatenate([[False], np.diff(values) < -0.5 * period])
     return values + period * np.cumsum(again)
@@ -103,7 +102,7 @@ def _sheet_parts(text: str) -> re.Match[str] | None:
     return match
 
 
-def _of_sheet(table: Table, name: str) -> FloatArray:
+def _of_sheet(table: Table, name: str) -> Array:
     texts = table.columns[name]
     hours = np.empty(len(texts))
     dates: list[tuple[int, ...]] = []
@@ -136,7 +135,7 @@ def _of_sheet(table: Table, name: str) -> FloatArray:
     return min(found, key=lambda values: float(values.max() - values.min()))
 
 
-def _days(dates: list[tuple[int, ...]], order: str) -> FloatArray | None:
+def _days(dates: list[tuple[int, ...]], order: str) -> Array | None:
     """Seconds since 1970 at the beginning of each date; None if one does not exist in this order."""
     known: dict[tuple[int, ...], float] = {}
     for date in dict.fromkeys(dates):
@@ -149,7 +148,7 @@ def _days(dates: list[tuple[int, ...]], order: str) -> FloatArray | None:
     return np.array([known[date] for date in dates])
 
 
-def _by_numpy(texts: NDArray[Any]) -> FloatArray | None:
+def _by_numpy(texts: NDArray[Any]) -> Array | None:
     """The fast way, for dates without a zone; None for other forms."""
     first = str(texts[0])
     if (

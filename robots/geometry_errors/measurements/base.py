@@ -9,13 +9,11 @@ from typing import ClassVar
 
 import casadi
 import numpy as np
-from numpy.typing import NDArray
 
+from robots.common.arrays import Array
 from robots.common.errors import InputError
 from robots.geometry_errors.measurements.setup import Setup
 from robots.geometry_errors.twists import cross_matrix
-
-Array = NDArray[np.float64]
 
 Scene = tuple[casadi.SX, Mapping[str, casadi.SX]]
 """Pose of the flange (4, 4), and the parts of the setup by name, as expressions."""

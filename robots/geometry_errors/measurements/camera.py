@@ -8,9 +8,9 @@ from typing import Any
 
 import casadi
 import numpy as np
-from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
+from robots.common.arrays import Array
 from robots.common.errors import InputError
 from robots.geometry_errors.measurements.base import (
     Evaluation,
@@ -22,9 +22,6 @@ from robots.geometry_errors.measurements.base import (
 from robots.geometry_errors.measurements.poses import BodyPoses
 from robots.geometry_errors.measurements.setup import Setup, Unknown
 from robots.geometry_errors.twists import adjoint, inverse
-
-Array = NDArray[np.float64]
-
 
 NEAREST = 1e-3  # m; what is nearer than this, or behind, is not in an image
 UNDISTORTIONS = 20  # fixed-point steps from pixels to directions

@@ -6,13 +6,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from robots.common.arrays import Array
 from robots.geometry_errors.measurements.base import Evaluation, Measurement, setup_jacobian
 from robots.geometry_errors.measurements.setup import Setup, Unknown
 from robots.geometry_errors.twists import adjoint, cross_matrix, inverse, rotation_log_jacobian, rotation_vector
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, kw_only=True)

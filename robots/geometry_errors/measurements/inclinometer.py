@@ -7,13 +7,11 @@ from dataclasses import dataclass
 
 import casadi
 import numpy as np
-from numpy.typing import NDArray
 
+from robots.common.arrays import Array
 from robots.geometry_errors.measurements.base import Evaluation, Measurement, Scene, setup_jacobian
 from robots.geometry_errors.measurements.setup import Setup, Unknown, tangents
 from robots.geometry_errors.twists import cross_matrix
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 
 import casadi
 import numpy as np
-from numpy.typing import NDArray
 
+from robots.common.arrays import Array
 from robots.geometry_errors.measurements.base import (
     Evaluation,
     Measurement,
@@ -18,8 +18,6 @@ from robots.geometry_errors.measurements.base import (
     setup_jacobian,
 )
 from robots.geometry_errors.measurements.setup import Setup, Unknown
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, kw_only=True)

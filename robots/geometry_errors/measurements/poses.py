@@ -7,9 +7,9 @@ from dataclasses import dataclass
 
 import casadi
 import numpy as np
-from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
+from robots.common.arrays import Array
 from robots.geometry_errors.measurements.base import (
     Evaluation,
     Measurement,
@@ -20,8 +20,6 @@ from robots.geometry_errors.measurements.base import (
 )
 from robots.geometry_errors.measurements.setup import Setup, Unknown
 from robots.geometry_errors.twists import rotation_log_jacobian, rotation_vector
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, kw_only=True)

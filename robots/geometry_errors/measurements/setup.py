@@ -7,12 +7,10 @@ from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
+from robots.common.arrays import Array
 from robots.geometry_errors.terms.base import ErrorParameter, parameter
 from robots.geometry_errors.twists import exponential
-
-Array = NDArray[np.float64]
 
 AXES = ("x", "y", "z", "rx", "ry", "rz")
 

@@ -6,12 +6,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from robots.common.arrays import Array
 from robots.geometry_errors.measurements.base import Evaluation, Measurement, point_by_twist, setup_jacobian
 from robots.geometry_errors.measurements.setup import Setup, Unknown, tangents
-
-Array = NDArray[np.float64]
 
 
 def _tip(flange: Array, setup: Setup) -> tuple[Array, Array]:

@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from robots.common.arrays import Array
 from robots.geometry_errors.state import ArmState
 from robots.geometry_errors.terms.base import Column, ErrorParameter, ErrorTerm, one_each, parameter
 from robots.robot import MASSES_REMEDY, Robot
-
-Array = NDArray[np.float64]
 
 NEGLIGIBLE = 1e-9  # of the largest moment; a vertical axis carries no moment of gravity beyond rounding
 

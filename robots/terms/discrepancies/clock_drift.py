@@ -5,14 +5,12 @@ from __future__ import annotations
 from typing import ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 
+from robots.common.arrays import Array
 from robots.robot import Robot
 from robots.terms.discrepancies.gain_drift import OverTime, half_waves, log_time
 from robots.terms.effects import Coefficient, Situation
 from robots.terms.effects.time_delay import lateness
-
-Array = NDArray[np.float64]
 
 DELAY_WAVES = 3
 

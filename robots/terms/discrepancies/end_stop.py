@@ -5,15 +5,13 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from robots.common.arrays import Array
 from robots.robot import Robot
 from robots.terms.base import force_unit, length_unit
 from robots.terms.columns import side_by_side
 from robots.terms.discrepancies.local_fault import Placed
 from robots.terms.effects import Coefficient, Shape, Situation
-
-Array = NDArray[np.float64]
 
 SCANNED = tuple(float(share) for share in np.arange(0.05, 0.96, 0.075))
 """Positions of a scan, as fractions of the joint's range in the data."""

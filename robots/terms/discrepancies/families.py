@@ -7,17 +7,15 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.signal import lfilter
 
+from robots.common.arrays import Array
 from robots.common.stretches import spans
 from robots.terms.columns import side_by_side
 from robots.terms.discrepancies.gain_drift import half_waves, log_time
 from robots.terms.discrepancies.resonance import resonance
 from robots.terms.effect_bases.states import bristle
 from robots.terms.effects import Situation
-
-Array = NDArray[np.float64]
 
 HARMONICS = (1, 2, 3, 4)
 # Time constants [s] of the memory of velocity, of sensor creep, and of a drop of the supply voltage.

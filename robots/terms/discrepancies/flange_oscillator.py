@@ -5,13 +5,11 @@ from __future__ import annotations
 from typing import ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 
+from robots.common.arrays import Array
 from robots.robot import Robot
 from robots.terms.discrepancies.resonance import resonance
 from robots.terms.effects import Coefficient, Effect, Shape, Situation
-
-Array = NDArray[np.float64]
 
 FREQUENCIES = tuple(float(f) for f in np.geomspace(0.4, 5.0, 24))
 _WAYS = ("level", "upright")

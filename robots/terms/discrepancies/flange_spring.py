@@ -5,12 +5,10 @@ from __future__ import annotations
 from typing import ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 
+from robots.common.arrays import Array
 from robots.robot import Robot
 from robots.terms.effects import Coefficient, Effect, Situation
-
-Array = NDArray[np.float64]
 
 _WAYS = ("x", "y", "z")
 

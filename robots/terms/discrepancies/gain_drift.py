@@ -5,15 +5,13 @@ from __future__ import annotations
 from typing import ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 
+from robots.common.arrays import Array
 from robots.common.plain import percent
 from robots.robot import Robot
 from robots.terms.columns import side_by_side
 from robots.terms.effect_bases.capabilities import Persistence
 from robots.terms.effects import Coefficient, Effect, Situation
-
-Array = NDArray[np.float64]
 
 GAIN_WAVES = 5
 FEWEST_JOINTS_OF_DRIFT = 3  # joints

@@ -5,14 +5,12 @@ from __future__ import annotations
 from typing import ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 
+from robots.common.arrays import Array
 from robots.common.plain import percent
 from robots.robot import Robot
 from robots.terms.effect_bases.sudden import Sudden
 from robots.terms.effects import Coefficient, JointEffect, Situation
-
-Array = NDArray[np.float64]
 
 
 class GainStep(Sudden, JointEffect):

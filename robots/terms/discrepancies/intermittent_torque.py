@@ -5,8 +5,8 @@ from __future__ import annotations
 from typing import ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 
+from robots.common.arrays import Array
 from robots.robot import Robot
 from robots.terms.base import force_unit
 from robots.terms.discrepancies.gain_drift import OverTime
@@ -14,8 +14,6 @@ from robots.terms.effect_bases.capabilities import Persistence
 from robots.terms.effect_bases.states import spells
 from robots.terms.effects import Coefficient, JointEffect, Shape, Situation
 from robots.terms.effects.external_contact import HOLD_HARDNESS, pulse
-
-Array = NDArray[np.float64]
 
 SPELLS = (1.5, 3.0, 6.0, 12.0)
 """Durations [s] of temporary friction in a scan."""

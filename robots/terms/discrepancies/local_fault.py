@@ -5,13 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from robots.common.arrays import Array
 from robots.robot import Robot
 from robots.terms.base import force_unit
 from robots.terms.effects import Coefficient, JointEffect, Shape, Situation
-
-Array = NDArray[np.float64]
 
 WIDTHS = (0.015, 0.03, 0.06, 0.12)
 """Widths (standard deviations) in a scan, as fractions of the joint's range; narrower ones are ripple, wider ones a

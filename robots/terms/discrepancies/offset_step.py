@@ -5,16 +5,14 @@ from __future__ import annotations
 from typing import ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 
+from robots.common.arrays import Array
 from robots.robot import Robot
 from robots.terms.base import length_unit
 from robots.terms.effect_bases.states import best_apart
 from robots.terms.effect_bases.sudden import Sudden
 from robots.terms.effects import Coefficient, Situation
 from robots.terms.effects.base_tilt import tilted_torque
-
-Array = NDArray[np.float64]
 
 
 class Step(Sudden):

@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from robots.common.arrays import Array
 from robots.robot import Robot
 from robots.terms.discrepancies.clock_drift import ClockDrift
 from robots.terms.discrepancies.end_stop import EndStop
@@ -22,8 +22,6 @@ from robots.terms.discrepancies.payload_drift import PayloadDrift
 from robots.terms.discrepancies.session_friction import SessionFriction
 from robots.terms.effect_bases.capabilities import AboveBand
 from robots.terms.effects import Coefficient, Effect, JointEffect, Shape, Situation
-
-Array = NDArray[np.float64]
 
 PREFIX = "pattern:"
 # Frequencies of a ringing load and of a vibration [Hz].

@@ -5,13 +5,11 @@ from __future__ import annotations
 from typing import ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 
+from robots.common.arrays import Array
 from robots.robot import Robot
 from robots.terms.discrepancies.gain_drift import OverTime, half_waves, log_time
 from robots.terms.effects import Coefficient, Situation
-
-Array = NDArray[np.float64]
 
 PAYLOAD_WAVES = 3
 _PARTS = (("mass", "kg"), ("moment_x", "kg m"), ("moment_y", "kg m"), ("moment_z", "kg m"))

@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.signal import lfilter
 
+from robots.common.arrays import Array
 from robots.terms.effect_bases.parameters import DAMPING_RATIO
 from robots.terms.effects import Situation
-
-Array = NDArray[np.float64]
 
 
 def resonance(situation: Situation, drive: Array, frequency: float) -> tuple[Array, Array]:

@@ -6,15 +6,13 @@ from itertools import pairwise
 from typing import ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 
+from robots.common.arrays import Array
 from robots.common.plain import percent
 from robots.robot import Robot
 from robots.signals import UNKNOWN_PAUSE
 from robots.terms.discrepancies.gain_drift import OverTime
 from robots.terms.effects import Coefficient, Situation
-
-Array = NDArray[np.float64]
 
 MOST_SESSIONS = 6
 """Largest number of separate sessions; if there are more, consecutive ones are grouped."""

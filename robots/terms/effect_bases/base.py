@@ -13,14 +13,13 @@ from typing import TYPE_CHECKING, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
+from robots.common.arrays import Array
 from robots.terms.effect_bases.capabilities import AboveBand, AtReversals, GearLoad, Persistence, Reading
 from robots.terms.effect_bases.parameters import Coefficient, Place, Shape
 from robots.terms.situations.situation import Situation
 
 if TYPE_CHECKING:
     from robots.robot import Robot
-
-Array = NDArray[np.float64]
 
 
 class Effect(ABC):

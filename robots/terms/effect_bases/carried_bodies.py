@@ -6,12 +6,10 @@ from itertools import product
 
 import clarabel
 import numpy as np
-from numpy.typing import NDArray
 from scipy import sparse
 
+from robots.common.arrays import Array
 from robots.consistency import BASIS, inertial_from_pseudo, pseudo_inertia
-
-Array = NDArray[np.float64]
 
 # Coordinates [m] of the centres of mass at which a search starts, about the flange. Finer ones change no result.
 _COORDINATES = (-0.4, -0.15, -0.05, 0.0, 0.05, 0.15, 0.4)

@@ -7,13 +7,11 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
+from robots.common.arrays import Array
 from robots.terms.effect_bases.base import Effect, Place
 from robots.terms.effect_bases.capabilities import GearLoad
 from robots.terms.situations.situation import Situation
-
-Array = NDArray[np.float64]
 
 LoadPath = Literal["effects", "preloads"]
 """Which torque loads the gears: that of the effects alone, or also the base model's offset on preloaded joints."""

@@ -5,16 +5,14 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 
+from robots.common.arrays import Array
 from robots.terms.effect_bases.base import JointEffect, Place
 from robots.terms.effect_bases.capabilities import Persistence
 from robots.terms.situations.situation import Situation
 
 if TYPE_CHECKING:
     from robots.robot import Robot
-
-Array = NDArray[np.float64]
 
 
 class HeatEffect(JointEffect):

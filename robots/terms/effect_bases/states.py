@@ -5,13 +5,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.signal import lfilter
 
+from robots.common.arrays import Array
 from robots.robot import Robot
 from robots.terms.situations.situation import Situation
-
-Array = NDArray[np.float64]
 
 SCANNED_CHANGES = 24
 """Number of change times in a scan: a step between two of them loses at most a tenth of its energy."""

@@ -10,16 +10,14 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import casadi
 import numpy as np
-from numpy.typing import NDArray
 
 from robots.batch import BatchFunction, batch_function, builds_expressions
+from robots.common.arrays import Array
 from robots.terms.effect_bases.base import Effect, JointEffect, Place
 from robots.terms.situations.situation import Situation
 
 if TYPE_CHECKING:
     from robots.robot import Robot
-
-Array = NDArray[np.float64]
 
 
 class Instant(NamedTuple):

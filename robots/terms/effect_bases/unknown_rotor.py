@@ -7,11 +7,9 @@ inertia, if the robot's description lacks it or is inaccurate.
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from robots.common.arrays import Array
 from robots.terms.effect_bases.base import Shape, Situation
-
-Array = NDArray[np.float64]
 
 KNOWN_ROTOR = 0.0
 """Additional rotor inertia of a known rotor: none."""

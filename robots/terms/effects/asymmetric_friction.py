@@ -5,17 +5,14 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, ClassVar
 
 import casadi
-import numpy as np
-from numpy.typing import NDArray
 
+from robots.common.arrays import Array
 from robots.terms.base import force_unit, length_unit
 from robots.terms.effect_bases.base import Coefficient, Place, Situation
 from robots.terms.effect_bases.static import Instant, StaticJointEffect
 
 if TYPE_CHECKING:
     from robots.robot import Robot
-
-Array = NDArray[np.float64]
 
 
 class AsymmetricFriction(StaticJointEffect):

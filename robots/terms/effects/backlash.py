@@ -8,9 +8,9 @@ from itertools import product
 from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.integrate import cumulative_trapezoid
 
+from robots.common.arrays import Array
 from robots.terms.base import force_unit, length_unit
 from robots.terms.effect_bases.base import Coefficient, Effect, Place, Shape, Situation
 from robots.terms.effect_bases.capabilities import AboveBand, AtReversals, GearLoad
@@ -28,7 +28,6 @@ from robots.terms.effects.joint_elasticity import least_inertia, link_inertia, w
 if TYPE_CHECKING:
     from robots.robot import Robot
 
-Array = NDArray[np.float64]
 
 SCANNED = tuple(0.006 * 1.25**k for k in range(17))
 """Crossing times [s] of a scan, up to 0.2; steps of a quarter, because impacts at wrong times explain nothing."""

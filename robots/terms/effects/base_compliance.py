@@ -6,9 +6,9 @@ from itertools import product
 from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.linalg import solve_banded
 
+from robots.common.arrays import Array
 from robots.terms.effect_bases.base import Coefficient, Effect, Place, Shape, Situation
 from robots.terms.effect_bases.parameters import DAMPING_RATIO
 from robots.terms.effects.base_tilt import level_axes, tilted_torque, upright
@@ -16,7 +16,6 @@ from robots.terms.effects.base_tilt import level_axes, tilted_torque, upright
 if TYPE_CHECKING:
     from robots.robot import Robot
 
-Array = NDArray[np.float64]
 
 SCANNED = (*(3.5 * 1.1**k for k in range(18)), 30.0, 300.0)
 """Resonances [Hz] of a scan at the log's mean inertia, up to 18 in steps of a tenth: a resonance is narrow."""

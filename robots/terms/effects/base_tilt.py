@@ -5,15 +5,14 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 
+from robots.common.arrays import Array
 from robots.terms.effect_bases.base import Coefficient, Effect, Place, Shape, Situation
 from robots.terms.effect_bases.capabilities import GearLoad
 
 if TYPE_CHECKING:
     from robots.robot import Robot
 
-Array = NDArray[np.float64]
 
 # First moments [kg m] of all that rotates about a vertical first axis, along the horizontal axes at zero joint angle.
 OWN = tuple(Shape(f"own_moment_{k}", "kg m", -np.inf, np.inf, "linear", (0.0,), default=0.0, beside=True) for k in "12")

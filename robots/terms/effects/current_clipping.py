@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import ndtr
 
+from robots.common.arrays import Array
 from robots.common.stretches import spans
 from robots.terms.base import force_unit
 from robots.terms.effect_bases.base import Coefficient, JointEffect, Place, Shape, Situation
@@ -15,8 +16,6 @@ from robots.terms.effect_bases.capabilities import Reading
 
 if TYPE_CHECKING:
     from robots.robot import Robot
-
-Array = NDArray[np.float64]
 
 
 class CurrentClipping(JointEffect):

@@ -5,17 +5,13 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import TYPE_CHECKING, ClassVar
 
-import numpy as np
-from numpy.typing import NDArray
-
+from robots.common.arrays import Array
 from robots.terms.base import force_unit
 from robots.terms.effect_bases.base import Coefficient, JointEffect, Place, Shape, Situation
 from robots.terms.effects.time_delay import DELAY_ERROR, LEAST_DELAY, LEAST_SHIFT, SHIFT, Late, lateness, near
 
 if TYPE_CHECKING:
     from robots.robot import Robot
-
-Array = NDArray[np.float64]
 
 
 class CurrentLag(Late, JointEffect):

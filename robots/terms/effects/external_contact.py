@@ -5,9 +5,9 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.special import gamma
 
+from robots.common.arrays import Array
 from robots.terms.base import force_unit
 from robots.terms.effect_bases.base import Coefficient, Effect, Place, Shape, Situation
 from robots.terms.effect_bases.capabilities import GearLoad, Persistence
@@ -16,7 +16,6 @@ from robots.terms.effect_bases.states import spells
 if TYPE_CHECKING:
     from robots.robot import Robot
 
-Array = NDArray[np.float64]
 
 PUSH_HARDNESS = 0.6  # hardness of a push between a half sine and a constant force
 HOLD_HARDNESS = 0.1  # hardness of a nearly constant force

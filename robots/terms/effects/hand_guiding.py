@@ -5,8 +5,8 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 
+from robots.common.arrays import Array
 from robots.terms.base import force_unit, length_unit
 from robots.terms.effect_bases.base import Coefficient, Effect, Place, Shape, Situation
 from robots.terms.effect_bases.capabilities import Persistence
@@ -14,7 +14,6 @@ from robots.terms.effect_bases.capabilities import Persistence
 if TYPE_CHECKING:
     from robots.robot import Robot
 
-Array = NDArray[np.float64]
 
 # Durations of scanned windows, as fractions of a log.
 SHARES = (1 / 2, 1 / 4, 1 / 8, 1 / 16)

@@ -6,9 +6,9 @@ from itertools import product
 from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.linalg import solve_banded
 
+from robots.common.arrays import Array
 from robots.terms.base import force_unit, length_unit
 from robots.terms.effect_bases.base import Coefficient, Effect, Place, Shape, Situation
 from robots.terms.effect_bases.capabilities import AtReversals, GearLoad
@@ -18,7 +18,6 @@ from robots.terms.effect_bases.unknown_rotor import KNOWN_ROTOR, ROTOR, is_sure,
 if TYPE_CHECKING:
     from robots.robot import Robot
 
-Array = NDArray[np.float64]
 
 SCANNED = (3.5, 4.2, 5.0, 6.0, 7.2, 8.6, 10.4, 12.5, 15.0, 18.0, 30.0, 300.0)
 """Resonances [Hz] of a scan at the log's mean inertia; dense where motions excite them, because they are narrow."""

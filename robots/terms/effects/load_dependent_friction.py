@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING, ClassVar
 
 import casadi
 import numpy as np
-from numpy.typing import NDArray
 
+from robots.common.arrays import Array
 from robots.terms.base import force_unit, length_unit
 from robots.terms.effect_bases.base import Coefficient, Place, Shape, Situation
 from robots.terms.effect_bases.capabilities import GearLoad
@@ -16,8 +16,6 @@ from robots.terms.effect_bases.unknown_rotor import KNOWN_ROTOR, ROTOR, load_bes
 
 if TYPE_CHECKING:
     from robots.robot import Robot
-
-Array = NDArray[np.float64]
 
 
 # Ratio of friction when the load drives the joint to friction when the joint drives the load, if both are equal.

@@ -5,8 +5,8 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 
+from robots.common.arrays import Array
 from robots.terms.effect_bases.base import Coefficient, Effect, Place, Shape, Situation
 from robots.terms.effect_bases.capabilities import GearLoad, Persistence
 from robots.terms.effect_bases.carried_bodies import (
@@ -20,7 +20,6 @@ from robots.terms.effect_bases.states import change_times
 if TYPE_CHECKING:
     from robots.robot import Robot
 
-Array = NDArray[np.float64]
 
 LINK = 2  # index of that shape parameter
 FEWER = 12

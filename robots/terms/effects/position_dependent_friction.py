@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING, ClassVar
 
 import casadi
 import numpy as np
-from numpy.typing import NDArray
 
+from robots.common.arrays import Array
 from robots.terms.base import force_unit, length_unit
 from robots.terms.effect_bases.base import Coefficient, Place, Shape, Situation
 from robots.terms.effect_bases.static import Instant, StaticJointEffect
@@ -15,7 +15,6 @@ from robots.terms.effect_bases.static import Instant, StaticJointEffect
 if TYPE_CHECKING:
     from robots.robot import Robot
 
-Array = NDArray[np.float64]
 
 HIGHEST = {"rad": 12.0, "m": 1000.0}
 """Highest order per turn, and highest wave number of a linear axis [rad/m]; above it the effect is a ripple."""

@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING, ClassVar
 
 import casadi
 import numpy as np
-from numpy.typing import NDArray
 
+from robots.common.arrays import Array
 from robots.terms.base import force_unit, length_unit
 from robots.terms.effect_bases.base import Coefficient, Place, Shape, Situation
 from robots.terms.effect_bases.capabilities import GearLoad
@@ -16,7 +16,6 @@ from robots.terms.effect_bases.static import Instant, StaticJointEffect
 if TYPE_CHECKING:
     from robots.robot import Robot
 
-Array = NDArray[np.float64]
 
 PLAIN = (0.0, 0.0, 3.0)
 LINEAR = (0.0, 0.0, 1.0)

@@ -5,8 +5,8 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 
+from robots.common.arrays import Array
 from robots.terms.base import force_unit, length_unit
 from robots.terms.columns import side_by_side
 from robots.terms.effect_bases.base import Coefficient, Place, Shape, Situation
@@ -16,7 +16,6 @@ from robots.terms.effect_bases.states import relaxation
 if TYPE_CHECKING:
     from robots.robot import Robot
 
-Array = NDArray[np.float64]
 
 HOUSING_TIME_RATIO = 12.0
 """Time constant of the housing as a multiple of the gear's. It is fixed, because only logs of hours determine it."""

@@ -6,9 +6,9 @@ from collections.abc import Callable
 from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.interpolate import PchipInterpolator, make_interp_spline
 
+from robots.common.arrays import Array
 from robots.terms.base import force_unit
 from robots.terms.effect_bases.base import Coefficient, Effect, Place, Shape, Situation
 from robots.terms.effect_bases.capabilities import AtReversals
@@ -16,7 +16,6 @@ from robots.terms.effect_bases.capabilities import AtReversals
 if TYPE_CHECKING:
     from robots.robot import Robot
 
-Array = NDArray[np.float64]
 
 LEAST_SHIFT = 1e-5
 """Least step [s] of the difference quotient."""

@@ -4,9 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, ClassVar
 
-import numpy as np
-from numpy.typing import NDArray
-
+from robots.common.arrays import Array
 from robots.terms.base import force_unit
 from robots.terms.effect_bases.base import Coefficient, Place, Shape, Situation
 from robots.terms.effect_bases.heat import HeatEffect
@@ -14,8 +12,6 @@ from robots.terms.effects.load_heat import copper_heat
 
 if TYPE_CHECKING:
     from robots.robot import Robot
-
-Array = NDArray[np.float64]
 
 
 class TorqueConstantHeat(HeatEffect):

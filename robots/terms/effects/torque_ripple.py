@@ -6,9 +6,9 @@ from typing import TYPE_CHECKING, ClassVar
 
 import casadi
 import numpy as np
-from numpy.typing import NDArray
 from scipy.ndimage import median_filter
 
+from robots.common.arrays import Array
 from robots.terms.base import force_unit, length_unit
 from robots.terms.effect_bases.base import Coefficient, Place, Shape, Situation
 from robots.terms.effect_bases.capabilities import AboveBand
@@ -18,7 +18,6 @@ from robots.terms.effect_bases.static import Instant, StaticJointEffect
 if TYPE_CHECKING:
     from robots.robot import Robot
 
-Array = NDArray[np.float64]
 
 HIGHEST = {"rad": 1000.0, "m": 10_000.0}
 """Highest order per turn, and highest wave number of a linear axis [rad/m]: four waves per turn of a screw with 3 mm

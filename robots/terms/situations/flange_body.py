@@ -6,15 +6,14 @@ from dataclasses import replace
 from functools import lru_cache
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from robots.base_parameters import BaseParameters, find_base_parameters
+from robots.common.arrays import Array
 from robots.common.errors import InputError
 from robots.regressor import TorqueModel
 from robots.robot import Robot
 from robots.terms.situations.sensitivities import moved_body
-
-Array = NDArray[np.float64]
 
 FLANGE = "chain.tip"
 """In `Robot.assumed` where the pose of the flange on the last link is not known."""

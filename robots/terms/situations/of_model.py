@@ -5,12 +5,11 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
+
+from robots.common.arrays import Array
 
 if TYPE_CHECKING:
     from robots.regressor import TorqueModel
-
-Array = NDArray[np.float64]
 
 
 def rotor_inertias(model: TorqueModel, parameters: Array) -> Array:

@@ -7,16 +7,14 @@ from functools import lru_cache, partial
 
 import casadi
 import numpy as np
-from numpy.typing import NDArray
 
 from robots.batch import BatchFunction, batch_function, builds_expressions
+from robots.common.arrays import Array
 from robots.common.errors import InputError
 from robots.common.stretches import chunks
 from robots.geometry.chain import Chain
 from robots.geometry.symbolic import cleaned, symbolic_placement
 from robots.regressor import TorqueModel
-
-Array = NDArray[np.float64]
 
 
 def evaluate(kind: str, model: TorqueModel, parameters: Array, q: Array, dq: Array, ddq: Array) -> Array:

@@ -9,8 +9,9 @@ from itertools import pairwise
 from typing import TYPE_CHECKING, Any, TypeVar, cast
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from robots.common.arrays import Array
 from robots.common.errors import InputError
 from robots.robot import Robot
 from robots.terms.base import Column
@@ -20,7 +21,6 @@ from robots.terms.situations.sensitivities import evaluate
 if TYPE_CHECKING:
     from robots.regressor import TorqueModel
 
-Array = NDArray[np.float64]
 Kept = TypeVar("Kept")
 
 

@@ -3,11 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from oed.controllers.virtual_options import PathKind
-
-Array = NDArray[np.float64]
+from robots.common.arrays import Array
 
 
 class PathFault:

@@ -12,7 +12,6 @@ from math import nan
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from oed.controllers.rtde.packages import (
     AS_TORQUE,
@@ -36,10 +35,9 @@ from oed.controllers.virtual.ur.script import Halt, Run, ScriptError, program_of
 from oed.controllers.virtual_options import ControllerOptions
 from oed.exports.forms.base import require_joints
 from oed.exports.forms.urscript import CYCLES
+from robots.common.arrays import Array
 from robots.plants import Plant, nominal_plant
 from robots.robot import Robot
-
-Array = NDArray[np.float64]
 
 
 class _Programs:

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from estimation.calibrations import Calibration
 from estimation.calibrations.result import SHOWN, error_words
@@ -14,14 +13,13 @@ from oed.reports.animations.building import animate
 from oed.reports.rendering.joint_units import joint_titles
 from oed.reports.rendering.page import Cell, Fact, Page, Section, Table, page_of, table_of
 from oed.reports.rendering.picture import Panel, Picture, Series
+from robots.common.arrays import Array
 from robots.geometry_errors.poses import approaches
 from robots.geometry_errors.state import ArmState, gravity_loads
 from robots.geometry_errors.terms import error_term
 from robots.geometry_errors.terms.joint_compliance import axis_loads
 from robots.robot import Robot
 from robots.signals import Motion
-
-Array = NDArray[np.float64]
 
 WORST = 6  # poses in the picture of the robot
 HOLD, MOVE, STEP = 1.0, 1.5, 0.04  # s at a pose, between two, and between frames
