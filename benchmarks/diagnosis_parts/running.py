@@ -23,7 +23,7 @@ from oed.benchmarks.truth.oracle import ask_oracle
 from oed.benchmarks.truth.plant import Record
 from robots import load_robot
 from robots.common.errors import AssumedValueWarning, OedError
-from robots.common.memory import give_back
+from robots.common.workers import give_back
 from robots.robot import Robot
 from robots.signals import Log
 

@@ -18,9 +18,9 @@ from estimation.diagnosis.validations.validation import validate
 from estimation.identifications.estimate import Estimate
 from estimation.recordings import Recording, make_ready
 from robots.common.errors import InputError
-from robots.common.memory import give_back
 from robots.common.parallel import one_blas_thread
 from robots.common.progress import SILENT, Progress
+from robots.common.workers import give_back
 from robots.robot import Robot
 from robots.signals import Log
 from robots.terms import BendingFriction, FrictionTerm

@@ -20,7 +20,7 @@ from estimation.preprocessing import resample, rows_at_rest, smooth
 from estimation.preprocessing.smoothing import low_pass
 from estimation.regressions.preparation import torque_of
 from estimation.regressions.torque_meanings import as_joint_torque
-from robots.common.arrays import Array
+from robots.common.arrays import Array, Flags
 from robots.common.errors import InputError
 from robots.common.plain import joints_in_words, percent
 from robots.common.records import Finding, Result, axes_for, findings_of
@@ -138,19 +138,16 @@ class Prediction(Result):
         return None if self.rest is None else np.asarray(self.rest.mean(axis=0))
 
     @property
-    def _judged(self) -> Array:
-        judged = np.ones(self.predicted.shape)
-        if self.rest is not None:
-            judged[self.rest] = 0.0
-        if self.ends is not None:
-            judged[self.ends] = 0.0
-        return judged
+    def judged(self) -> Flags:
+        """Rows (N, n) that count in the errors: the joint moves, and the smoothing has positions on both sides."""
+        judged = np.ones(self.predicted.shape, dtype=bool) if self.rest is None else ~self.rest
+        return judged if self.ends is None else judged & ~self.ends[:, None]
 
     def _rms(self, signal: Array) -> Array:
-        return np.asarray(np.sqrt(np.average(signal**2, axis=0, weights=self._judged)))
+        return np.asarray(np.sqrt(np.average(signal**2, axis=0, weights=self.judged)))
 
     def _std(self, signal: Array) -> Array:
-        return self._rms(signal - np.average(signal, axis=0, weights=self._judged))
+        return self._rms(signal - np.average(signal, axis=0, weights=self.judged))
 
     def _over(self, error: Array, scale: Array | None) -> Array:
         if scale is None:

@@ -11,9 +11,8 @@ from concurrent.futures.process import BrokenProcessPool
 from itertools import count, repeat
 from typing import Any, TypeVar
 
-from robots.common.memory import give_back
 from robots.common.parallel import available_cores, is_worker, threaded
-from robots.common.workers import start_worker
+from robots.common.workers import give_back, start_worker
 
 Item = TypeVar("Item")
 Result = TypeVar("Result")

@@ -12,9 +12,6 @@ from robots.common.arrays import Array
 from robots.robot import Robot
 from robots.terms.effects import Effect, JointEffect, Situation
 
-LARGEST = 1e15
-"""Largest value of a column, in its unit: more is a response that diverges."""
-
 
 @dataclass(frozen=True)
 class Hypothesis:
@@ -79,8 +76,10 @@ def all_hypotheses(robot: Robot, effects: Sequence[Effect]) -> tuple[Hypothesis,
 def _finite(X: Array) -> Array:
     """Sets values that are not finite to zero, and columns whose squares single precision cannot hold."""
     with np.errstate(all="ignore"):
-        usual = max(X.max(initial=0.0), -X.min(initial=0.0)) < LARGEST
-    if usual:
+        largest = max(X.max(initial=0.0), -X.min(initial=0.0))
+    # A column with larger values, in its unit, is a response that diverges.
+    diverged = 1e15
+    if largest < diverged:
         return X
     X = np.where(np.isfinite(X), X, 0.0)
-    return np.where(np.abs(X).max(axis=0) < LARGEST, X, 0.0)
+    return np.where(np.abs(X).max(axis=0) < diverged, X, 0.0)

@@ -24,8 +24,8 @@ from estimation.diagnosis.searches.refit import RefitResult, base_torque_changed
 from estimation.diagnosis.searches.selection import Selection, select, with_rivals
 from estimation.regressions.parameter_priors import inflate_conflicting_prior
 from robots.base_parameters import BaseParameters
-from robots.common.memory import give_back
 from robots.common.progress import Progress
+from robots.common.workers import give_back
 from robots.terms.effect_bases.capabilities import AboveBand, AtReversals
 from robots.terms.effects import Effect
 

@@ -198,7 +198,7 @@ def with_band(model: Model, logs: Sequence[Log], held_out: Sequence[Log], unseen
     """Sets the half-widths of a band that contains 95 % of the model's errors on held-out data.
 
     The provenance also gets the coverage (n,): the share of each part of the held-out logs that lies in the band from
-    the other parts. It also gets the NRMSE on all rows but those at rest (n,).
+    the other parts. It also gets the NRMSE on all rows that count in a prediction (n,).
 
     Args:
         model: extended model.
@@ -250,7 +250,6 @@ def _predicted(model: Model, log: Log, before: Sequence[Log] = ()) -> Prediction
 
 
 def _error(prediction: Prediction) -> Array:
-    """Errors (N, n), NaN where the joint is at rest: friction may hold it with any torque."""
+    """Errors (N, n), NaN in rows that do not count."""
     assert prediction.measured is not None
-    error = prediction.measured - prediction.predicted
-    return error if prediction.rest is None else np.where(prediction.rest, np.nan, error)
+    return np.where(prediction.judged, prediction.measured - prediction.predicted, np.nan)

@@ -253,13 +253,15 @@ def other_robot(logged: Fitted, found: Found) -> tuple[NDArray[np.intp], Array, 
         The joints, and the unexplained shares of all with this robot and with any (n,); None for this robot.
     """
     left = np.minimum(found.after.unexplained, 1.0)
-    if not (left >= DOUBTFUL).any():
+    # Factors on the torques may hide that positions or masses are wrong.
+    doubtful = left >= (0.0 if any(change.kind == "size" for change in found.changes) else DOUBTFUL)
+    if not doubtful.any():
         return None
     any_ = any_arm(logged)
     order = np.arange(len(left)) if found.reading.tau_from is None else found.reading.tau_from
     other = np.minimum(any_.unexplained, 1.0)[order]
     wrong = np.flatnonzero(other < 0.5 * left)
     better = mean_log(left) - mean_log(other) > BETTER and is_sure(found.after.by_fold, any_.by_fold[order])
-    if len(wrong) < 2 or not (left[wrong] >= DOUBTFUL).any() or not better:
+    if len(wrong) < 2 or not doubtful[wrong].any() or not better:
         return None
     return wrong, left, other

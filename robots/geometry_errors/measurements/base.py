@@ -5,9 +5,8 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import TYPE_CHECKING, ClassVar, TypeAlias
 
-import casadi
 import numpy as np
 
 from robots.common.arrays import Array
@@ -15,7 +14,10 @@ from robots.common.errors import InputError
 from robots.geometry_errors.measurements.setup import Setup
 from robots.geometry_errors.twists import cross_matrix
 
-Scene = tuple[casadi.SX, Mapping[str, casadi.SX]]
+if TYPE_CHECKING:
+    import casadi
+
+Scene: TypeAlias = "tuple[casadi.SX, Mapping[str, casadi.SX]]"
 """Pose of the flange (4, 4), and the parts of the setup by name, as expressions."""
 
 

@@ -4,9 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-import casadi
 import numpy as np
 from scipy.spatial.transform import Rotation
 
@@ -22,6 +21,9 @@ from robots.geometry_errors.measurements.base import (
 from robots.geometry_errors.measurements.poses import BodyPoses
 from robots.geometry_errors.measurements.setup import Setup, Unknown
 from robots.geometry_errors.twists import adjoint, inverse
+
+if TYPE_CHECKING:
+    import casadi
 
 NEAREST = 1e-3  # m; what is nearer than this, or behind, is not in an image
 UNDISTORTIONS = 20  # fixed-point steps from pixels to directions
@@ -174,6 +176,8 @@ class CameraBoard(Measurement):
 
     def expression(self, moved: Scene, nominal: Scene) -> casadi.SX:
         """Writes the pixels, row by row of the board."""
+        import casadi
+
         flange, parts = moved
         camera, board = parts["camera"], parts["board"]
         # Steps are small: the inverse of a pose is right to first order.
@@ -255,5 +259,7 @@ def _bent(x: Array, y: Array, lens: Array) -> tuple[Array, Array, Array]:
 
 
 def _inverse(pose: casadi.SX) -> casadi.SX:
+    import casadi
+
     turned = pose[:3, :3].T
     return casadi.vertcat(casadi.horzcat(turned, -turned @ pose[:3, 3]), casadi.SX([[0.0, 0.0, 0.0, 1.0]]))

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
-import casadi
 import numpy as np
 
 from robots.common.arrays import Array
@@ -17,6 +17,9 @@ from robots.geometry_errors.measurements.base import (
     setup_jacobian,
 )
 from robots.geometry_errors.measurements.setup import Setup, Unknown
+
+if TYPE_CHECKING:
+    import casadi
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -86,6 +89,8 @@ class Distances(Measurement):
 
     def expression(self, moved: Scene, nominal: Scene) -> casadi.SX:
         """Writes the distances; the instrument's zero adds to them."""
+        import casadi
+
         flange, parts = moved
         place = flange[:3, :3] @ parts["tool"] + flange[:3, 3]
         zeros = [parts[f"offset_{k + 1}"] if self.offset else casadi.SX(0.0) for k in range(self.count)]

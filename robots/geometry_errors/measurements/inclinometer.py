@@ -4,14 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
-import casadi
 import numpy as np
 
 from robots.common.arrays import Array
 from robots.geometry_errors.measurements.base import Evaluation, Measurement, Scene, setup_jacobian
 from robots.geometry_errors.measurements.setup import Setup, Unknown, tangents
 from robots.geometry_errors.twists import cross_matrix
+
+if TYPE_CHECKING:
+    import casadi
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -76,6 +79,8 @@ class Inclinometer(Measurement):
 
     def expression(self, moved: Scene, nominal: Scene) -> casadi.SX:
         """Writes roll and pitch."""
+        import casadi
+
         flange, parts = moved
         sensed = parts["sensor"].T @ flange[:3, :3].T @ parts["up"]
         across = casadi.sqrt(sensed[1] ** 2 + sensed[2] ** 2)

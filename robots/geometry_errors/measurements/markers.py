@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
-import casadi
 import numpy as np
 
 from robots.common.arrays import Array
@@ -18,6 +18,9 @@ from robots.geometry_errors.measurements.base import (
     setup_jacobian,
 )
 from robots.geometry_errors.measurements.setup import Setup, Unknown
+
+if TYPE_CHECKING:
+    import casadi
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -80,6 +83,8 @@ class Markers(Measurement):
 
     def expression(self, moved: Scene, nominal: Scene) -> casadi.SX:
         """Writes the positions in the tracker's frame."""
+        import casadi
+
         flange, parts = moved
         seen = parts["tracker"] @ flange
         return casadi.vertcat(*(seen[:3, :3] @ parts[f"marker_{k + 1}"] + seen[:3, 3] for k in range(self.count)))

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
-import casadi
 import numpy as np
 from scipy.spatial.transform import Rotation
 
@@ -20,6 +20,9 @@ from robots.geometry_errors.measurements.base import (
 )
 from robots.geometry_errors.measurements.setup import Setup, Unknown
 from robots.geometry_errors.twists import rotation_log_jacobian, rotation_vector
+
+if TYPE_CHECKING:
+    import casadi
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -75,6 +78,8 @@ class BodyPoses(Measurement):
 
     def expression(self, moved: Scene, nominal: Scene) -> casadi.SX:
         """Writes the position, and the turn from the nominal pose."""
+        import casadi
+
         pose, before = (parts["tracker"] @ flange @ parts["tool"] for flange, parts in (moved, nominal))
         return casadi.vertcat(pose[:3, 3], casadi.inv_skew(before[:3, :3].T @ pose[:3, :3]))
 

@@ -19,7 +19,6 @@ from estimation.diagnosis.recordings.log_reading import build_recording
 from estimation.diagnosis.recordings.recording import Recording
 from robots.robot import Robot
 from robots.signals import Log
-from robots.terms.effect_bases.states import bristle
 from robots.terms.effects import EFFECTS
 from robots.terms.effects.time_delay import lateness
 
@@ -161,31 +160,3 @@ def test_a_lag_of_one_joint_is_reported_no_better_than_its_reversals(
         cross**2 / gram * (1 - 1 / (1 + moment**2 * gram)), rel=0.01, abs=1e-9
     )
     assert (found.local_bic_gain > 10) is (moment == 0)
-
-
-@pytest.mark.slow
-def test_friction_that_turns_round_over_microns_is_reported_no_better_than_the_moments(
-    recording: Recording, pose_arm: Callable[..., Problem]
-) -> None:
-    """The doubtful part of a presliding gain grows with the error of reversal times."""
-    q, dq = recording.q[:, 1], recording.dq[:, 1]
-    z = bristle(recording.t, q, dq, recording.runs, 1e-4)
-    extra = np.zeros_like(recording.tau)
-    extra[:, 1] = 3.0 * (z - np.sign(dq))
-    everywhere = np.ones(recording.q.shape, dtype=bool)
-    problem = pose_arm(replace(recording.with_trusted(everywhere[0]), tau=recording.tau + extra))
-    doubts = []
-    for moment in (1e-6, 3e-4, 1e-3, 3e-3):
-        known = replace(
-            problem.recording,
-            sign_known_from_velocity=everywhere,
-            trusted=everywhere[0],
-            reversal_time_error=np.full(recording.q.shape, moment),
-        )
-        seen: Problem = replace(problem, recording=known)
-        member = refine(seen, Hypothesis(EFFECTS["presliding_hysteresis"], 2), (2e-4,), accept(seen, ()))
-        assert member.gain > 100.0
-        doubts.append(member.motion_error_chi2 / member.gain)
-    assert doubts[0] < 0.01
-    assert doubts == sorted(doubts)
-    assert doubts[-1] > 0.2

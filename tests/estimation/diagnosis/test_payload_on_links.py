@@ -45,7 +45,7 @@ def _log(link: int, centre: np.ndarray = CENTRE) -> Log:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("link", [2, 3])
+@pytest.mark.parametrize("link", [2, pytest.param(3, marks=pytest.mark.longer)])
 def test_a_weight_on_a_link_is_found_there(link: int) -> None:
     """The link, the mass, the centre of mass and the time of the change are those of pinocchio's weight."""
     found = diagnose(load_robot("ur10"), _log(link)).findings
@@ -62,7 +62,7 @@ def test_a_weight_on_a_link_is_found_there(link: int) -> None:
         assert low <= true <= high, name
 
 
-@pytest.mark.slow
+@pytest.mark.longer
 def test_a_weight_that_may_be_on_two_bodies_is_on_the_flange() -> None:
     """A weight on the axis of the last joint fits on the link before it as well: the flange comes first."""
     found = diagnose(load_robot("ur10"), _log(6, np.array([0.0, 0.1, 0.0]))).findings

@@ -131,7 +131,7 @@ def coverage():
 def test_an_own_check_takes_part(er3a, good, coverage):
     """A registered check finds its faults beside the built-in ones, with their severities sorted together."""
     log = good()
-    report = check_log(er3a, Log(log.t, log.q * np.array([1, 0.2, 1, 1, 1, 1]), tau=-log.tau))
+    report = check_log(er3a, Log(log.t, log.q * np.array([1, 0.2, 1, 1, 1, 1]), tau=log.tau))
     (finding,) = (each for each in found(report, "coverage") if each.joint == 2)
     assert finding.severity == "warning"
     assert report.findings[0].severity == "refuse"

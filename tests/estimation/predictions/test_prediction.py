@@ -119,7 +119,7 @@ def test_currents_count_by_the_torque_constants(arm, arm_log):
 
 def by_torque_rms(estimate, log):
     found = predict(estimate.model, log)
-    return np.sqrt(np.average((log.tau - found.predicted) ** 2, axis=0, weights=~found.rest))
+    return np.sqrt(np.average((log.tau - found.predicted) ** 2, axis=0, weights=~found.rest & ~found.ends[:, None]))
 
 
 @pytest.mark.slow

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from robots.common.memory import give_back
+from robots.common.workers import give_back
 
 
 def _resident() -> int:

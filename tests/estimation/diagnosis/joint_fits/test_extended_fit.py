@@ -84,7 +84,7 @@ def test_what_a_log_leaves_open_has_no_interval(
     ("effect", "joint", "known", "size"),
     [
         ("friction_step", 1, (), (0.5, 0.3)),
-        ("payload_change", None, (1.0,), (0.5, 0.1, 0.0, 0.0, 0.001, 0.0, 0.0, 0.021, 0.0, 0.021)),
+        ("payload_change", None, (1.0, 0.0), (0.5, 0.1, 0.0, 0.0, 0.001, 0.0, 0.0, 0.021, 0.0, 0.021)),
     ],
 )
 def test_a_change_between_two_logs_is_within_the_pause(

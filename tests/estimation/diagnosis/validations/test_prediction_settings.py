@@ -107,8 +107,8 @@ def test_its_band_grows_as_errors_do_on_parts_left_out(noisy: Model, arm_log: Ca
     log, model = arm_log(torque_noise=0.05), noisy
     found = predict(model, log)
     error = np.abs(log.tau - found.predicted)
-    pairs = zip(error.T, found.rest.T, strict=True)
-    seen = np.array([np.quantile(column[~rest], 0.95) for column, rest in pairs])
+    pairs = zip(error.T, found.judged.T, strict=True)
+    seen = np.array([np.quantile(column[judged], 0.95) for column, judged in pairs])
     parts = np.ones((50, 2))
     fitted = (parts, np.array([1.5, 4.0]) * parts)
     unseen = HeldOutErrors("", np.arange(50.0), 1.0, parts, (parts, 3.0 * parts), parts > 0, fitted)
