@@ -41,6 +41,8 @@ BASIC = ("armature", "viscous", "coulomb", "torque_offset")
 """Parameters of every joint that are always identified, beside the delay of all."""
 TRAINED = 0.7
 """Share of each run that is fitted where no log is held out."""
+EXPLAINED_SHARE = 0.2
+"""Largest share of what command and measurement differ by that a simulation may miss."""
 ROUGH = 1e-3
 """Relative decrease of the cost at which the fit ends that effects are compared with."""
 NEUTRAL = {
@@ -168,6 +170,17 @@ def _fit_notes(fit: Fit) -> list[str]:
     return [] if fit.settled else ["the fit had not settled after the allowed iterations: allow more"]
 
 
+def _limits(runs: Sequence[Run]) -> Array:
+    """Errors (n,) above which a simulated motion is not explained, see `MotionError`."""
+    differences = []
+    for run in runs:
+        command = np.column_stack([np.interp(run.t, run.log_t, column) for column in run.command.T])
+        differences.append((run.q - command)[run.counted])
+    deviation = np.sqrt(np.mean(np.concatenate(differences) ** 2, axis=0))
+    noise = np.max([run.noise for run in runs], axis=0)
+    return np.asarray(np.maximum(EXPLAINED_SHARE * deviation, 3.0 * noise))
+
+
 def _result(
     fleet: Fleet,
     fit: Fit,
@@ -183,9 +196,15 @@ def _result(
     fitted_as_described = _described_errors(fleet, runs)
     seen_as_described, after = _described_errors(fleet, seen), simulate_runs(reached, fit.values, seen, refinement=FINE)
     errors = tuple(
-        MotionError(name=name, described=a, fitted=b, held_out_described=c, held_out=d)
-        for name, a, b, c, d in zip(
-            fleet.names, rms(fitted_as_described), fit.rms[: fleet.n], rms(seen_as_described), rms(after), strict=True
+        MotionError(name=name, described=a, fitted=b, held_out_described=c, held_out=d, limit=e)
+        for name, a, b, c, d, e in zip(
+            fleet.names,
+            rms(fitted_as_described),
+            fit.rms[: fleet.n],
+            rms(seen_as_described),
+            rms(after),
+            _limits(seen),
+            strict=True,
         )
     )
     drives, parameters = reached.with_values(fit.values), _parameters(fleet, fit, options.seed)

@@ -121,6 +121,10 @@ class LoopDiagnosis(Result, format="robot-oed loop diagnosis"):
             )
             known = (f"{p.name} {p.value:.3g} ({p.ci95[0]:.3g} to {p.ci95[1]:.3g}) {p.unit}" for p in item.parameters)
             lines.append(f"    95 % intervals: {'; '.join(known)}")
+        held_out = ", ".join(f"{error.name} {1e3 * error.held_out:.3g}" for error in self.errors)
+        lines.append(f"  held-out error of the simulated motion [mrad or mm]: {held_out}")
+        if self.unexplained and self.next_motion:
+            lines.append(f"  next: {self.next_motion}")
         return "\n".join(lines)
 
     def to_frame(self) -> pd.DataFrame:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
@@ -73,6 +74,8 @@ class MotionError:
         fitted: with the identified drives, on the fitted runs.
         held_out_described: with the drives as described, on held-out runs.
         held_out: with the identified drives, on held-out runs.
+        limit: error on held-out runs above which the motion is not explained: a fifth of what command and measurement
+            differ by, and three times the encoder's noise. NaN where it is not known.
     """
 
     name: str
@@ -80,6 +83,7 @@ class MotionError:
     fitted: float
     held_out_described: float
     held_out: float
+    limit: float = math.nan
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -172,9 +176,9 @@ class Actuators(Result, format="robot-oed actuators"):
 
     @property
     def unexplained(self) -> tuple[MotionError, ...]:
-        """Joints whose held-out error is far above that of the others."""
+        """Joints whose held-out error is above their limit, or far above that of the others."""
         middle = float(np.median([error.held_out for error in self.errors]))
-        return tuple(e for e in self.errors if e.held_out > _UNEXPLAINED * middle and len(self.errors) > 1)
+        return tuple(e for e in self.errors if e.held_out > e.limit or e.held_out > _UNEXPLAINED * middle)
 
     @property
     def undetermined(self) -> tuple[DriveValue, ...]:

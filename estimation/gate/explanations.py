@@ -228,9 +228,9 @@ _TABLE: dict[tuple[int, str], tuple[str, str, str]] = {
         "Check the units of t and q, and that the log belongs to this robot.",
     ),
     (45, "torque_meaning"): (
-        "The torques seem to be without gravity, of the side of the motor, or currents.",
+        "The torques seem to be without gravity, of the side of the motor, currents, or in another unit.",
         "tau is what a controller adds to its compensation of gravity.",
-        "State the meaning with --torque-is.",
+        "State the meaning with --torque-is, or the unit with `torque: {scale: ...}` in a mapping (--mapping).",
     ),
     (46, "torque_sign"): (
         "A torque has the wrong sign: inertia and friction of the joint would be negative.",
