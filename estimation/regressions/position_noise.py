@@ -60,8 +60,7 @@ def passed_noise(smoother: Smoother, positions: Resampled, seed: int = 0) -> Arr
     noise = np.random.default_rng(seed).standard_normal((rows, 8))
     t = positions.t[:rows]
     motion = smoother.smooth(replace(positions, t=t, q=noise, original=t))
-    edge = smoother.edge(motion.duration)
-    inside = (t >= t[0] + edge) & (t <= t[-1] - edge)
+    inside = smoother.inside(t)
     left = np.stack([signal[inside].reshape(-1) for signal in (motion.q, motion.dq, motion.ddq)])
     return np.asarray(left @ left.T / left.shape[1])
 

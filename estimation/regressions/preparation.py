@@ -146,10 +146,9 @@ class Prepared:
             yield self.cut(slice(start, start + rows))
 
     def _inside(self, motion: Motion, smoother: Smoother) -> tuple[Motion, Array]:
-        t, edge = motion.t, smoother.edge(motion.duration)
-        begin = int(np.searchsorted(t, t[0] + edge))
-        end = int(np.searchsorted(t, t[-1] - edge, side="right"))
-        return (motion.slice(begin, end) if (begin, end) != (0, len(t)) else motion), self.tau[begin:end]
+        rows = np.flatnonzero(smoother.inside(motion.t))
+        begin, end = int(rows[0]), int(rows[-1]) + 1
+        return (motion.slice(begin, end) if end - begin < len(motion) else motion), self.tau[begin:end]
 
     def _masked(self, parts: list[tuple[Motion, Array]]) -> list[Rows]:
         """Leaves out the rows (N, n) in which a joint is almost at rest, by its speed in all parts together.
