@@ -1,4 +1,4 @@
-"""How a worker process begins and ends: with its parent, and by any signal."""
+"""How a worker process begins and ends, with its parent and by any signal; and memory that is no longer needed."""
 
 from __future__ import annotations
 
@@ -49,6 +49,3 @@ def give_back() -> None:
     trim = getattr(ctypes.CDLL(None), "malloc_trim", None)
     if trim is not None:
         trim(0)
-
-
-__all__ = ["give_back"]
