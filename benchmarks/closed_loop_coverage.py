@@ -298,12 +298,12 @@ def main() -> int:
         row = run(seed, options.logs)
         with options.out.open("a") as file:
             file.write(json.dumps(row, default=float) + "\n")
-        told = ", ".join(
+        held = ", ".join(
             f"{p['name']} {p['truth']:.4g} in {p['ci95'][0]:.4g} to {p['ci95'][1]:.4g}"
             + ("" if p["ci95"][0] <= p["truth"] <= p["ci95"][1] else " MISSED")
             for p in row["intervals"]
         )
-        print(f"{seed} {row['effect']} {row['joint'] or ''}: {row['found']}, {told} ({row['cpu']:.0f} s)", flush=True)
+        print(f"{seed} {row['effect']} {row['joint'] or ''}: {row['found']}, {held} ({row['cpu']:.0f} s)", flush=True)
     print(figures(read_rows(options.out)))
     return 0
 

@@ -41,7 +41,7 @@ ELSEWHERE = {
     "robot-oed discriminating experiment": "read its trajectory.csv by oed.read_trajectory",
     "robot-oed pareto front": "load one of the designs in its sub-folders",
 }
-"""What to do about results of which the files hold figures only."""
+"""What to do about results whose files hold figures only."""
 
 REMEDY = "give a result of oed: its folder, or its JSON file"
 

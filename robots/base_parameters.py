@@ -158,8 +158,8 @@ def find_base_parameters(
 
     A column that the ones before it span, on random states all over the robot's ranges, is regrouped into them
     (thesis section 1.3.1); the singular values must confirm the rank (section 1.3.2). Columns are measured against the
-    largest of their kind (masses, moments, inertias, ...). Where right angles are rounded to 1.57 some stand out by
-    parts in a million, and where a calibration found axes that lean by a milliradian by a thousandth: their torque is
+    largest of their kind (masses, moments, inertias, ...). Where right angles are rounded to 1.57, some are independent
+    by parts in a million; where a calibration found axes that lean by a milliradian, by a thousandth. Their torque is
     below what noise and motion show. Arms as they are designed have no column between 0.0001 and 0.03 (20 public
     descriptions). `BaseParameters.neglected` says how much was left out.
 

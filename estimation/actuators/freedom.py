@@ -110,7 +110,7 @@ class Fleet:
         return Fleet([self.robots[chain]], drives, [self.dynamics[chain]])
 
     def with_drives(self, drives: Sequence[Drive]) -> Fleet:
-        """Gives the chains with other drives; those of which no drive differs keep their compiled functions."""
+        """Gives the chains with other drives; chains whose drives are the same keep their compiled functions."""
         dynamics = []
         for chain, columns in enumerate(self.columns):
             own = [drives[j] for j in columns]

@@ -79,7 +79,7 @@ class _Promise:
     start: dict[str, float]
     share: float
     cost: float
-    """What it takes off the chain's weighted squared error on fitted data; infinite where nobody knows."""
+    """What it takes off the chain's weighted squared error on fitted data; infinite where it is not known."""
 
 
 _Trial = tuple[float, _Promise, Fit, list[Errors]]
@@ -192,7 +192,7 @@ def _outside(fit: Fit, held_out: Sequence[Run]) -> list[Errors]:
 
 
 def _plainest(best: _Trial, trials: Sequence[_Trial], weights: Array) -> _Trial:
-    """Takes a trial of which the best one is a special case with more parameters, unless that is surely better."""
+    """Prefers a special case of the best trial, with fewer parameters, unless the best one is surely better."""
     _, promise, _, seen = best
     for trial in trials:
         effect = trial[1].effect

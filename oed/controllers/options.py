@@ -40,7 +40,7 @@ def _byte(option: str, text: str) -> int:
 
 @dataclass(frozen=True, kw_only=True)
 class DriverSettings:
-    """Settings of which a driver's profile has the defaults.
+    """Settings whose defaults are those of a driver's profile.
 
     Attributes:
         driver: program on the controller: efort, fanuc, motoman, abb, egm, ur or generic. Sets what is not stated.

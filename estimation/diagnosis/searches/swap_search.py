@@ -1,4 +1,4 @@
-"""Refinement of candidates, and of selected effects, each of which may be replaced by a rival or dropped."""
+"""Refinement of candidates and of selected effects; a selected effect may be replaced by a rival, or dropped."""
 
 from __future__ import annotations
 

@@ -47,7 +47,7 @@ class Found:
 
     Attributes:
         reading: of the log.
-        changes: of which it consists; none for a log that is read as it was logged.
+        changes: its parts; none for a log that is read as it was logged.
         before: fit of the log as it was logged.
         after: fit of the log as it is read.
         certain: whether the log fits with this reading only.
